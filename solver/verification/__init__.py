@@ -1,5 +1,5 @@
-"""How fast the solver is and how true: measured on the machine it runs on, subject by subject, on one page.
+"""Speed and accuracy of the solver, measured on the present machine, subject by subject, on one page.
 
-A subject is a file with `measure(asked, found)`, a generator of rows: plain data, nothing drawn, nothing written.
-`subjects.py` lists them, `measuring.py` runs them, `page.py` and `figures/` tell what they found.
+A subject is a file with `measure(request, measurements)`, a generator of rows: plain data, nothing drawn or written.
+`subjects.py` lists the subjects, `measuring.py` runs them, and `daq_app.accuracy_page` shows the rows.
 """

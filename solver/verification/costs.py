@@ -1,8 +1,8 @@
 """Where the time of one solve goes: mesh, assembly, factorisation, contact, estimate.
 
-A solve through the front door is run once to load what must be loaded, timed, and run again under a profiler whose
-shares are then of the time without it. What a function outside the solver takes is its caller's; all that is done for
-the error estimate and for evidence is theirs, on whatever mesh.
+A solve by the public face runs once to load everything, once timed, and once under a profiler. The profiler's shares
+are then of the time without it. Time in a function outside the solver counts for its caller. Time for the error
+estimate and for evidence counts as theirs, on whatever mesh.
 """
 
 import cProfile
@@ -20,7 +20,7 @@ from solver.verification.methods import Kinematics
 from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
-# The part of a solve that a folder of the solver works for, or a file or a compiled loop of it that differs.
+# Part of a solve by folder of the solver, or by file or compiled loop where that differs from the folder's.
 PARTS = {
     "mesh": "mesh and tables", "body": "assembly", "constitutive": "assembly", "linalg": "factorisation",
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
@@ -32,7 +32,7 @@ PARTS = {
     "_kernels.elements": "assembly", "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
     "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "proof of existence",
 }  # fmt: skip
-WHOLE = {"on_nested": "error estimate", "with_held": "evidence"}  # all that these do, on whatever mesh
+WHOLE = {"on_nested": "error estimate", "with_held": "evidence"}  # their calls count here, on whatever mesh
 OTHER = "the rest"
 Function = tuple[str, int, str]  # file, line, name
 # calls, own and total time, callers
@@ -47,14 +47,14 @@ class Cost:
     tolerance: float
     dofs: int
     took_s: float  # from scene to answer: median
-    setup_s: float  # as the answer itself tells, of the mesh it is from
+    setup_s: float  # from the answer, for its own mesh
     wall_s: float
     estimate_s: float
     parts: dict[str, float]  # shares of `took_s`
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Cost | LeftOut]:
-    """Return an iterator over a row a kinematics and tolerance."""
+    """Return an iterator over rows, one for each kinematics and tolerance."""
     del measurements
     works: list[tuple[Kinematics, float]] = [
         (kind, tolerance) for tolerance in request.pick((0.01, 0.003), (0.01,)) for kind in KINEMATICS
@@ -68,7 +68,7 @@ def _cost(kinematics: Kinematics, tolerance: float) -> Cost:
     solve(scene)
     start, before = clock(), perf_counter()
     answer = solve(scene)
-    own = (clock() - start) / (perf_counter() - before)  # of the time that passed, by which answers tell theirs
+    own = (clock() - start) / (perf_counter() - before)  # processor time by elapsed time, in which answers measure
     span = median_time(partial(solve, scene), 5, 1.5)
     profile = cProfile.Profile()
     profile.enable()
@@ -81,16 +81,16 @@ def _cost(kinematics: Kinematics, tolerance: float) -> Cost:
 
 
 def shares(profile: pstats.Stats) -> dict[str, float]:
-    """Return the share of every part in a profile, the largest first."""
+    """Return the share of every part in a profile, largest first."""
     raw = cast("dict[Function, Spent]", vars(profile)["stats"])
-    known: dict[Function, dict[str, float]] = {}
+    cache: dict[Function, dict[str, float]] = {}
 
     def parts(function: Function, above: frozenset[Function] = frozenset()) -> dict[str, float]:
-        """Return which parts a function works for, as shares that sum to 1."""
+        """Return the parts that a function works for, as shares that sum to 1."""
         if function[2] in WHOLE:
             return {WHOLE[function[2]]: 1.0}
-        if function in known:
-            return known[function]
+        if function in cache:
+            return cache[function]
         callers = {caller: spent[3] for caller, spent in raw[function][4].items() if caller not in above}
         total, out = sum(callers.values()), dict[str, float]()
         for caller, spent in callers.items():
@@ -99,8 +99,8 @@ def shares(profile: pstats.Stats) -> dict[str, float]:
         if (own := _part(function)) is not None:
             out = {name: share for name, share in out.items() if name in WHOLE.values()}
             out[own] = 1.0 - sum(out.values())
-        known[function] = out or {OTHER: 1.0}
-        return known[function]
+        cache[function] = out or {OTHER: 1.0}
+        return cache[function]
 
     spent: dict[str, float] = {}
     for function, row in raw.items():
@@ -111,7 +111,7 @@ def shares(profile: pstats.Stats) -> dict[str, float]:
 
 
 def _part(function: Function) -> str | None:
-    """Return the part that a function works for by itself; None where it is its caller's."""
+    """Return the part that a function itself works for; None where it counts for its caller."""
     path, _, name = function
     if name.startswith("<built-in method solver."):  # a compiled loop
         place = name.removeprefix("<built-in method solver.").removesuffix(">").split(".")

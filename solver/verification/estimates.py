@@ -1,7 +1,7 @@
-"""The solver's own error estimates against true errors, and what an answer with a guaranteed tolerance takes.
+"""The solver's own error estimates against true errors, and the cost of an answer with a guaranteed tolerance.
 
-All through the front door: scenes in, `tolerance` asked for, answers with their estimates out. The published surfaces,
-solved together, and random scenes, each alone.
+Everything goes through the public face: scenes with a `tolerance` in, answers with their estimates out. The published
+surfaces are solved together, random scenes one by one.
 """
 
 from collections.abc import Iterator
@@ -20,53 +20,53 @@ from solver.verification.request import LeftOut, Measurements, Request, clock, r
 from solver.verification.truth import KINEMATICS, NUMBERS, cases, known_truths, mean_and_doubt
 
 TOLERANCES = (0.01, 0.003, 0.001)
-SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
-MOST = 10.0  # times the true error that an estimate may be
+SMALL = 2e-4  # relative error below which an estimate may be any factor too large
+MOST = 10.0  # largest ratio of estimate to true error
 RANDOM: dict[Kinematics, int] = {"small": 12, "finite": 6}  # scenes, as far as time allows
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One number of one answer: how far it was said to be off at most, and how far it is."""
+    """One number of one answer: its estimated and its true error."""
 
     kinematics: Kinematics
     case: str
     number: str
-    tolerance: float  # asked of the SED; 0 where none was
+    tolerance: float  # of the SED; 0 where none was requested
     dofs: int
     estimate: float  # relative
     error: float  # relative
     doubt: float  # of the truth, relative
     corrected: float | None = None  # error of the value on the nested mesh, relative
-    towards: bool = False  # whether that lies on the truth's side of the value
+    towards: bool = False  # whether this value lies on the truth's side of the answer
 
     @property
     def above(self) -> bool | None:
-        """Whether the estimate lies above the true error; None where the truth is too doubtful to tell."""
+        """Whether the estimate lies above the true error; None where the truth is too uncertain to decide."""
         return self.estimate >= self.error if self.doubt <= max(self.estimate, self.error) / 3.0 else None
 
     @property
     def near(self) -> bool | None:
-        """Whether the estimate lies below ten times max(true error, 0.02 %); None where the truth cannot tell."""
+        """Whether the estimate lies below ten times max(true error, 0.02 %); None where the truth is too uncertain."""
         bound = MOST * max(self.error, SMALL)
         return self.estimate < bound if self.doubt <= bound / 3.0 else None
 
     @property
     def met(self) -> bool | None:
-        """Whether the true error lies below the tolerance asked for; None where the truth cannot tell."""
+        """Whether the true error lies below the requested tolerance; None where the truth is too uncertain."""
         return self.error <= self.tolerance if self.doubt <= self.tolerance / 3.0 else None
 
 
 @dataclass(frozen=True, slots=True)
 class GuaranteedCost:
-    """What it takes to be sure of a tolerance, in compiled loops: every mesh tried and every estimate included."""
+    """Cost of an answer with a guaranteed tolerance, with compiled loops; all meshes and estimates are included."""
 
     kinematics: Kinematics
     tolerance: float
-    surfaces: int  # solved together
+    surfaces: int  # number of surfaces solved together
     dofs: int
     took_s: float  # from scenes to answers
-    wall_s: float  # of it, the solves on the last mesh
+    wall_s: float  # of which the solves on the last mesh
     setup_s: float  # its mesh and tables
     estimate_s: float  # its estimates
     worst_estimate: float
@@ -74,7 +74,7 @@ class GuaranteedCost:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
-    """Yield the published surfaces at each tolerance, then random scenes until time is over."""
+    """Yield the published surfaces at each tolerance, then random scenes until the time is up."""
     for kinematics in KINEMATICS:
         yield from _estimate_published(request, measurements, kinematics)
     for kinematics in KINEMATICS:
@@ -91,18 +91,19 @@ def _estimate_published(
 
     def rows_at(tolerance: float) -> Iterator[Estimate | GuaranteedCost]:
         start = clock()
-        found_all = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
+        results = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
         elapsed_s = clock() - start
         rows: list[Estimate] = []
-        good = [a for a in found_all if isinstance(a, Prediction)]
-        for answer in good:
+        answers = [a for a in results if isinstance(a, Prediction)]
+        for answer in answers:
             truth = truths[answer.scene.title]
             rows += compare(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
         yield from rows
-        if good:
+        if answers:
             yield GuaranteedCost(
-                kinematics, tolerance, len(chosen), max(a.dofs for a in good), elapsed_s, sum(a.wall_s for a in good),
-                good[0].setup_s, sum(a.estimate_s for a in good), max(a.error_estimate for a in good),
+                kinematics, tolerance, len(chosen), max(a.dofs for a in answers), elapsed_s,
+                sum(a.wall_s for a in answers), answers[0].setup_s, sum(a.estimate_s for a in answers),
+                max(a.error_estimate for a in answers),
                 max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
             )  # fmt: skip
 
@@ -111,7 +112,7 @@ def _estimate_published(
 
 
 def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | LeftOut]:
-    wanted = 2 if request.quick else RANDOM[kinematics]
+    count = 2 if request.quick else RANDOM[kinematics]
     refused = 0
 
     def rows_of(number: int) -> Iterator[Estimate]:
@@ -127,13 +128,13 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
         else:
             yield from compare(answer, TOLERANCES[0], *truth)
 
-    yield from rows_within(request, range(wanted), f"random scenes at {kinematics} strain", rows_of)
+    yield from rows_within(request, range(count), f"random scenes at {kinematics} strain", rows_of)
     if refused:
-        yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
+        yield LeftOut(f"{refused} of {count} random scenes at {kinematics} strain have no settled state to compare.")
 
 
 def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
-    """Return the estimates of an answer's numbers beside their errors against `truth` (3,) of relative `doubt` (3,)."""
+    """Return the estimates of an answer's numbers with their errors against `truth` (3,) of relative `doubt` (3,)."""
     values = np.abs((answer.sed_ending, answer.normal_force, answer.tangential_force))
     estimates = (answer.error_estimate, answer.normal_force_error, answer.tangential_force_error)
     nested = None if answer.nested is None else np.abs(answer.nested.numbers)

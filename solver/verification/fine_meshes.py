@@ -1,4 +1,4 @@
-"""The truth of a random scene: its numbers on two uniformly fine meshes, and on one refined where its error is made."""
+"""The truth of a random scene: its numbers on two uniformly fine meshes, and on one refined by its estimated error."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -18,21 +18,21 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.methods import Kinematics
 
-# fineness, whether moved along the skin by half an element, and times the usual load steps: the first that have a state
-MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by whether the end depends on its way
+# fineness, shift by half an element, and number of load steps by the usual; the first with a solution are used
+MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by kinematics, `depends_on_way`
     ("small", False): ((26.0, False, 1), (26.0, True, 1), (23.0, False, 1), (23.0, True, 1), (29.0, False, 1)),
     ("small", True): ((16.0, False, 12), (16.0, True, 14), (14.0, False, 16), (14.0, True, 13)),
     ("finite", False): ((15.0, False, 1), (15.0, True, 1), (13.0, False, 1), (13.0, True, 1), (17.0, False, 1)),
     ("finite", True): ((10.0, False, 4), (10.0, True, 5), (9.0, False, 6), (9.0, True, 4)),
 }
-ENOUGH = 2  # of them
+ENOUGH = 2  # number of meshes used
 REFINED = {"small": 2e-4, "finite": 1e-3}  # tolerance that refines the third
 
 
 def fine_numbers(scenes: Sequence[Scene]) -> Array:
     """Return SED [MPa], normal force and drag [N/mm] (3, n, 3) of scenes of one finger on three meshes.
 
-    Raises SolveFailure where fewer have a state.
+    Raises SolveFailure where fewer meshes have a solution.
     """
     solves: list[Array] = []
     for mesh in MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]:
@@ -44,18 +44,18 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
 
 
 def _solve_refined(scenes: Sequence[Scene]) -> Array:
-    """Return the same (n, 3) as the nested mesh has it of an answer that was refined to a tight tolerance."""
+    """Return the numbers (n, 3) of the nested mesh of answers with a tight tolerance."""
     tolerance = REFINED[scenes[0].solve.kinematics]
     tight = {"tolerance": tolerance, "contrast_tolerance": tolerance if len(scenes) > 1 else None, "evidence": "quick"}
     answers = solve_many([replace(scene, solve=replace(scene.solve, **tight)) for scene in scenes])
-    known = [one.nested.numbers[:3] for one in answers if isinstance(one, Prediction) and one.nested is not None]
-    if len(known) < len(scenes):
+    numbers = [one.nested.numbers[:3] for one in answers if isinstance(one, Prediction) and one.nested is not None]
+    if len(numbers) < len(scenes):
         raise NotConverged("No refined mesh has a state.")
-    return np.abs(known)
+    return np.abs(numbers)
 
 
 def depends_on_way(scene: Scene) -> bool:
-    """Return whether the end of a scene may depend on its load steps."""
+    """Return whether the final state of a scene may depend on its load steps."""
     return scene.loading.direction == 0 or scene.loading.dragged
 
 

@@ -1,4 +1,4 @@
-"""A course of 200 substeps against the settled state found directly: the same state, at how many times the cost."""
+"""A load path of 200 substeps against the steady state solved directly: the same state, at a multiple of the cost."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from solver.verification.methods import MESHED, Kinematics
 from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
 from solver.verification.truth import JUDGED, KINEMATICS, cases
 
-PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and how far it goes [mm]
+PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and its distance [mm]
 FINENESS: dict[Kinematics, float] = {"small": 4.0, "finite": 3.0}
 
 
 @dataclass(frozen=True, slots=True)
 class March:
-    """One surface marched and solved directly, on the same mesh."""
+    """One surface, marched and solved directly on the same mesh."""
 
     kinematics: Kinematics
     case: str
@@ -27,7 +27,7 @@ class March:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[March | LeftOut]:
-    """Return an iterator over a row a surface and kinematics."""
+    """Return an iterator over rows, one for each kinematics and surface."""
     del measurements
     names = ("slipperiness 100", "stickiness 0") if request.quick else JUDGED
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in names]
@@ -37,9 +37,9 @@ def measure(request: Request, measurements: Measurements) -> Iterator[March | Le
 def press_and_slide(
     depth: float, mu: float, tau: float, direction: int, press: int, slides: int, distance: float
 ) -> list[LoadState]:
-    """Return the course of a bone driven `depth` [mm] down in `press` steps, then `distance` [mm] along in `slides`.
+    """Return the load path of a bone driven `depth` [mm] down in `press` steps, then `distance` [mm] along in `slides`.
 
-    `direction` is that of the bone, +1 along +x: the surface goes the other way.
+    `direction` is that of the bone, +1 along +x: the surface moves the other way.
 
     >>> [(p.depth, p.travel) for p in press_and_slide(1.0, 0.3, 0.02, +1, press=2, slides=2, distance=4.0)]
     [(0.5, 0.0), (1.0, 0.0), (1.0, -2.0), (1.0, -4.0)]

@@ -1,4 +1,4 @@
-"""What the numbers were measured on: machine, load, versions."""
+"""The machine of a measurement: hardware, load, versions."""
 
 import os
 import platform
@@ -11,18 +11,18 @@ from solver.verification.request import Measurements, Request
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One machine at one moment. Times on a busy one are longer than the solver's own."""
+    """One machine at one moment. Times on a busy machine are longer than the solver's own."""
 
     system: str
     processor: str
     cores: int
-    threads: str  # that linear algebra may use, as the environment says
-    load: float | None  # processes that wanted a core, mean of the last minute; None where the system does not tell
+    threads: str  # threads of linear algebra, by the environment variable
+    load: float | None  # running processes, mean of the last minute; None where the system does not report it
     versions: dict[str, str]
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Machine]:
-    """Yield the one row."""
+    """Yield one row."""
     del measurements
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     threads = os.environ.get("OPENBLAS_NUM_THREADS", "not limited")
@@ -33,7 +33,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Machine]:
 
 
 def _processor() -> str:
-    """Return what the processor calls itself, where the system tells."""
+    """Return the processor's own name where the system reports it."""
     info = Path("/proc/cpuinfo")
     if info.exists():
         for line in info.read_text(encoding="utf-8", errors="replace").splitlines():

@@ -1,8 +1,8 @@
-"""Pages of the docs with tables that are made and not typed, each between its marks."""
+"""Generated tables in pages of the docs, each between its marks."""
 
 
 def fill_marks(text: str, name: str, text_between: str) -> str:
-    r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
+    r"""Return the page with the table between its marks replaced. Raises ValueError where the marks are missing.
 
     >>> fill_marks("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
     'a <!-- x: begin -->\nnew\n<!-- x: end --> b'

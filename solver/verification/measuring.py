@@ -1,4 +1,4 @@
-"""Run the subjects one after another, within the time there is, and keep what was found however it ends."""
+"""Run the subjects one after another within the time there is; an early end keeps the rows so far."""
 
 import datetime
 from collections.abc import Callable, Mapping, Sequence
@@ -30,8 +30,8 @@ from solver.verification.warm import Warm
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-FULL_S, QUICK_S = 140.0, 12.5  # what the subjects may take; what was begun is ended, and drawing comes on top
-# every kind of row, by its name in the JSON file
+FULL_S, QUICK_S = 140.0, 12.5  # time for the subjects; a running item is finished, and drawing takes more
+# row classes by their names in the JSON file
 KINDS = {
     kind.__name__: kind
     for kind in (
@@ -39,28 +39,28 @@ KINDS = {
         HardCase, Target,
     )
 }  # fmt: skip
-ALWAYS = ("machine", "targets")  # cost nothing, and follow even after a stop
+ALWAYS = ("machine", "targets")  # run even after a stop, since they take no time
 Progress = Callable[[float, str], None]
 R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
 class RunResults:
-    """All that one run found."""
+    """Results of one run."""
 
     begun: str  # date and time, UTC
     quick: bool
-    stopped: bool  # by the user, before everything was measured
+    stopped: bool  # by the user, before all subjects were done
     took_s: dict[str, float]  # by subject
     rows: "Mapping[str, tuple[DataclassInstance, ...]]"  # by subject
     left_out: tuple[str, ...]
 
     def of(self, kind: type[R]) -> list[R]:
-        """Return all rows of one kind."""
+        """Return all rows of one class."""
         return [row for rows in self.rows.values() for row in rows if isinstance(row, kind)]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for a JSON file; a number that is none is null."""
+        """Return plain data for a JSON file; nan becomes null."""
         rows = {
             name: [{"kind": type(row).__name__, **asdict(row)} for row in measurements]
             for name, measurements in self.rows.items()
@@ -73,7 +73,7 @@ class RunResults:
 
 
 def restore(document: dict[str, Any]) -> RunResults:
-    """Return what `to_dict` made plain data of. Raises msgspec.ValidationError where it is something else."""
+    """Return the results from the data of `to_dict`. Raises msgspec.ValidationError for data of another form."""
     rows = {
         subject.name: tuple(
             msgspec.convert({name: value for name, value in row.items() if name != "kind"}, KINDS[row["kind"]])
@@ -91,12 +91,12 @@ def measure(
     quick: bool, progress: Progress, host: Host, subjects: Sequence[Subject] = SUBJECTS,
     seconds: float | None = None, clock: Callable[[], float] = perf_counter,
 ) -> RunResults:  # fmt: skip
-    """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then.
+    """Run the subjects and return their results. Ctrl-C ends the run and keeps the rows so far.
 
-    `seconds` of `clock` are there for all: with one of processor time a busy machine measures as much as a quiet one.
+    The run takes `seconds` of `clock`. With a clock of processor time, a busy machine measures as much as an idle one.
     """
     begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-    warm_up(progress)  # before the clock starts: the first run ever compiles what later ones load
+    warm_up(progress)  # before the clock starts: the first run on a machine compiles, later ones load
     start = clock()
     end = start + (seconds or (QUICK_S if quick else FULL_S))
     measurements = Measurements()
@@ -111,26 +111,26 @@ def measure(
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
         now = clock()
         request = Request(quick, now + max(end - now, 0.0) * part, clock, host)
-        mine: list[DataclassInstance] = []
+        subject_rows: list[DataclassInstance] = []
         try:
             for row in subject.measure(request, measurements):
                 progress(min((clock() - start) / (end - start), 0.99), subject.doing)
                 if isinstance(row, LeftOut):
                     left_out.append(row.reason)
                 else:
-                    mine.append(row)
+                    subject_rows.append(row)
                     measurements.rows.append(row)
         except KeyboardInterrupt:
             stopped = True
             left_out.append(f"Stopped during: {subject.doing}.")
         except (SolveFailure, ArithmeticError, ValueError) as failure:
             left_out.append(f"{subject.doing.capitalize()} broke off: {failure}")
-        rows[subject.name], took[subject.name] = tuple(mine), clock() - now
+        rows[subject.name], took[subject.name] = tuple(subject_rows), clock() - now
     return RunResults(begun, quick, stopped, took, rows, tuple(left_out))
 
 
 def warm_up(progress: Progress) -> None:
-    """Solve once in each kinematics and follow one reading, so that compiled loops are in memory and nothing waits."""
+    """Solve once in each kinematics and take one step, so that all compiled loops are loaded."""
     progress(0.0, "loading compiled loops")
     for kinematics in ("small", "finite"):
         scene = cases(kinematics)[-1]

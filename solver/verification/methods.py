@@ -1,4 +1,4 @@
-"""A finger on one mesh as it is measured: both kinematics behind one face."""
+"""A finger on one mesh, measured by one interface for both kinematics."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -40,7 +40,7 @@ class MeshMethod(ABC, Generic[AnyFinger]):
 
     @abstractmethod
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Return the settled state of `scene`, from the undeformed finger or from the state of a similar surface.
+        """Return the steady state of `scene`, from the undeformed finger or from the state of a similar surface.
 
         Raises SolveFailure where there is none.
         """
@@ -54,28 +54,28 @@ class MeshMethod(ABC, Generic[AnyFinger]):
         return self.numbers_together([state])[0]
 
     def numbers_together(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return them for several states (n, 3)."""
+        """Return these numbers for several states (n, 3)."""
         return np.abs(self.finger.numbers(states))
 
 
 class SmallMethod(MeshMethod[LinearFinger]):
-    """Small strain: all but the skin eliminated once, contact on what remains."""
+    """Small strain: the inside is condensed once, contact is solved on the skin."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
-        """Mesh and reduce the finger of `scene`."""
-        start, passing = clock(), perf_counter()
+        """Mesh and condense the finger of `scene`."""
+        start, wall_start = clock(), perf_counter()
         self.finger = LinearFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
-        elapsed_s, passed = clock() - start, perf_counter() - passing
-        self.prepared_s = elapsed_s * self.finger.solve_s / passed  # which it tells by the time that passes
+        elapsed_s, wall_s = clock() - start, perf_counter() - wall_start
+        self.prepared_s = elapsed_s * self.finger.solve_s / wall_s  # `solve_s` is elapsed time
         self.setup_s = elapsed_s - self.prepared_s
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Do as `MeshMethod` says; every surface begins at the same guess, so `before` is not used."""
+        """Solve from the same guess for every surface; `before` is not used."""
         del before
         return settled_state(scene, self.finger)
 
     def floor(self) -> float:
-        """Do as `MeshMethod` says."""
+        """Time one assembly, factorisation and solve."""
         skin, moduli = np.ones(self.finger.body.condensed.rest.shape), settled_moduli(self.finger.scene.materials)
         start = clock()
         LinearBody.of(self.finger.geometry.mesh, moduli).displacement(skin)
@@ -83,7 +83,7 @@ class SmallMethod(MeshMethod[LinearFinger]):
 
 
 class FiniteMethod(MeshMethod[FiniteFinger]):
-    """Finite strain on one mesh, begun on a coarse one, which is kept for other surfaces."""
+    """Finite strain on one mesh, started on a coarse one, which is kept for other surfaces."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh the finger of `scene`."""
@@ -93,14 +93,14 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
         self.setup_s = clock() - start
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Do as `MeshMethod` says."""
+        """Solve from the coarse mesh, or from `before`."""
         if before is None:
-            with suppress(SolveFailure):  # a steep slide may fold the skin of a coarse mesh alone
+            with suppress(SolveFailure):  # with steep friction the skin may fold on the coarse mesh alone
                 before = self.finger.transfer(roughly(self._coarse, scene), self._coarse)
         return steady(self.finger, sliding_load(scene), start=before)
 
     def floor(self) -> float:
-        """Do as `MeshMethod` says."""
+        """Time one assembly, factorisation and solve."""
         newton = self.finger.newton
         shape = EquilibriumState.undeformed(newton.condensed)
         start = clock()

@@ -1,4 +1,4 @@
-"""Observed orders of convergence: sequences of meshes, their errors and times, and the slope between them."""
+"""Observed orders of convergence: errors and times on sequences of meshes, and the slope between them."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,21 +23,21 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One quantity of one problem on ever finer meshes."""
+    """One quantity of one problem on a sequence of finer meshes."""
 
     problem: str
     quantity: str
     kinematics: str
     element: str
-    sizes: tuple[float, ...]  # of the elements, by the coarsest
-    errors: tuple[float, ...]  # relative; root mean square over meshes of nearly one size where contact is involved
+    sizes: tuple[float, ...]  # element sizes, by the coarsest
+    errors: tuple[float, ...]  # relative; for contact, root mean square over meshes of nearly one size
     took_s: tuple[float, ...]  # of the solves that gave each error
-    order: float  # observed: slope of the best line through the logarithms
-    least: float  # what theory leads one to expect, less what three meshes leave open
+    order: float  # observed: slope of the least-squares line through the logarithms
+    least: float  # theory's order, less the uncertainty of three meshes
 
 
 def slope(sizes: Errors, errors: Errors) -> float:
-    """Return the slope of the best line through the logarithms.
+    """Return the slope of the least-squares line through the logarithms.
 
     >>> slope([1.0, 0.5, 0.25], [4.0, 1.0, 0.25])
     2.0
@@ -46,7 +46,7 @@ def slope(sizes: Errors, errors: Errors) -> float:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Order | LeftOut]:
-    """Return an iterator over a row for each quantity, until time is over."""
+    """Return an iterator over rows, one for each quantity, until the time is up."""
     del measurements
     works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, press_orders]
     return rows_within(request, works, "problems whose order is observed", lambda work: work(request.quick))
@@ -61,7 +61,7 @@ def _row(
 
 
 def cylinders(quick: bool) -> Iterator[Order]:
-    """Yield thick cylinders under inner pressure, distorted meshes: displacement 3, stress 2, energy 4, at any nu."""
+    """Yield distorted thick cylinders under inner pressure: orders 3, 2 and 4 of displacement, stress and energy."""
     sizes = (1 / 16, 1 / 32) if quick else (1 / 8, 1 / 16, 1 / 32)
     for nu in (0.3, 0.4999999):
         errors, took = _each(sizes, lambda size, nu=nu: locking.cylinder_errors(nu, round(1 / size)))
@@ -72,15 +72,15 @@ def cylinders(quick: bool) -> Iterator[Order]:
 
 
 def membranes(quick: bool) -> Iterator[Order]:
-    """Yield Cook's membrane, clamped meeting free at 108 degrees: the order is the singularity's, between 0.9 and 1.5.
+    """Yield Cook's membrane, whose clamped and free edges meet at 108 degrees: the singularity's order is 0.9 to 1.5.
 
-    The error of a mesh is what the next one, half as wide, adds to the displacement.
+    The error of a mesh is its change of displacement to the next mesh, with elements half as wide.
     """
     counts = (4, 8, 16, 32) if quick else (4, 8, 16, 32, 64)
-    risen, took = _each(counts, lambda count: locking.cook(240.565, 0.4999, 100.0, count)[0])
-    gained = np.diff(risen) / risen[-1]
+    rises, took = _each(counts, lambda count: locking.cook(240.565, 0.4999, 100.0, count)[0])
+    changes = np.diff(rises) / rises[-1]
     sizes = [1 / count for count in counts[:-1]]
-    yield _row("Cook's membrane, nu 0.4999", "displacement", "small", sizes, gained.tolist(), took[:-1], 0.9)
+    yield _row("Cook's membrane, nu 0.4999", "displacement", "small", sizes, changes.tolist(), took[:-1], 0.9)
 
 
 def press_orders(quick: bool) -> Iterator[Order]:
@@ -106,7 +106,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
 
 
 def finite_finger(quick: bool) -> Iterator[Order]:
-    """Yield the same at finite strain."""
+    """Yield the SED of the finger's ending at finite strain, in the same way."""
     case = scene(SLIPPERINESS[4])
 
     def sed(fineness: float, shift: bool) -> float:
@@ -131,7 +131,7 @@ def _finger(
 
 
 def _each(meshes: Sequence[Size], error: Callable[[Size], Value]) -> tuple[list[Value], list[float]]:
-    """Return what `error` finds on each mesh, and how long it took [s]."""
+    """Return the result of `error` on each mesh, and its time [s]."""
     errors, took = list[Value](), list[float]()
     for mesh in meshes:
         start = clock()

@@ -1,4 +1,4 @@
-"""What only a process of its own shows: the cold start of `daq-app solve`, and the memory of one solve."""
+"""Measurements that need a process of their own: the cold start of `daq-app solve`, and the memory of one solve."""
 
 import json
 import os
@@ -24,8 +24,8 @@ slide = "-x"
 kinematics = "{kinematics}"
 """
 TOLERANCE = 0.0015  # of the solve whose memory is measured
-LONGEST = 60.0  # seconds after which a process is given up
-# Run alone: what the process holds, loops loaded, is idle; the peak is counted afresh from there (Linux alone lets it).
+LONGEST = 60.0  # seconds after which a process is stopped
+# Code of a process of its own: idle memory is measured with loops loaded, and the peak restarts there (Linux only).
 MEMORY = """
 import json
 from dataclasses import replace
@@ -47,24 +47,24 @@ print(json.dumps([before, held("VmHWM") - before, found.dofs, found.error_estima
 
 @dataclass(frozen=True, slots=True)
 class Cold:
-    """A process from start to end: medians."""
+    """Medians of a process from start to end."""
 
     what: str
     runs: int
-    took_s: float  # its processor time where the system tells it, else the time that passes
-    passed_s: float  # the time that passes, in which a busy machine does other things too
+    took_s: float  # processor time where the system reports it, else elapsed time
+    passed_s: float  # elapsed time, including other work of a busy machine
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What one solve needs above the idle process."""
+    """Memory of one solve above the idle process."""
 
     kinematics: Kinematics
     tolerance: float
     dofs: int
     error_estimate: float
     idle_mb: float
-    solve_mb: float  # largest, above idle
+    solve_mb: float  # peak above idle
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Cold | Memory | LeftOut]:
@@ -76,8 +76,8 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Cold | Mem
                 continue
             runs = 5 if not request.quick else 2 if what.startswith("daq-app") else 1
             try:
-                took, passed = zip(*(_run(command) for _ in range(runs)), strict=True)
-                yield Cold(what, runs, median(took), median(passed))
+                took, wall_s = zip(*(_run(command) for _ in range(runs)), strict=True)
+                yield Cold(what, runs, median(took), median(wall_s))
             except (subprocess.SubprocessError, OSError) as bad:
                 yield LeftOut(f"The cold start of {what} could not be measured: {bad}.")
     for kinematics in KINEMATICS:
@@ -99,15 +99,15 @@ def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str
 
 
 def _run(command: list[str]) -> tuple[float, float]:
-    """Return the processor time of a process and the time that passed, the second twice where there is no first."""
+    """Return processor time and elapsed time of a process; elapsed time twice where the system reports no first."""
     start, before = perf_counter(), _of_children()
     subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
-    passed, spent = perf_counter() - start, _of_children() - before
-    return (spent if spent > 0.0 else passed), passed
+    wall_s, spent = perf_counter() - start, _of_children() - before
+    return (spent if spent > 0.0 else wall_s), wall_s
 
 
 def _of_children() -> float:
-    """Return the processor time of all processes that were started and have ended; 0 where the system does not tell."""
+    """Return the processor time of all child processes that have ended; 0 where the system does not report it."""
     times = os.times()
     return times.children_user + times.children_system
 

@@ -1,14 +1,14 @@
-"""Seeded random scenes: a set and a number draw the same scene always, but for its kinematics.
+"""Seeded random scenes: a set and a number always give the same scene, in either kinematics.
 
 | set | scenes |
 | --- | --- |
-| axis | a published surface with one number of finger, tissues, friction, loading or receptor drawn anew |
-| fingers | all lengths within 30 % of the published ones, or drawn freely (tip radius 3.5 to 8 mm) in every other |
+| axis | a published surface with one random number of finger, tissues, friction, loading or receptor |
+| fingers | all lengths within 30 % of the published ones, or, in every other, random (tip radius 3.5 to 8 mm) |
 | extreme | tissues 1e-3 to 1e6 times as stiff as fat, layers of 2 to 60 % of the tip |
 | edge | a receptor in the epidermis beneath an edge of contact |
-| bounds | a bound of 1 to 10 kPa on the traction |
-| forces | a normal force given, and a drag in half of them |
-| courses | a slide that turns round, a press with friction, or a history of relaxing tissues |
+| bounds | a traction bound of 1 to 10 kPa |
+| forces | a prescribed normal force, in half of them also a drag |
+| courses | a slide that reverses, a press with friction, or a history of relaxing tissues |
 | stiff | skin 8 to 100 times as stiff as fat, or at finite strain Ogden's law with an exponent of 3 to 14 |
 """
 
@@ -24,7 +24,7 @@ from solver.scene.published import scenes
 from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, SceneError, Solve
 from solver.verification.methods import Kinematics
 
-CLOSE = 0.06  # how far the coefficients of every other set of surfaces lie from the first, at most
+CLOSE = 0.06  # largest difference of coefficients from the first, in every other set of surfaces
 Draw = np.random.Generator
 
 
@@ -34,13 +34,13 @@ def random_scene(family: str, number: int, kinematics: Kinematics) -> Scene:
     while True:
         try:
             drawn = FAMILIES[family](draw, number, kinematics)
-        except SceneError:  # of an outline that is none, or without room for the receptor
+        except SceneError:  # impossible outline, or no room for the receptor
             continue
         return replace(drawn, title=f"{family} {number}", solve=replace(drawn.solve, kinematics=kinematics))
 
 
 def _common(draw: Draw, most: float = 0.7) -> Scene:
-    """Return the published finger with drawn angle, stiffnesses and load; half of them have a bound."""
+    """Return the published finger with random angle, stiffnesses and load; half of the scenes have a bound."""
     bound = None if draw.random() < 0.5 else _by_logarithm(draw, 0.003, 0.06)
     return Scene(
         finger=Finger(contact_angle=draw.uniform(30.0, 75.0)),
@@ -115,9 +115,9 @@ def _extreme(draw: Draw, _: int, __: Kinematics) -> Scene:
 def _edge(draw: Draw, _: int, __: Kinematics) -> Scene:
     scene = _common(draw)
     along = _by_logarithm(draw, 0.3, 3.0)
-    touched = draw.uniform(0.5, 2.0) * (along / 2.0) ** 2 / (2.0 * scene.finger.tip_radius)  # ends near the ending's
+    depth = draw.uniform(0.5, 2.0) * (along / 2.0) ** 2 / (2.0 * scene.finger.tip_radius)  # ends near the ending's
     receptor = Receptor(draw.uniform(0.1, 0.7), (0.05, along))
-    return replace(scene, receptor=receptor, loading=replace(scene.loading, indentation=touched))
+    return replace(scene, receptor=receptor, loading=replace(scene.loading, indentation=depth))
 
 
 def _bounds(draw: Draw, _: int, __: Kinematics) -> Scene:
@@ -140,8 +140,8 @@ def _courses(draw: Draw, number: int, _: Kinematics) -> Scene:
     if number % 3 < 2:
         return scene
     prony = (Relaxation(draw.uniform(0.1, 0.5), _by_logarithm(draw, 0.03, 3.0)),)
-    mine = scene.materials
-    tissues = Materials(*(replace(one, prony=prony) for one in (mine.epidermis, mine.dermis, mine.fat)))
+    materials = scene.materials
+    tissues = Materials(*(replace(one, prony=prony) for one in (materials.epidermis, materials.dermis, materials.fat)))
     return replace(scene, materials=tissues, solve=Solve(course="history"))
 
 
@@ -164,8 +164,7 @@ FAMILIES: Mapping[str, Callable[[Draw, int, Kinematics], Scene]] = {
 def surface_set(number: int, kinematics: Kinematics) -> list[Scene]:
     """Return three surfaces on one finger, at one indentation and in one direction.
 
-    Their mu is 0.05 to 0.6, in every other set within 0.06 of the first. Each has even odds of a bound of 0.004 to
-    0.05 MPa.
+    Their mu is 0.05 to 0.6, in every other set within 0.06 of the first. Half have a bound of 0.004 to 0.05 MPa.
     """
     draw = np.random.default_rng([number, 71])
     base = replace(_common(draw), title=f"surfaces {number}", solve=Solve(kinematics))

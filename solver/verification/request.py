@@ -1,4 +1,4 @@
-"""What is asked of a subject, what it may know of the others, and how time is taken."""
+"""The request to a subject, the measurements that it may use, and the clock."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 Kind = TypeVar("Kind")
 Row = TypeVar("Row")
-# Processor time of the thread that works: on a quiet machine the time that passes, and on a busy one still the solver's
-# own. Where the system counts it too coarsely, the time that passes.
+# Processor time of this thread: on an idle machine the elapsed time, on a busy one the solver's own.
+# Elapsed time is used where the system's counter is too coarse.
 PROCESSOR_TIME = get_clock_info("thread_time").resolution <= 1e-6
 clock = thread_time if PROCESSOR_TIME else perf_counter
 
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """Something that was not measured, and why: one sentence."""
+    """An omitted measurement and its reason, in one sentence."""
 
     reason: str
 
@@ -30,13 +30,13 @@ class LeftOut:
 class Host:
     """The program that measures."""
 
-    versions: Mapping[str, str] = field(default_factory=dict[str, str])  # of it and its libraries, by name
-    python: tuple[str, ...] = ("python3",)  # the command that starts another Python
+    versions: Mapping[str, str] = field(default_factory=dict[str, str])  # program and libraries
+    python: tuple[str, ...] = ("python3",)  # command that starts another Python
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """How much may be measured. `until` is an instant of the clock `now` after which nothing new is begun."""
+    """Limits of a measurement. No work starts after the instant `until` of the clock `now`."""
 
     quick: bool
     until: float
@@ -45,27 +45,27 @@ class Request:
 
     @property
     def seconds_left(self) -> float:
-        """Seconds left; below 0 when time is over."""
+        """Seconds left; negative when the time is up."""
         return self.until - self.now()
 
     def pick(self, full: Iterable[Kind], quick: Iterable[Kind]) -> list[Kind]:
-        """Return what a full or a quick run measures."""
+        """Return the items of a full or a quick run."""
         return list(quick if self.quick else full)
 
 
 @dataclass(slots=True)
 class Measurements:
-    """All rows so far, of every subject."""
+    """All rows of all subjects so far."""
 
     rows: list[DataclassInstance] = field(default_factory=list["DataclassInstance"])
 
     def of(self, kind: type[Kind]) -> list[Kind]:
-        """Return the rows of one kind, in their order."""
+        """Return the rows of one class, in order."""
         return [row for row in self.rows if isinstance(row, kind)]
 
 
 def median_time(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> float:
-    """Return the median time of `work()` [s] over up to `repeats` runs; slow work is run less often, at least once."""
+    """Return the median time of `work()` [s] over up to `repeats` runs; slow work runs less often, at least once."""
     spans: list[float] = []
     start_s = clock()
     for _ in range(repeats):
@@ -80,7 +80,7 @@ def median_time(work: Callable[[], object], repeats: int = 5, most_s: float = 1.
 def rows_within(
     request: Request, work: Iterable[Kind], what: str, rows: Callable[[Kind], Iterable[Row]]
 ) -> Iterator[Row | LeftOut]:
-    """Yield the `rows` of each item of `work`, of one at least, until time is over; then that the rest is left out."""
+    """Yield the `rows` of each item of `work` until the time is up, of one at least; then report the omitted items."""
     items = list(work)
     for number, item in enumerate(items):
         if number and request.seconds_left <= 0.0:

@@ -1,4 +1,4 @@
-"""Time against true error, at both kinematics and on every mesh, on the reference cases."""
+"""Time against true error, at both kinematics and on every mesh, for the reference cases."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ QUICK: dict[Kinematics, tuple[float, ...]] = {"small": (2.5, 3.0, 5.0, 8.0), "fi
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """One mesh. Times are medians; errors relative, by case, of SED, normal force and drag."""
+    """One mesh. Times are medians; errors are relative, by case, of SED, normal force and drag."""
 
     kinematics: Kinematics
     fineness: float
@@ -36,20 +36,20 @@ class Speed:
     first_s: float  # one surface from undeformed, `prepared_s` included: median over the cases
     next_s: float | None  # each further surface; None where no two are neighbours
     all_s: float  # all cases one after another, `prepared_s` included
-    surfaces: int  # how many those are
+    surfaces: int  # number of these cases
     errors: dict[str, tuple[float, ...]]
     failed: dict[str, str]  # cases without an answer on this mesh, and why
 
     @property
     def judged_error(self) -> float | None:
-        """The largest error of the SED on the cases that speeds are asked at; None where one is missing."""
+        """Largest error of the SED on the judged cases; None where one is missing."""
         if any(name in self.failed for name in JUDGED):
             return None
         return max((self.errors[name][0] for name in JUDGED if name in self.errors), default=None)
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Speed | LeftOut]:
-    """Yield a row for each kinematics and mesh, coarse meshes before fine ones."""
+    """Yield a row for each kinematics and mesh, coarse meshes first."""
     pairs: list[tuple[float, Kinematics]] = [
         (fineness, kind) for kind, all_of in (QUICK if request.quick else MESHES).items() for fineness in all_of
     ]
@@ -64,7 +64,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Speed | Le
 
 
 def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: float) -> Speed:
-    """Return the row of one mesh; `patience` is how long its times are repeated, by that of a full run."""
+    """Return the row of one mesh; `patience` is the time for repetitions, by that of a full run."""
     chosen = [scene for scene in cases(kind) if scene.title in truths]
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
     prepared, setup, floors_before = _prepare(kind, deepest, fineness, 0.3 * patience)
@@ -86,7 +86,7 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
         first.append(median_time(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
     together = median_time(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
     onward, between = _onward(mesh, solved, patience)
-    floors = floors_before if prepared else between  # of the same moments as most of the work
+    floors = floors_before if prepared else between  # measured at the same time as most of the work
     next_s = median(onward) if onward else None
     return Speed(
         kind, fineness, mesh.dofs, setup, prepared, median(floors),
@@ -95,9 +95,9 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
 
 
 def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
-    """Return medians of what a mesh's assembly and factorisation, and what the rest took; and floors in turn with them.
+    """Return median times of a mesh's assembly and factorisation, and of the rest, and floors measured in between.
 
-    One is forgotten before the next is made, as in a process that solves again and again, which is given memory once.
+    Each mesh is released before the next is made, as in a process that solves again and again with the same memory.
     """
     spans: list[tuple[float, float]] = []
     floors: list[float] = []
@@ -112,10 +112,10 @@ def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> 
 
 
 def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
-    """Return what each surface took that was begun at one solved just before, pressed as deep and moved the same way.
+    """Return the time of each surface that starts from the one solved before, at the same depth and direction.
 
-    Medians over passes through all of `scenes`, in the order the solver takes them, after one in which meshes are made.
-    The floor is taken after each of them: a machine's speed changes within a second, and both must see the same of it.
+    Times are medians over passes through `scenes` in the solver's order, after a first pass that makes the meshes. The
+    floor is measured after each: the speed of a machine changes within a second, and both must see the same speed.
     """
     scenes = sorted(scenes, key=alike)
     spans: dict[str, list[float]] = {}

@@ -1,4 +1,4 @@
-"""Everything that is measured, in order: a later subject may use what an earlier one found."""
+"""All subjects in order: a later subject may use the rows of an earlier one."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """One file's measurement."""
+    """The measurement of one file."""
 
     name: str  # key in the JSON file
-    doing: str  # as shown while it runs
-    share: float  # of the time; what a subject does not use is left to the later ones
+    doing: str  # shown while it runs
+    share: float  # share of the time; unused time is left to later subjects
     quick_share: float
     measure: "Callable[[Request, Measurements], Iterator[DataclassInstance]]"
 

@@ -1,8 +1,8 @@
-"""What was asked of the solver's speed, row by row: reach and aim, what was measured, met or missed.
+"""Targets for the solver's speed, row by row: required and desired value, measured value, met or missed.
 
-Speeds are at a true error, of the way that answers come from: the time is that of the cheapest mesh whose error on
-slipperiness 0 to 100 and stickiness 0 stays below it, without the cost of the estimate, mesh and tables apart. The
-floor is one assembly, factorisation and solve of the same system, timed in the same run.
+A speed belongs to a true error. It is the time of the cheapest mesh whose error on slipperiness 0 to 100 and stickiness
+0 stays below that, without the estimate, mesh and tables. The floor is one assembly, factorisation and solve of the
+same system, timed in the same run.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,28 +20,28 @@ from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.truth import JUDGED, cases
 from solver.verification.warm import SURFACES, Warm
 
-AGREED = 1e-10  # a course and the direct state, relative
-PEAK = 0.02  # error of the warm stepper, by the peak
+AGREED = 1e-10  # largest relative difference of a load path from the direct state
+PEAK = 0.02  # largest error of the warm stepper, by the peak
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One row. Times in ms; `reach` and `aim` are None where a row only reports."""
+    """One row. Times in ms; `reach` and `aim` are None in a row that only reports."""
 
     work: str
     at_error: str
     unit: str
     reach: float | None
     aim: float | None
-    measured: float | None  # None: nothing measured met the error, or it was not measured
-    floors: float | None  # measured by the floor
-    how: str  # which way, mesh and error
-    tried: bool = True  # whether all that could have met it was measured: time may have been over before
-    part: str = ""  # what was measured, where that is not all that was asked
+    measured: float | None  # None: not measured, or no mesh met the error
+    floors: float | None  # `measured` by the floor
+    how: str  # method, mesh and error
+    tried: bool = True  # whether all candidates were measured before the time was up
+    part: str = ""  # the measured part, where it is not all that was required
 
     @property
     def verdict(self) -> str:
-        """Say plainly whether it was met."""
+        """Say whether the target was met."""
         if self.measured is None:
             return "missed" if self.tried and self.how != "" else "not measured"
         if self.reach is None:
@@ -53,7 +53,7 @@ class Target:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Target]:
-    """Yield every row from what the other subjects found."""
+    """Yield every row, from the rows of the other subjects."""
     meshes = QUICK if request.quick else MESHES
     further = "finite strain, each further surface"
     at_errors: tuple[tuple[str, Kinematics, float, float, float, Callable[[Speed], float | None]], ...] = (
@@ -96,14 +96,14 @@ def _at_error(
     time: Callable[[Speed], float | None],
 ) -> Target:
     rows = [row for row in measurements.of(Speed) if row.kinematics == kinematics]
-    known = [(r.judged_error, took, r) for r in rows if r.judged_error is not None and (took := time(r)) is not None]
-    good = [(took, r) for off, took, r in known if off <= error]
-    if not good:
+    pairs = [(r.judged_error, took, r) for r in rows if r.judged_error is not None and (took := time(r)) is not None]
+    accurate = [(took, r) for off, took, r in pairs if off <= error]
+    if not accurate:
         least = min((r.judged_error for r in rows if r.judged_error is not None), default=None)
         how = "" if least is None else f"no mesh that was tried is below: the best is at {percent(least)}"
         tried = len(rows) >= len(meshes[kinematics])
         return Target(work, percent(error), "ms", reach, aim, None, None, how, tried)
-    took, best = min(good, key=lambda pair: pair[0])
+    took, best = min(accurate, key=lambda pair: pair[0])
     how = f"{best.dofs} unknowns, error {percent(best.judged_error or 0.0)}"
     part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
     return Target(work, percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
@@ -154,5 +154,5 @@ def _between(rows: list[Growth]) -> str:
     return f"from mesh to mesh {min(powers):.2f} to {max(powers):.2f}"
 
 
-def _part(measured: int, wanted: int, what: str) -> str:
-    return f"{measured} of {wanted} {what}" if measured < wanted else ""
+def _part(measured: int, total: int, what: str) -> str:
+    return f"{measured} of {total} {what}" if measured < total else ""

@@ -1,9 +1,9 @@
-"""The reference cases and their truth: overkill solves on meshes whose nodes lie elsewhere, made in the same run.
+"""The reference cases and their truth: very fine solves on meshes with other nodes, made in the same run.
 
-The ten published surfaces, at small and at finite strain. The truth of a number is the mean of three solves on fine
-meshes, one of them moved along the skin by half an element. How far they lie from their mean is its doubt. Nothing is
-shipped and nothing comes from elsewhere, so the truth is never older than the solver. Where a surface has no settled
-sliding the solver's refusal stands instead.
+The cases are the ten published surfaces, at small and at finite strain. The truth of a number is the mean of three
+solves on fine meshes, one of them moved along the skin by half an element. Its doubt is their distance from the mean.
+No truth is stored, so it is never older than the solver. A surface without steady sliding has the solver's refusal
+instead.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ from solver.verification.request import LeftOut, Measurements, Request, clock
 
 KINEMATICS = tuple(MESHED)
 NUMBERS = ("SED of the ending", "normal force", "drag")
-# fineness of three meshes, and whether moved along the skin by half an element
+# fineness of three meshes, and whether they are moved along the skin by half an element
 SHIFTED = {
     "small": ((26.0, False), (26.0, True), (23.0, False)),
     "finite": ((18.0, False), (18.0, True), (16.0, False)),
@@ -30,18 +30,18 @@ SHIFTED_QUICK = {
     "small": ((18.0, False), (18.0, True), (16.0, False)),
     "finite": ((13.0, False), (13.0, True), (11.0, False)),
 }
-# "slip 0-100 and stick 0": what speeds are asked at
+# the judged cases, whose speeds count
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What one case truly is, or why it has no answer."""
+    """The true numbers of one case, or the reason why it has no answer."""
 
     kinematics: Kinematics
     case: str
     numbers: tuple[float, ...]  # SED [MPa], normal force, drag [N/mm]; empty where refused
-    doubt: tuple[float, ...]  # of each, relative: how far the three solves lie from their mean, at most
+    doubt: tuple[float, ...]  # relative, of each: largest distance of the three solves from their mean
     dofs: tuple[int, ...]  # of the three meshes
     took_s: float
     refused: str  # the solver's sentence, "" where there is an answer
@@ -53,7 +53,7 @@ def cases(kinematics: Kinematics) -> list[Scene]:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Truth | LeftOut]:
-    """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
+    """Yield the truth of every case; a quick run has coarser meshes, and the judged cases only."""
     del measurements
     for kinematics in KINEMATICS:
         chosen = [s for s in cases(kinematics) if s.title in JUDGED or not request.quick]
@@ -61,7 +61,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Truth | Le
 
 
 def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and doubt (3,) of the numbers found on three meshes (3, 3)."""
+    """Return mean and doubt (3,) of the numbers on three meshes (3, 3)."""
     mean = solves.mean(axis=0)
     return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
 
@@ -74,7 +74,7 @@ def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> It
     meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
     shared = (clock() - start) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
-        if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
+        if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # other subjects need these
             yield LeftOut(
                 f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
             )
@@ -94,11 +94,11 @@ def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], shared: f
 
 
 def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
-    """Return the cases that the solver refuses, each with its sentence, and the others."""
+    """Return the cases that the solver refuses, each with its sentence, and the other cases."""
     refused: list[Truth] = []
     todo: list[Scene] = []
     for scene in chosen:
-        if scene.title in JUDGED:  # known to have an answer; were it refused, the overkill meshes would tell
+        if scene.title in JUDGED:  # an answer exists; a refusal would show on the fine meshes
             todo.append(scene)
             continue
         start = clock()
@@ -111,5 +111,5 @@ def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[T
 
 
 def known_truths(measurements: Measurements, kinematics: Kinematics) -> dict[str, Truth]:
-    """Return the cases whose truth is known, by name."""
+    """Return the truths of the cases that have one, by case name."""
     return {t.case: t for t in measurements.of(Truth) if t.kinematics == kinematics and t.numbers}

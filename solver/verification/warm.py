@@ -1,9 +1,9 @@
-"""The warm stepper that a live view calls: time a reading, and how far the response is off while forces come in.
+"""The warm stepper of a live view: its time a reading, and the error of its response while forces come in.
 
-The truth is a course driven by depth on a finer mesh: the finger is pressed, slides, and lifts off while it slides, in
-so few readings that each moves it far. Its forces, without noise and without a bound on traction, are what the stepper
-is given. A busy machine stops a process for milliseconds now and then: so
-each reading counts with its median over several passes, and the percentile of one pass stands beside.
+The truth is a load path driven by depth on a finer mesh. The finger is pressed, slides, and lifts off while it slides,
+in so few readings that each moves it far. The stepper gets its forces, without noise and traction bound. A busy machine
+pauses processes for milliseconds, so each reading counts with its median over several passes; the percentile of one
+pass is given too.
 """
 
 from collections.abc import Iterator
@@ -22,8 +22,8 @@ from solver.verification.request import LeftOut, Measurements, Request, clock, r
 from solver.verification.truth import KINEMATICS, cases
 
 PASSES, QUICK_PASSES = 5, 3
-PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
-LIFTS = 8  # readings in which it lifts off: 40 ms at 200 Hz
+PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and its distance [mm]
+LIFTS = 8  # readings of the lift-off: 40 ms at 200 Hz
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
 SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
 QUICK: dict[Kinematics, tuple[str, ...]] = {"finite": SURFACES[:1], "small": SURFACES[::3]}
@@ -32,7 +32,7 @@ Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED 
 
 @dataclass(frozen=True, slots=True)
 class Warm:
-    """One surface followed reading by reading."""
+    """One surface, followed reading by reading."""
 
     kinematics: Kinematics
     case: str
@@ -45,7 +45,7 @@ class Warm:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Warm | LeftOut]:
-    """Return an iterator over a row a surface and kinematics."""
+    """Return an iterator over rows, one for each kinematics and surface."""
     del measurements
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (QUICK[kind] if request.quick else SURFACES)]
     unbounded = [replace(scene, friction=Friction(scene.friction.mu)) for scene in scenes]
@@ -69,7 +69,7 @@ def _row(scene: Scene, passes: int) -> Warm:
 
 
 def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES) -> tuple[np.ndarray, np.ndarray]:
-    """Return what each reading took in each pass (passes, n) [s], and the SED found in the last (n,)."""
+    """Return the time of each reading in each pass (passes, n) [s], and the SED of the last pass (n,)."""
     spans = np.zeros((passes, len(readings)))
     seds = np.zeros(len(readings))
     for number in range(passes):
@@ -82,17 +82,17 @@ def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES
 
 
 def _readings(scene: Scene) -> Iterator[Reading]:
-    """Yield what a finer mesh has of a press, a slide, and a lift at each of whose readings it slides as if settled."""
+    """Yield the readings on a finer mesh of a press, a slide, and a lift-off in states of full slip."""
     kind, loading, mu = scene.solve.kinematics, scene.loading, float(scene.friction.mu)
     finger = MESHED[kind](scene, FINER[kind], False).finger
     course = press_and_slide(
         loading.depth, mu, np.inf, loading.direction, press=PRESS, slides=SLIDES, distance=DISTANCE
     )
     states = [*march(finger.newton, course, tolerance=1e-6)]
-    lifted: EquilibriumState | None = None
+    state: EquilibriumState | None = None
     for n in range(1, LIFTS):
         load = LoadState(loading.depth * (1.0 - n / LIFTS), mu, np.inf, -loading.direction)
-        lifted = solve_full_slip(finger.newton, load, lifted)
-        states.append(lifted)
+        state = solve_full_slip(finger.newton, load, state)
+        states.append(state)
     for sed, push, drag in finger.numbers(states).tolist():
         yield push, drag, sed

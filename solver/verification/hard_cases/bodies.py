@@ -1,4 +1,4 @@
-"""The hard cases that are no scenes: bodies, load paths and bad meshes, in one of the two kinematics."""
+"""The hard cases other than scenes: bodies, load paths and bad meshes, in one of the two kinematics."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -27,18 +27,18 @@ Finger = LinearFinger | FiniteFinger
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """How bodies of one kinematics are made and loaded, and to how much their states must agree."""
+    """Construction and loading of bodies in one kinematics, and the required agreement of their states."""
 
     newton: Callable[[Mesh, Sequence[tuple[float, float]]], Newton]  # of a body of layers (E, nu)
     finger: Callable[[float], Finger]  # by fineness
     fineness: float
-    sense: int  # of the surface, where it first goes
+    sense: int  # of the surface, in its first slide
     back_and_forth: tuple[float, int, int, float]  # bound [MPa], steps of the press and of a leg, and their length [mm]
-    path: Callable[[int], list[LoadState]]  # that begins in steps of this part of the way
+    path: Callable[[int], list[LoadState]]  # with first steps of this part of the way
     path_words: str
-    meshes: int  # that are distorted
-    agreement: float  # of states that are one, relative
-    rigid_agreement: float  # of a stiff part's force and a rigid one's, where only round-off is left
+    meshes: int  # number of distorted meshes
+    agreement: float  # relative, of states that must be the same
+    rigid_agreement: float  # of the forces of a stiff part and of a rigid one, where only round-off remains
     node_agreement: float  # of one node's force and its compliance
 
 
@@ -55,7 +55,7 @@ def _sed(finger: Finger, state: EquilibriumState) -> float:
 
 
 def _whole_path(count: int) -> list[LoadState]:
-    """Return a press of `count` even steps, and a slide of as many, ten at least."""
+    """Return a press of `count` even steps and a slide of as many, at least ten."""
     press = [LoadState(depth, 0.3, 0.01) for depth in np.linspace(0.0, DEPTH, count + 1)[1:].tolist()]
     slide = [
         LoadState(DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()
@@ -64,7 +64,7 @@ def _whole_path(count: int) -> list[LoadState]:
 
 
 def _beginning(count: int) -> list[LoadState]:
-    """Return a press and a slide that begin in up to twenty steps of 1/`count` of the way and go on in long ones."""
+    """Return a press and a slide with up to twenty first steps of 1/`count` of the way, then long ones."""
     down = [DEPTH * (i + 1) / count for i in range(min(count, 20))]
     along = [8.0 * (i + 1) / count for i in range(min(count, 20))]
     down += [DEPTH * part for part in (0.25, 0.5, 0.75, 1.0) if DEPTH * part > down[-1]]
@@ -96,7 +96,7 @@ def _force(newton: Newton, depth: float, sense: int = -1) -> float:
 
 
 def reversal(bodies: Bodies) -> Outcome:
-    """Slide forth, back and forth again: full slip must return, and full slip the other way be met."""
+    """Slide forth, back and forth again: full slip must recur, and occur in the other direction."""
     tau, press, leg, step = bodies.back_and_forth
     finger, load = bodies.finger(bodies.fineness), LoadState(DEPTH, 0.44, tau)
     senses = [bodies.sense, -bodies.sense, bodies.sense]
@@ -112,14 +112,14 @@ def reversal(bodies: Bodies) -> Outcome:
 
 
 def steps(bodies: Bodies) -> Outcome:
-    """Press and slide in steps of 1 to 1/10,000 of the way: full slip does not depend on the way."""
+    """Press and slide in steps of 1 to 1/10,000 of the way: full slip does not depend on the load path."""
     finger = bodies.finger(4.0)
     seds = [_sed(finger, _last(finger.newton, bodies.path(count))) for count in (1, 10, 100, 1000, 10000)]
     return agree(f"SED {seds[0]:.4g} after {bodies.path_words}", seds, bodies.agreement)
 
 
 def edge_at_node(bodies: Bodies) -> Outcome:
-    """Bisect for the depth at which one more node comes to touch, and solve on both sides of it and there."""
+    """Bisect for the depth at which one more node comes into contact; solve there and on both sides of it."""
     finger = bodies.finger(bodies.fineness)
 
     def at(depth: float) -> EquilibriumState:
@@ -149,7 +149,7 @@ def distorted_finger(bodies: Bodies) -> Outcome:
 
 
 def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
-    """Press a soft block by a plate in it that is `ratio` times stiffer, and by one held as a whole in its place."""
+    """Press a soft block by a plate in it that is `ratio` times stiffer, and by held nodes in place of the plate."""
     whole, alone = two_parts()
     slide = solve_full_slip(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
     force, rigid = float(slide.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
@@ -160,12 +160,12 @@ def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
 
 
 def one_node(bodies: Bodies) -> Outcome:
-    """Press so lightly that one node touches: its force is its depth by its compliance at small strain."""
+    """Press so lightly that one node touches: at small strain its force is depth by compliance."""
     mesh, layers = block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [(0.08, 0.48)]
     depth, mu = 1e-5, 0.3
     slide = solve_full_slip(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
     compliance = np.linalg.inv(LinearBody.of(mesh, [Hooke(*layers[0])]).condensed.stiffness)
-    up = 2 * (len(mesh.skin) // 2) + 1  # the unknown of the node in the middle
+    up = 2 * (len(mesh.skin) // 2) + 1  # normal displacement of the middle node
     force, exact = float(slide.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])
     off = abs(force / exact - 1)
     flaw = "" if slide.touching.sum() == 1 and off < bodies.node_agreement else "not what one node bears"
@@ -174,7 +174,7 @@ def one_node(bodies: Bodies) -> Outcome:
 
 
 def aspect(bodies: Bodies) -> Outcome:
-    """Press a block of elements fifty times longer than wide, and the same block of squarer ones."""
+    """Press a block of elements fifty times longer than high, and the same block of squarer ones."""
     forces = [_force(bodies.newton(mesh, [(0.08, 0.48)]), 0.1) for mesh in slabs()]
     off = abs(forces[1] / forces[0] - 1)
     summary = f"N {forces[1]:.4g}, {percent(off)} from squarer elements'"

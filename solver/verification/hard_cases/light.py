@@ -1,4 +1,4 @@
-"""Light touches held against Hertz: a cylinder of the tip's radius on its epidermis, far thicker than the contact."""
+"""Light touches against Hertz: a cylinder of the tip's radius on an epidermis far thicker than the contact."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -10,13 +10,13 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.hard_cases.outcome import Outcome, of_answer
 
-KNOWN = 1e-3  # indentation at which contact spans many elements, and is still far thinner than the epidermis [mm]
-MODEL = 0.005  # what the rest of the finger changes in the two laws, from there to lighter touches
+KNOWN = 1e-3  # indentation with many elements in contact, which is still far smaller than the epidermis [mm]
+MODEL = 0.005  # change of both laws by the rest of the finger, from there to lighter touches
 
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What the theory says of a light touch."""
+    """Theoretical values of a light touch."""
 
     force: float  # [N/mm]
     sed: float  # [MPa]
@@ -24,7 +24,7 @@ class Touch:
 
 
 def of_light_touch(scene: Scene) -> Outcome:
-    """Solve a scene of a light touch; SED, normal force and width must be Hertz's within their estimates."""
+    """Solve a scene of a light touch; SED, normal force and width must agree with Hertz within their estimates."""
     (answer,) = solve_many([scene])
     outcome = of_answer(answer)
     if not isinstance(answer, Prediction):
@@ -48,13 +48,13 @@ def of_light_touch(scene: Scene) -> Outcome:
 
 
 def hertz(scene: Scene) -> Touch:
-    """Return Hertz's touch at the depth of a scene (Johnson 1985, eqs 4.43 to 4.45 and 5.56).
+    """Return Hertz's values at the depth of a scene (Johnson 1985, eqs 4.43 to 4.45 and 5.56).
 
-    Half the contact is sqrt(4 N R / (pi E*)), and d / N grows by ln(1 / N) / (pi E*) as the force N on a mm of width
-    falls. What the finger behind the contact adds to that, and the SED there by the force squared, are constants, taken
-    from the deeper touch, which every mesh resolves.
+    Half the contact is sqrt(4 N R / (pi E*)). As the force N on a mm of width falls, d / N grows by ln(1 / N) / (pi
+    E*). The finger behind the contact adds a constant to d / N, and the SED there by the force squared is another. Both
+    are from a deeper touch, which every mesh resolves.
     """
-    from scipy.optimize import brentq  # slow to load, and light touches alone have need of it
+    from scipy.optimize import brentq  # slow to load, and only light touches use it
 
     skin = scene.materials.of("epidermis")
     modulus = skin.E / (1.0 - skin.nu**2)
@@ -71,7 +71,7 @@ def hertz(scene: Scene) -> Touch:
 
 @cache
 def _finger(deeper: Scene) -> tuple[tuple[float, float], float]:
-    """Return the depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
+    """Return depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
     (answer,) = solve_many([deeper])
     if isinstance(answer, SolveFailure):
         raise answer

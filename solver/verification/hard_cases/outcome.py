@@ -1,4 +1,4 @@
-"""How a hard case ended, and what is wrong with it, if anything."""
+"""Outcome of a hard case, and its flaw, if any."""
 
 import math
 from collections.abc import Sequence
@@ -11,29 +11,29 @@ from solver.prediction import Prediction, percent
 from solver.response.solution import ERROR_UNKNOWN, solve_many
 from solver.scene import Scene
 
-BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # those of them that an answer has
+BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # audits of balance
 LIMITS = ("penetration", "tension", "cone_violation")
-UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest part of the forces left over; largest part by which a law is exceeded
-NOTHING = 1.0  # estimated error of an answer of which nothing is known
+UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest residual, by the forces; largest excess over a law, by its limit
+NOTHING = 1.0  # estimated error of an answer without any accuracy
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a case ended."""
+    """Outcome of a case."""
 
     answered: bool
-    numbers: tuple[float, ...]  # all that was found; each must be finite
-    flaw: str  # "" where the answer is sound, else what is not
-    summary: str  # for people: the answer with its error, or the reason why there is none
+    numbers: tuple[float, ...]  # all numbers of the answer; each must be finite
+    flaw: str  # "" where the answer is sound, else its flaw
+    summary: str  # for readers: the answer with its error, or the reason why there is none
 
 
 def of_scene(scene: Scene) -> Outcome:
-    """Solve a scene of the finger through the solver's front door."""
+    """Solve a scene of the finger by the public face."""
     return of_answer(solve_many([scene])[0])
 
 
 def of_answer(answer: Prediction | SolveFailure) -> Outcome:
-    """Return how a solve ended."""
+    """Return the outcome of a solve."""
     return _of_refusal(answer) if isinstance(answer, SolveFailure) else _of_answer(answer)
 
 
@@ -63,14 +63,14 @@ def _of_answer(answer: Prediction) -> Outcome:
 
 
 def agree(summary: str, numbers: Sequence[float], within: float) -> Outcome:
-    """Return an outcome whose numbers must all be one."""
+    """Return the outcome of a case whose numbers must all agree."""
     spread = float(np.ptp(numbers)) / abs(numbers[0])
     flaw = "" if spread <= within else f"{len(numbers)} ways differ by {spread:.1g}"
     return Outcome(True, tuple(numbers), flaw, f"{summary}: {len(numbers)} ways agree to {power(spread)}")
 
 
 def power(value: float) -> str:
-    """Return the power of ten at or above a round-off, whose digits differ from machine to machine.
+    """Return the power of ten at or above a round-off, whose digits differ between machines.
 
     >>> power(3e-12), power(0.0)
     ('1e-11', '1e-16')

@@ -1,4 +1,4 @@
-"""The hard cases that are scenes of the finger: name, scene, and what must happen."""
+"""The hard cases that are scenes of the finger: name, scene, and required outcome."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -16,22 +16,22 @@ ANSWER: Must = "answer"
 EITHER: Must = "answer or limit"
 SOFT = Material(0.034, 0.48)
 BEYOND: dict[Kinematics, tuple[tuple[float, float], ...]] = {  # depth [mm] and mu near and beyond a limit
-    "small": ((1.5, 1.4), (2.0, 1.3), (2.0, 2.0)),  # at which the finger wedges itself in
-    "finite": ((2.0, 0.37), (2.0, 0.38), (2.0, 0.44), (1.5, 0.62), (1.0, 2.0)),  # at which skin folds
+    "small": ((1.5, 1.4), (2.0, 1.3), (2.0, 2.0)),  # where the finger wedges itself in
+    "finite": ((2.0, 0.37), (2.0, 0.38), (2.0, 0.44), (1.5, 0.62), (1.0, 2.0)),  # where the skin folds
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A named hard case and what must happen."""
+    """A named hard case and its required outcome."""
 
     kinematics: Kinematics
     name: str
     must: Must
     run: Callable[[], Outcome]
-    same_as: str = ""  # a case of the same kinematics whose first number this one's must be
+    same_as: str = ""  # a case of the same kinematics with the same first number
     within: float = 0.0  # relative
-    slow: bool = False  # seconds rather than tenths
+    slow: bool = False  # takes seconds rather than tenths
 
 
 def hard_scenes(kinematics: Kinematics) -> Iterator[Case]:

@@ -1,4 +1,4 @@
-"""The suite as a list of cases, and the rows it gives."""
+"""The suite as a list of cases, and its rows."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from solver.verification.hard_cases.scenes import ANSWER, Case, hard_scenes
 from solver.verification.methods import Kinematics
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 
-TELLING = {  # what a quick run shows, and `make test` of finite strain
+TELLING = {  # cases of a quick run, and of `make test` at finite strain
     "nu 0.0", "nu 0.4999999", "bone 1e10 times stiffer than fat", "mu 0", "tau_max 0 MPa", "tau_max 1e+09 MPa",
     "depth 1 mm", "depth 2 mm without friction", "angle 30 degrees", "angle 75 degrees, backwards",
     "epidermis and dermis of 0.05 mm each", "a part 1e+10 times stiffer", "one node touching", "direction reversal",
@@ -35,7 +35,7 @@ class HardCase:
     case: str
     must: str
     answered: bool
-    flaw: str  # "" where what must happen happened
+    flaw: str  # "" for the required outcome
     summary: str  # the outcome's summary
     took_s: float
 
@@ -50,7 +50,7 @@ def cases(kinematics: Kinematics) -> tuple[Case, ...]:
 
 
 def judge(case: Case, neighbour: Outcome | None = None) -> HardCase:
-    """Run one case and say what is wrong, if anything; `neighbour` is the outcome of the case it must be `same_as`."""
+    """Run one case and return its flaw, if any; `neighbour` is the outcome of the case named in `same_as`."""
     return _judge(case, neighbour)[0]
 
 
@@ -71,7 +71,7 @@ def _judge(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[HardCase | LeftOut]:
-    """Yield a row for every case, or for those that tell most."""
+    """Yield a row for every case; in a quick run for the most telling ones."""
     del measurements
     suite = [case for kinematics in bodies.BODIES for case in cases(kinematics)]
     todo = [case for case in suite if not request.quick or case.name in TELLING]

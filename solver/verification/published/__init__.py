@@ -1,1 +1,1 @@
-"""Published problems that one deformable body allows, run through the very same code as the finger."""
+"""Published problems of one deformable body, solved by the same code as the finger."""

@@ -17,7 +17,7 @@ NONE: Indices = np.zeros(0, np.int64)
 
 
 def grade(finest: float, growth: float, zone: float, end: float) -> Array:
-    """Return lines from 0 to `end`, `finest` apart up to `zone` and then further and further apart."""
+    """Return lines from 0 to `end`, `finest` apart up to `zone` and then with growing distances."""
     steps = [0.0]
     while steps[-1] < end:
         steps.append(steps[-1] + max(finest, finest + growth * (steps[-1] - zone)))
@@ -25,17 +25,17 @@ def grade(finest: float, growth: float, zone: float, end: float) -> Array:
 
 
 def mirror(lines: Array) -> Array:
-    """Return the lines from 0 up, and as many below 0."""
+    """Return the lines from 0 up and their mirror images below 0."""
     return np.concatenate([-lines[:0:-1], lines])
 
 
 def join(grids: Sequence[Array]) -> Mesh:
-    """Return the mesh of several grids of points (2 a + 1, 2 b + 1, 2), nodes at one place made one.
+    """Return the mesh of several grids of points (2 a + 1, 2 b + 1, 2), with nodes at one position merged.
 
-    Nothing is held, nothing may touch.
+    No node is held and none may touch.
     """
-    turned = [g if _clockwise(g) else g[::-1] for g in grids]
-    meshes = [grid_mesh(g, _one_region(g), slice(0, 1), NONE) for g in turned]
+    clockwise = [g if _clockwise(g) else g[::-1] for g in grids]
+    meshes = [grid_mesh(g, _one_region(g), slice(0, 1), NONE) for g in clockwise]
     nodes = np.concatenate([m.nodes for m in meshes])
     starts = np.cumsum([0, *(len(m.nodes) for m in meshes[:-1])])
     elements = np.concatenate([m.elements + s for m, s in zip(meshes, starts, strict=True)])
@@ -45,13 +45,13 @@ def join(grids: Sequence[Array]) -> Mesh:
 
 
 def chain(on: NDArray[np.bool_], along: Array) -> Indices:
-    """Return the nodes where `on` is true, in the order of `along`."""
+    """Return the nodes where `on` is true, sorted by `along`."""
     nodes = np.flatnonzero(on)
     return nodes[np.argsort(along[nodes])]
 
 
 def ring(inner: float, outer: float, radial: int, around: int) -> tuple[Mesh, Indices]:
-    """Return a thick cylinder that nothing holds, and the nodes of its hole in order; its skin is one outer edge."""
+    """Return a free thick cylinder, and the nodes of its hole in order; its skin is one outer edge."""
     r = with_middles(np.geomspace(inner, outer, radial + 1))
     turn = np.linspace(-np.pi, np.pi, 2 * around + 1)
     mesh = join([np.stack([r * np.cos(turn)[:, None], r * np.sin(turn)[:, None]], axis=-1)])
@@ -64,7 +64,7 @@ def ring(inner: float, outer: float, radial: int, around: int) -> tuple[Mesh, In
 
 
 def membrane(across: int, up: int) -> Mesh:
-    """Return Cook's membrane (0,0) (48,44) (48,60) (0,44), its left edge held, its right edge as the skin."""
+    """Return Cook's membrane (0,0) (48,44) (48,60) (0,44), its left edge held and its right edge as the skin."""
     x, part = with_middles(np.linspace(0, 48, across + 1)), with_middles(np.linspace(0, 1, up + 1))
     low, high = 44 * x / 48, 44 + 16 * x / 48
     points = np.empty((len(x), len(part), 2))
@@ -77,7 +77,7 @@ def membrane(across: int, up: int) -> Mesh:
 
 
 def mound(x_lines: Array, y_lines: Array, radius: float, zone: float) -> Mesh:
-    """Return a block whose underside is the parabola x^2 / (2 radius) that the theory of Hertz has; its top is held.
+    """Return a block with an underside of x^2 / (2 radius), the parabola of Hertz's theory; its top is held.
 
     It may touch where |x| is below `zone`.
     """
@@ -92,8 +92,8 @@ def mound(x_lines: Array, y_lines: Array, radius: float, zone: float) -> Mesh:
 
 
 def disc(radius: float, finest: float, zone: float) -> Mesh:
-    """Return a whole cylinder standing on the surface, fine below and above; its skin is the lower quarter."""
-    fine = mirror(grade(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the foot
+    """Return a whole cylinder that stands on the surface, fine below and above; its skin is the lower quarter."""
+    fine = mirror(grade(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the lowest point
     coarse = np.linspace(-np.pi / 4, np.pi / 4, 13)
     out = 1 - grade(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
     half = 0.4 * radius
@@ -129,8 +129,8 @@ def _clockwise(grid: Array) -> bool:
 def distort(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> Mesh:
     """Return the mesh with inner corners of elements moved at random by up to `by` of their shortest edge.
 
-    Corners on the boundary, between layers, held, on the skin or in `still` stay, so that the body stays the same;
-    other nodes follow. Corners that would fold an element move less.
+    Corners on the boundary, between layers, held, on the skin or in `still` stay, so that the body is the same. Other
+    nodes follow. Corners that would fold an element move less.
     """
     corners, middles = mesh.elements[:, :4], mesh.elements[:, 4:8]
     sides = np.stack([corners, np.roll(corners, -1, axis=1)])  # two ends of every side
@@ -145,22 +145,22 @@ def distort(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> M
     once = np.bincount(middles.ravel(), minlength=len(free))[middles] == 1  # sides of the boundary
     free[sides[:, once]] = free[mesh.held] = free[mesh.skin] = False
     free[[] if still is None else still] = False
-    moved = np.zeros(mesh.nodes.shape)
+    shift = np.zeros(mesh.nodes.shape)
     rng = np.random.default_rng(seed)
-    moved[free] = rng.uniform(-1, 1, (int(free.sum()), 2)) * by / np.sqrt(2) * shortest[free, None]
+    shift[free] = rng.uniform(-1, 1, (int(free.sum()), 2)) * by / np.sqrt(2) * shortest[free, None]
     while True:
-        nodes = mesh.nodes + moved
-        nodes[middles] = mesh.nodes[middles] + moved[sides].sum(axis=0) / 2
-        nodes[mesh.elements[:, 8]] = mesh.nodes[mesh.elements[:, 8]] + moved[corners].sum(axis=1) / 4
+        nodes = mesh.nodes + shift
+        nodes[middles] = mesh.nodes[middles] + shift[sides].sum(axis=0) / 2
+        nodes[mesh.elements[:, 8]] = mesh.nodes[mesh.elements[:, 8]] + shift[corners].sum(axis=1) / 4
         det = np.linalg.det(np.swapaxes(nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(Q2P1.corners)[1])
         folded = det.min(axis=1) < 0.02 * det.max(axis=1)
         if not folded.any():
             return replace(mesh, nodes=nodes)
-        moved[np.unique(corners[folded])] *= 0.8
+        shift[np.unique(corners[folded])] *= 0.8
 
 
 def locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
-    """Return the element that holds each point (p, 2), and the point's local coordinates there."""
+    """Return the element that contains each of the `points` (p, 2), and the point's local coordinates there."""
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :24]
     corners = mesh.nodes[mesh.elements[near.ravel()]]
@@ -183,5 +183,5 @@ def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
 
 
 def touching_within(newton: Newton, half_width: float) -> Indices:
-    """Return first states: points whose |x| is below `half_width` slip, the others are open."""
+    """Return initial states: nodes with |x| below `half_width` slip, the others are open."""
     return np.where(np.abs(newton.skin_x) < half_width, SLIP, OPEN)

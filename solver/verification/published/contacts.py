@@ -1,7 +1,7 @@
 """Cylinders on a flat rigid surface: Hertz, Smith and Liu, Cattaneo and Mindlin, Coulomb with a bound.
 
-K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 4, 5 and 7. Half-plane problems run on a block so wide that
-its sides are not felt, in units of the half-width a; whole cylinders run as they are.
+K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 4, 5 and 7. Half-plane problems run in units of the
+half-width a, on a block so wide that its sides have no effect; whole cylinders have their own lengths.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ NONE = LoadState(0.0, 0.0, sense=-1)
 
 
 def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0) -> LinearBody:
-    """Return a half-plane with elements of 1/30 of the half-width where it touches; radius inf: flat."""
+    """Return a half-plane with elements of 1/30 of the half-width in the contact; an infinite `radius` is flat."""
     x = mirror(grade(ELEMENT, 0.3, 1.2, wide)) * half_width
     y = grade(ELEMENT, 0.3, 0.0, wide) * half_width
     return LinearBody.of(mound(x, y, radius, 3.0 * half_width), [law])
@@ -36,7 +36,7 @@ def press_under_load(newton: Newton, load: float, half_width: float) -> Equilibr
 
 
 def press(finest: float, nu: float) -> float:
-    """Return the force [N/mm] of a light half-plane on elements of that size, pressed by 1e-3 half-widths."""
+    """Return the force [N/mm] on a half-plane with elements of size `finest`, pressed lightly, by 1e-3 half-widths."""
     x, y = mirror(grade(finest, 0.3, 1.2, 20.0)), grade(finest, 0.3, 0.0, 20.0)
     body = LinearBody.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)])
     return float(solve_full_slip(Newton(body.condensed), NONE._replace(depth=1e-3)).force[1])
@@ -44,7 +44,7 @@ def press(finest: float, nu: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Hertz:
-    """What a pressed half-plane under the gap of a parabola shows."""
+    """Results of a half-plane pressed under the gap of a parabola."""
 
     load: float  # [N/mm]
     half_width: float  # from the pressure's second moment, a = 2 sqrt(<x^2>) [mm]
@@ -54,7 +54,7 @@ class Hertz:
 
 
 def hertz(young: float, nu: float, radius: float, load: float, half_width: float, peak: float) -> Hertz:
-    """Return what is found for a load whose closed form has `half_width` [mm] and `peak` [MPa]."""
+    """Return the results for a load whose closed form has `half_width` [mm] and `peak` [MPa]."""
     body = half_plane(half_width, np.inf, Hooke(young, nu))
     x = body.mesh.nodes[body.mesh.skin, 0]
     body.condensed.rest[:, 1] = x**2 / (2 * radius)
@@ -71,7 +71,7 @@ def hertz(young: float, nu: float, radius: float, load: float, half_width: float
 
 @dataclass(frozen=True, slots=True)
 class Cylinder:
-    """What a whole cylinder between two plates shows."""
+    """Results of a whole cylinder between two plates."""
 
     approach: float  # of the plate to the centre [mm]
     load: float
@@ -80,7 +80,7 @@ class Cylinder:
 
 
 def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
-    """Return what is found for a cylinder of radius 5 mm under `load`, pressed from above as Hertz says."""
+    """Return the results of a cylinder of radius 5 mm under `load`, pressed from above by Hertz's pressure."""
     mesh = disc(5.0, 0.05, 1.0)
     x, y = (mesh.nodes - [0.0, 5.0]).T
     top = chain(np.isclose(np.hypot(x, y), 5.0) & (y > 0), x)
@@ -90,18 +90,18 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
     newton = Newton(body.condensed)
     slide = slide_from_guess(newton, NONE, touching_within(newton, 0.9 * half_width))
-    moved = body.displacement(slide.u)
+    displacement = body.displacement(slide.u)
     centre = int(np.argmin(np.hypot(x, y)))
     at = mesh.nodes[mesh.skin, 0]
     return Cylinder(
-        -float(moved[centre, 1]), float(slide.normal.sum()), 2 * float(np.sqrt(slide.normal @ at**2 / load)),
+        -float(displacement[centre, 1]), float(slide.normal.sum()), 2 * float(np.sqrt(slide.normal @ at**2 / load)),
         float((slide.normal / body.condensed.fixed_length).max()),
     )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
-    """A light contact of half-width 1 and the load that makes it, nearly incompressible so that nothing couples."""
+    """A light contact of half-width 1 and its load; the body is nearly incompressible, so nothing couples."""
 
     body: LinearBody
     load: float
@@ -116,7 +116,7 @@ class Light:
         return stress(self.body, self.body.displacement(state.u), points) / self.peak
 
     def shear(self, law: FrictionLaw, part: float) -> EquilibriumState:
-        """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
+        """Return the state after a tangential force `part` mu P along -x on the far side of the pressed state."""
         stuck = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
         before = replace(self.press, state=stuck, load=LoadState(self.press.load.depth, law.mu, law.tau_max))
         return solve_under_forces(self.newton, before, ForceLoad(self.load, -part * law.mu * self.load))
@@ -141,10 +141,10 @@ def light(nu: float = 0.4999, wide: float = 100.0) -> Light:
 
 
 def stick_width(light: Light, state: EquilibriumState, mu: float) -> float:
-    """Return half the width of the stick: what friction could carry and does not, mu p - q, falls to nothing there."""
+    """Return half the width of the stick zone, at whose ends mu p - q falls to zero."""
     return half_width(light.x, mu * state.normal + state.tangential, state.state == STICK)
 
 
 def capped_width(light: Light, state: EquilibriumState, law: FrictionLaw) -> float:
-    """Return half the width of what slips at the bound: where mu p crosses it."""
+    """Return half the width of the zone at the traction bound, at whose ends mu p crosses it."""
     return half_above(light.x, law.mu * state.normal / light.length - law.tau_max)

@@ -1,4 +1,4 @@
-"""The contacts of the theory at finite strain: a half-plane touched so lightly that it must be the theory's."""
+"""The contacts of the theory at finite strain: a half-plane pressed so lightly that small-strain theory holds."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -15,17 +15,17 @@ from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.verification.published.bodies import grade, mirror, mound
 from solver.verification.published.zones import half_above, half_width
 
-ELEMENT = 1 / 10  # of the half-width expected
+ELEMENT = 1 / 10  # by the expected half-width
 RADIUS = 1000.0  # in half-widths
-WIDE = 30.0  # of the body to each side, in half-widths: forces and widths do not feel it, depths would
+WIDE = 30.0  # of the body to each side, in half-widths: forces and widths do not depend on it, depths would
 YOUNG, NU = 0.08, 0.4999  # nearly incompressible, so that normal and shear do not couple
 DEPTH = 2.3e-3  # in half-widths: gives a contact of about half-width 1
-STEP = 5e-5  # of the surface sideways, in half-widths
+STEP = 5e-5  # of the surface along x, in half-widths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightFinite:
-    """A half-plane at finite strain and what a light press of it gives."""
+    """A half-plane at finite strain under a light press."""
 
     newton: Newton
     pressed: EquilibriumState
@@ -33,22 +33,22 @@ class LightFinite:
 
     @property
     def half_width(self) -> float:
-        """The half-width that the theory gives to this load."""
+        """The theoretical half-width under this load."""
         return float(np.sqrt(4 * self.load * RADIUS * (1 - NU**2) / (np.pi * YOUNG)))
 
     @property
     def peak(self) -> float:
-        """The peak pressure that the theory gives to this load [MPa]."""
+        """The theoretical peak pressure under this load [MPa]."""
         return 2 * self.load / (np.pi * self.half_width)
 
     @property
     def x(self) -> Array:
-        """Where the skin's nodes lie undeformed (k,)."""
+        """Positions of the undeformed skin's nodes (k,)."""
         return self.newton.skin_x
 
     @property
     def length(self) -> Array:
-        """The skin each node stands for (k,): 1/6, 4/6, 1/6 of an edge."""
+        """Tributary lengths of the skin's nodes (k,): 1/6, 4/6, 1/6 of an edge."""
         out = np.zeros(len(self.x))
         ends = self.x[::2]
         for number, (low, high) in enumerate(pairwise(ends)):
@@ -56,7 +56,7 @@ class LightFinite:
         return out
 
     def found_width(self) -> float:
-        """Return the half-width that the pressure's second moment tells, a = 2 sqrt(<x^2>)."""
+        """Return the half-width from the pressure's second moment, a = 2 sqrt(<x^2>)."""
         return 2 * float(np.sqrt(self.pressed.reaction[:, 1] @ self.x**2 / self.load))
 
     def found_peak(self) -> float:
@@ -65,7 +65,7 @@ class LightFinite:
         return float(self.pressed.reaction[middle, 1] / self.length[middle])
 
     def slide_at_bound(self, mu: float, k: float) -> tuple[float, float]:
-        """Return Q/(mu P) in full slip under the bound k mu p0, and half the width by a in which mu p is above it."""
+        """Return Q/(mu P) in full slip under the bound k mu p0, and half the width of mu p above the bound, by a."""
         load = self.pressed.load._replace(mu=mu, tau=k * mu * self.peak, sense=1)
         state = solve_full_slip(self.newton, load)
         drag = float(state.force[0]) / (mu * float(state.force[1]))
@@ -73,9 +73,9 @@ class LightFinite:
         return drag, width / self.half_width
 
     def shear(self, mu: float, part: float) -> tuple[float, float, float]:
-        """Return Q/(mu P) once the surface has moved so that `part` acts or more, half the stick by a, q(0)/(mu p0).
+        """Return Q/(mu P) of at least `part`, half the width of the stick zone by a, and q(0)/(mu p0).
 
-        What friction could carry and does not, mu p - q, falls to nothing at the ends of the stick.
+        The surface moves in steps until `part` is reached. At the ends of the stick zone mu p - q falls to zero.
         """
         load = self.pressed.load._replace(mu=mu, sense=0)
         (state,) = march(self.newton, [load])

@@ -11,7 +11,7 @@ from solver.verification.published.bodies import distort, membrane, ring
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
 _SHARE = INNER**2 / (OUTER**2 - INNER**2)
-_POINTS = np.array([[0.31, -0.57], [-0.77, 0.11], [0.43, 0.83]])  # where stresses are compared, in an element
+_POINTS = np.array([[0.31, -0.57], [-0.77, 0.11], [0.43, 0.83]])  # local points where stresses are compared
 
 
 def widening(nu: float) -> float:
@@ -24,13 +24,13 @@ def widening(nu: float) -> float:
 
 
 def hole_displacement(nu: float, radial: int, around: int) -> float:
-    """Return the displacement of the hole that is found, mean over corner nodes [mm]."""
+    """Return the computed displacement of the hole, mean over corner nodes [mm]."""
     mesh, hole = ring(INNER, OUTER, radial, around)
     at = mesh.nodes[hole]
     loads = edge_load(mesh, hole, at / INNER)
     body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
-    moved = _free(body)[hole]
-    return float(np.sum(moved * at, axis=1)[:-1:2].mean() / INNER)
+    displacement = _free(body)[hole]
+    return float(np.sum(displacement * at, axis=1)[:-1:2].mean() / INNER)
 
 
 def _free(body: LinearBody) -> Array:
@@ -38,7 +38,7 @@ def _free(body: LinearBody) -> Array:
 
 
 def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
-    """Return the errors of displacement, stress (root mean squares) and energy on distorted elements."""
+    """Return the errors of displacement, stress (both root mean squares) and energy on distorted elements."""
     mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
     mesh = distort(mesh, 0.2, 5)
     loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
@@ -50,8 +50,8 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     off = (displacement - exact).ravel()
     one, zero = np.ones_like(x), np.zeros_like(x)
     rigid = np.stack([np.stack(m, axis=1).ravel() for m in ((one, zero), (zero, one), (-y, x))], axis=1)
-    moved = np.asarray(np.linalg.lstsq(rigid, off, rcond=None)[0], np.float64)
-    off = np.asarray(off - rigid @ moved, np.float64)
+    motion = np.asarray(np.linalg.lstsq(rigid, off, rcond=None)[0], np.float64)
+    off = np.asarray(off - rigid @ motion, np.float64)
     element = np.repeat(np.arange(len(mesh.elements)), len(_POINTS))
     probes = Probes.at(mesh, body.elastic.centre, element, np.tile(_POINTS, (len(mesh.elements), 1)))
     gradient = probes.displacement_gradient(mesh, displacement)
@@ -73,11 +73,11 @@ def _locate(mesh: Mesh, element: Indices) -> Array:
 
 
 def cook(young: float, nu: float, force: float, count: int) -> tuple[float, float]:
-    """Return by how much the right edge of Cook's membrane rises at its middle and upper end [mm].
+    """Return the rise of the right edge of Cook's membrane at its middle and upper end [mm].
 
     `force` [N/mm] is spread evenly over the right edge, `count` elements lie along each side.
     """
     mesh = membrane(count, count)
     loads = edge_load(mesh, mesh.skin, np.tile([0.0, force / 16.0], (len(mesh.skin), 1)))
-    risen = LinearBody.of(mesh, [Hooke(young, nu)], loads).condensed.free_displacement()[:, 1]
-    return float(risen[len(risen) // 2]), float(risen[-1])
+    rise = LinearBody.of(mesh, [Hooke(young, nu)], loads).condensed.free_displacement()[:, 1]
+    return float(rise[len(rise) // 2]), float(rise[-1])

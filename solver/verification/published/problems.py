@@ -1,4 +1,4 @@
-"""The published problems as rows: where the number comes from, what it should be, what is found, what is required."""
+"""The published problems as rows: source, expected number, obtained number, allowed error."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from solver.verification.request import LeftOut, Measurements, Request, clock, r
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One number of one problem; `off` and `allowed` are parts of what was expected, or of what `of` names."""
+    """One number of one problem; `off` and `allowed` are relative to the expected number, or to what `of` names."""
 
     problem: str
     source: str
@@ -27,7 +27,7 @@ class Problem:
 
     @property
     def met(self) -> bool:
-        """Whether what was found is near enough."""
+        """Whether the obtained number is close enough."""
         return self.off <= self.allowed
 
 
@@ -40,8 +40,8 @@ HERTZ = (
     ("two metals as one body", 57692.3 * (1 - 0.3**2), 0.3, 50.0, 35000.0, 6.2146, 3585.4),
 )
 JOHNSON, KONTER = "Johnson 1985, ch. 4", "Konter 2005, FENET-UNOTT-DLE-09"
-# E, nu, F, and u_y at the right edge's middle and upper end; plane stress as the plane strain that equals it. What was
-# published has fewer digits than we hold ourselves to: the numbers are those of another code's meshes to 128 x 128
+# E, nu, F, and u_y at the right edge's middle and upper end; plane stress as the equivalent plane strain. Published
+# numbers have too few digits for our tolerance: these are from another code's meshes up to 128 x 128
 REFINED = "another code, 128 x 128"
 COOK = (
     ("Cook's membrane, plane stress", f"{REFINED}; 23.96 in Cook 1989", 0.9375, 0.25, 1.0, 23.967, 25.18),
@@ -69,7 +69,7 @@ PARTS = (0.1, 0.25, 0.5, 0.75, 0.9, 0.99)  # Q/(mu P) of partial slip
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Problem | LeftOut]:
-    """Return an iterator over every number, until time is over."""
+    """Return an iterator over all numbers, until the time is up."""
     del measurements
     works = [thick_cylinders, membranes, hertz, partial_slip, bound_on_hertz, cylinder, below, at_finite_strain]
     return rows_within(request, works, "groups of published problems", lambda work: work())
@@ -83,7 +83,7 @@ def _row(
 
 
 def thick_cylinders() -> Iterator[Problem]:
-    """Yield the widening of a thick cylinder, five elements across its wall."""
+    """Yield the widening of a thick cylinder with five elements across its wall."""
     for nu in (0.3, 0.48, 0.49, 0.499, 0.4999, 0.49999, 0.4999999):
         start = clock()
         numbers = locking.hole_displacement(nu, 5, 20)
@@ -92,7 +92,7 @@ def thick_cylinders() -> Iterator[Problem]:
 
 
 def membranes() -> Iterator[Problem]:
-    """Yield the rise of Cook's membrane, 32 elements along each side."""
+    """Yield the rise of Cook's membrane with 32 elements along each side."""
     for problem, source, young, nu, force, middle, corner in COOK:
         start = clock()
         numbers = locking.cook(young, nu, force, 32)
@@ -120,7 +120,7 @@ def hertz() -> Iterator[Problem]:
 
 
 def cylinder() -> Iterator[Problem]:
-    """Yield what a whole cylinder between plates shows; a/R = 0.16, whose square is what the theory neglects."""
+    """Yield the results of a whole cylinder between plates; a/R = 0.16, whose square the theory neglects."""
     start = clock()
     numbers = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
     problem, source = "whole cylinder between plates", "Johnson 1985, eq. 5.57"
@@ -137,8 +137,8 @@ def below() -> Iterator[Problem]:
         start = clock()
         light = contacts.light(wide=300.0)
         rows = np.array(table)
-        got = light.stress(light.slip(FrictionLaw(mu, math.inf), -1), rows[:, :2])
-        parts = np.stack([got[:, 0, 0], got[:, 1, 1], got[:, 0, 1]], axis=1)
+        stresses = light.stress(light.slip(FrictionLaw(mu, math.inf), -1), rows[:, :2])
+        parts = np.stack([stresses[:, 0, 0], stresses[:, 1, 1], stresses[:, 0, 1]], axis=1)
         worst = float(np.abs(parts - rows[:, 2:]).max())
         yield Problem(
             f"stresses below a contact, mu {mu:g}", "Flamant's kernels, as Smith and Liu 1953",
@@ -147,7 +147,7 @@ def below() -> Iterator[Problem]:
 
 
 def partial_slip() -> Iterator[Problem]:
-    """Yield half the stick's width and the traction in its middle, the pressure being that of nu = 0.4999."""
+    """Yield half the width of the stick zone and the traction in its middle, under the pressure of nu = 0.4999."""
     light, law = contacts.light(), FrictionLaw(0.3, math.inf)
     for part in PARTS:
         start = clock()
@@ -161,7 +161,7 @@ def partial_slip() -> Iterator[Problem]:
 
 
 def bound_on_hertz() -> Iterator[Problem]:
-    """Yield the drag of a bound on a Hertz pressure."""
+    """Yield the drag of a traction bound on a Hertz pressure."""
     light, mu = contacts.light(), 0.3
     for k, force in CAPPED:
         start = clock()
@@ -174,7 +174,7 @@ def bound_on_hertz() -> Iterator[Problem]:
 def _bound_problems(
     problem: str, k: float, drags: tuple[float, float], width: float, begun: float
 ) -> Iterator[Problem]:
-    """Yield the drag, expected and found, and half the width in which the bound acts, where it does anywhere."""
+    """Yield the drag, expected and obtained, and half the width at the bound, where it acts anywhere."""
     yield _row(problem, "elementary integral", "Q/(mu P)", *drags, 0.005, begun)
     if k < 1.0:
         yield _row(
@@ -183,7 +183,7 @@ def _bound_problems(
 
 
 def at_finite_strain() -> Iterator[Problem]:
-    """Yield the same contacts at finite strain, so light that they must be those of the theory."""
+    """Yield the same contacts at finite strain, so light that small-strain theory holds."""
     start = clock()
     light = finite_contacts.light_finite()
     name = "Hertz at finite strain, a/R 0.001"

@@ -1,4 +1,4 @@
-"""Half the width of a zone on the skin, such as where it sticks, known to a part of an element."""
+"""Half-width of a zone on the skin, such as the stick zone, to a fraction of an element."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,16 +8,16 @@ from solver.contact import last_edge
 
 
 def half_width(x: Array, force: Array, inside: NDArray[np.bool_]) -> float:
-    """Return half the width of the zone of nodes `inside` (k,), at whose ends a `force` (k,) falls as a pressure does.
+    """Return the half-width of the zone of nodes `inside` (k,), at whose ends a `force` (k,) falls like a pressure.
 
-    nan where it is too short to tell.
+    Returns nan where the zone is too short.
     """
     high, low = last_edge(x, force, inside), last_edge(-x[::-1], force[::-1], inside[::-1])
     return float("nan") if high is None or low is None else (high + low) / 2.0
 
 
 def half_above(x: Array, value: Array) -> float:
-    """Return half the width of the zone in which `value` (k,) lies above 0, interpolated between nodes; 0 if nowhere.
+    """Return the half-width of the zone of `value` (k,) above 0, interpolated between nodes; 0 without such a zone.
 
     >>> half_above(np.array([-2.0, -1.0, 0.0, 1.0, 2.0]), np.array([-1.0, -0.5, 0.5, -1.5, -2.0]))
     0.375

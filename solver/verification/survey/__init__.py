@@ -1,1 +1,1 @@
-"""Surveys of error estimates against true errors over many random scenes, for choosing the factors of estimates."""
+"""Surveys of error estimates against true errors over many random scenes."""

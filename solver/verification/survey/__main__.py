@@ -1,7 +1,7 @@
-"""Judge error estimates over many random scenes: `python -m solver.verification.survey`.
+"""Compare error estimates with true errors on many random scenes: `python -m solver.verification.survey`.
 
-Each scene is asked for without a tolerance, at 1 % and at 0.3 %. One takes 1 to 60 s. `--keep FILE` appends what is
-solved to FILE, and takes from it what is there.
+Each scene is solved without a tolerance, at 1 % and at 0.3 %. One takes 1 to 60 s. `--keep FILE` appends new rows to
+FILE and reads the rows that it holds already.
 """
 
 from argparse import ArgumentParser
@@ -24,13 +24,13 @@ CAPTION = (
 
 
 def read_rows(keep: Path | None) -> list[Row]:
-    """Return the rows of a file; none where there is none."""
+    """Return the rows of a file; none where it does not exist."""
     lines = keep.read_bytes().splitlines() if keep is not None and keep.exists() else []
     return [msgspec.json.decode(line, type=Row) for line in lines]
 
 
 def rows(keys: Sequence[Key], keep: Path | None, solve: Callable[[str, int, Kinematics], Row] = solve) -> Iterator[Row]:
-    """Yield what scenes give, from the lines of `keep` where it has them; the others are solved and appended."""
+    """Yield the rows of scenes, from the file `keep` where it has them; solve the others and append them."""
     by_key = {(row.family, row.number, row.kinematics): row for row in read_rows(keep)}
     for key in keys:
         row = by_key.get(key)

@@ -1,4 +1,4 @@
-"""Answers as users ask for them, without a tolerance, at 1 % and at 0.3 %, against fine meshes."""
+"""Answers as users request them, without a tolerance, at 1 % and at 0.3 %, against fine meshes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -18,18 +18,18 @@ from solver.verification.random_scenes import random_scene, surface_set
 from solver.verification.survey.statistics import HEADER, TOLERANCES, judgement, misses
 from solver.verification.truth import NUMBERS, mean_and_doubt
 
-SURFACES = "surfaces"  # the set of three surfaces solved together, whose differences are judged by their range
+SURFACES = "surfaces"  # the set of three surfaces solved together, whose differences are relative to their range
 BY_TOLERANCE = 5.0  # tolerance of a difference by that of a number
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What one scene, or set of surfaces, gives."""
+    """Result of one scene, or set of surfaces."""
 
     family: str
     number: int
     kinematics: Kinematics
-    estimates: tuple[Estimate, ...] = ()  # of the answers; those without a tolerance have 0
+    estimates: tuple[Estimate, ...] = ()  # of the answers; tolerance 0 where none was requested
     refusals: tuple[str, ...] = ()  # of the answers, or of the truth
 
 
@@ -62,7 +62,7 @@ def _with_tolerance(scene: Scene, tolerance: float | None, *, together: bool) ->
 
 
 def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) -> Estimate:
-    """Return how far differences in SED may be off, and are, by the range of the truth, `solves` (3, n, 3)."""
+    """Return the estimate of a difference in SED, by the range of the truth, `solves` (3, n, 3)."""
     sed = np.array([answer.sed_ending for answer in answers])
     error, doubt = apart(sed, solves[:, :, 0])
     first = answers[0]
@@ -71,9 +71,9 @@ def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) 
 
 
 def apart(numbers: Array, solves: Array) -> tuple[float, float]:
-    """Return the worst error of a difference between numbers (n,), and the truth's doubt, by the range of the truth.
+    """Return the worst error of a difference between `numbers` (n,), and the truth's doubt, by the range of the truth.
 
-    `solves` (m, n) are the same on m fine meshes.
+    `solves` (m, n) are the numbers on m fine meshes.
     """
     truth = solves.mean(axis=0)
     span = float(np.ptp(truth))
@@ -81,19 +81,19 @@ def apart(numbers: Array, solves: Array) -> tuple[float, float]:
 
 
 def report(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the refusals, the misses, and a table with a row a set and kinematics."""
+    """Yield the refusals, the misses, and a table with a row for each set and kinematics."""
     yield from (f"{row.family} {row.number}: {sentence}" for row in rows for sentence in row.refusals)
     yield from misses(one for row in rows for one in row.estimates)
     yield from table(rows)
 
 
 def table(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the lines of a Markdown table with a row a set and kinematics."""
+    """Yield the lines of a Markdown table with a row for each set and kinematics."""
     yield _line(HEADER)
     yield _line(["---"] * len(HEADER))
     for kinematics, family in dict.fromkeys((row.kinematics, row.family) for row in rows):
-        mine = [row for row in rows if (row.kinematics, row.family) == (kinematics, family)]
-        yield _line(judgement(family, kinematics, (one for row in mine for one in row.estimates)))
+        selection = [row for row in rows if (row.kinematics, row.family) == (kinematics, family)]
+        yield _line(judgement(family, kinematics, (one for row in selection for one in row.estimates)))
 
 
 def _line(cells: Sequence[str]) -> str:

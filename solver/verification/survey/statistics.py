@@ -1,4 +1,4 @@
-"""How many estimates are safe, how many are near, and how much the corrected value is worth."""
+"""Statistics of estimates: how many are safe, how many are close, and the gain of the corrected value."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
@@ -9,7 +9,7 @@ from solver.verification.estimates import Estimate
 from solver.verification.truth import NUMBERS
 
 TOLERANCES = (None, 0.01, 0.003)  # tolerances of answers
-EXACT = 1e-12  # error below which a number follows from what is given alone, and nothing is judged [-]
+EXACT = 1e-12  # error below which a number follows from the input alone, and is not judged [-]
 HEADER = (
     "set", "strain", "answers", "SED above", "force above", "drag above", "near", "missed unsaid", "ratio", "rank",
     "sign", "corrected",
@@ -22,10 +22,10 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     Near, ratio (estimate by error, median), rank (Spearman's, of estimate and error), sign (whether the nested value
     lies on the truth's side) and corrected (its error by the answer's, median) are those of the SED.
     """
-    known = [row for row in rows if row.above is not None and row.error > EXACT]
-    by_number = [[row for row in known if row.number == number] for number in NUMBERS]
+    decided = [row for row in rows if row.above is not None and row.error > EXACT]
+    by_number = [[row for row in decided if row.number == number] for number in NUMBERS]
     sed = by_number[0]
-    claimed = [row for row in sed if row.met is not None and row.tolerance and row.estimate <= row.tolerance]
+    within = [row for row in sed if row.met is not None and row.tolerance and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
     ratios = [row.estimate / row.error for row in sed]
     halves = [row.corrected / row.error for row in true if row.corrected is not None]
@@ -33,9 +33,9 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         name,
         kinematics,
         str(len(sed)),
-        *(_share([bool(row.above) for row in mine]) for mine in by_number),
+        *(_share([bool(row.above) for row in column]) for column in by_number),
         _share([row.near for row in sed if row.near is not None]),
-        f"{sum(not row.met for row in claimed)} of {len(claimed)}",
+        f"{sum(not row.met for row in within)} of {len(within)}",
         f"{median(ratios):.1f}" if ratios else "–",
         f"{_rank_correlation([row.estimate for row in sed], [row.error for row in sed]):.2f}" if len(sed) > 2 else "–",
         _share([bool(row.towards) for row in true]),
@@ -53,7 +53,7 @@ def _rank_correlation(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def misses(rows: Iterable[Estimate]) -> Iterator[str]:
-    """Yield a line for every number whose error lies above its estimate."""
+    """Yield a line for every number whose error exceeds its estimate."""
     for row in rows:
         if row.above is False and row.error > EXACT:
             words = f"error of the {row.number} {row.error:.2g}, estimate {row.estimate:.2g}"
