@@ -219,7 +219,7 @@ def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
     return (np.cumsum(room) - room)[slot], int(room.sum())
 
 
-class Some(NamedTuple):
+class ElementSubset(NamedTuple):
     """Elements whose displacements are recovered."""
 
     parts: Flags  # (p,) of the elimination that hold their unknowns
@@ -274,9 +274,9 @@ class Elimination:
         self._back_substitute(condensed_force, np.ascontiguousarray(skin), self._every, out)
         return out
 
-    def displace(self, condensed_force: Array, skin: Array, some: Some, out: Array) -> None:
-        """Fill `out` (nodes, 2, c) with displacements of some elements for the skin's (c, m).
+    def displace(self, condensed_force: Array, skin: Array, subset: ElementSubset, out: Array) -> None:
+        """Fill `out` (nodes, 2, c) with the displacements of a `subset` of elements for the skin's (c, m).
 
         `condensed_force` (n,) is the result of `condense`.
         """
-        self._displace(condensed_force, np.ascontiguousarray(skin), *some, out)
+        self._displace(condensed_force, np.ascontiguousarray(skin), *subset, out)

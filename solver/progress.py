@@ -1,4 +1,4 @@
-"""Progress reports of the solver: nobody knows beforehand how long a hard scene takes.
+"""Progress reports of the solver, since the duration of a hard scene is unknown.
 
 with listening(lambda doing, part: print(f"{doing}: {part:.0%} of it")):
     solve(scene)

@@ -14,7 +14,7 @@ from solver.arrays import Array, BodyState, ElementSystem, Indices, Narrow, Symb
 from solver.body import MeshElements, Patches, held_directions, integrate_elements
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Elasticity, log1p, shape, slopes
-from solver.linalg import Elimination, Some, symbolic_factorization
+from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import Mesh
 from solver.quantities import QUANTITIES
 
@@ -74,8 +74,8 @@ class FiniteBody(MeshElements):
         out = np.zeros((*self.mesh.nodes.shape, skin.shape[1]))
         inside, recovery = self.condensed.inside, self.condensed.system.recovery_matrix[:, :, :16].copy()
         every = np.ones(len(self.plan.start), bool)
-        some = Some(every, self.elements.nodes, self.elements.unknown, recovery)
-        inside.displace(np.zeros(self.size), skin.T, some, out)
+        subset = ElementSubset(every, self.elements.nodes, self.elements.unknown, recovery)
+        inside.displace(np.zeros(self.size), skin.T, subset, out)
         return out
 
     def deformation(self, u: Array) -> Array:

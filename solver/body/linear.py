@@ -16,7 +16,7 @@ from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
 from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.constitutive import Elasticity
-from solver.linalg import Elimination, Some, symbolic_factorization
+from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
 from solver.quantities import QUANTITIES, SED
 
@@ -89,7 +89,7 @@ class LinearElimination:
         self._recovery_matrix = self._recovery_matrix[:, :, :16].copy()
         self.stiffness = self._inside.stiffness
         self.unloaded: Carried = np.zeros(plan.size), np.zeros((count, 2))
-        self._some: dict[bytes | None, tuple[Indices, Some]] = {}
+        self._subsets: dict[bytes | None, tuple[Indices, ElementSubset]] = {}
 
     def condense(self, loads: Array) -> Carried:
         """Return dead `loads` (nodes, 2) after forward elimination."""
@@ -114,23 +114,26 @@ class LinearElimination:
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-        mesh, (used, some) = self.elastic.mesh, self._elements_of(only)
+        mesh, (used, subset) = self.elastic.mesh, self._elements_of(only)
         out = np.zeros((*mesh.nodes.shape, skin.shape[1]))
-        self._inside.displace(carried[0], skin.T, some, out)
-        out[some.nodes[:, 8]] += carried[1][used, :, None]
+        self._inside.displace(carried[0], skin.T, subset, out)
+        out[subset.nodes[:, 8]] += carried[1][used, :, None]
         return out
 
-    def _elements_of(self, only: Indices | None) -> tuple[Indices, Some]:
+    def _elements_of(self, only: Indices | None) -> tuple[Indices, ElementSubset]:
         """Return the elements that hold the nodes `only`, or all elements."""
         key = None if only is None else only.tobytes()
-        if key not in self._some:
+        if key not in self._subsets:
             of = self.elastic.elements
             wanted = np.full(len(self.elastic.mesh.nodes), only is None)
             wanted[only] = True
             used = np.flatnonzero(wanted[of.nodes].any(axis=1))
             parts = self._inside.parts_holding(of.unknown[used])
-            self._some[key] = used, Some(parts, of.nodes[used], of.unknown[used], self._recovery_matrix[used])
-        return self._some[key]
+            self._subsets[key] = (
+                used,
+                ElementSubset(parts, of.nodes[used], of.unknown[used], self._recovery_matrix[used]),
+            )
+        return self._subsets[key]
 
 
 @lru_cache(maxsize=1)

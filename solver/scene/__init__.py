@@ -84,7 +84,7 @@ class Scene:
 
     @property
     def tangential_force(self) -> float | None:
-        """The prescribed drag, opposing the slide [N/mm], None where the bone slides until the state is steady."""
+        """The prescribed drag, opposing the slide [N/mm], None where the bone slides to the settled state."""
         return self._per_mm(self.loading.tangential_force)
 
     def _per_mm(self, force: float | None) -> float | None:
@@ -106,7 +106,7 @@ class Scene:
         return replace(self, loading=replace(self.loading, tangential_force=None))
 
     def earlier_slides(self) -> tuple["Scene", ...]:
-        """Return the steady slides before the last one that go the other way, a scene each."""
+        """Return the settled slides before the last one that go the other way, a scene each."""
         opposite = set(self.loading.directions[:-1]) - {self.loading.direction}
         way = {1: "+x", -1: "-x"}
         solve = replace(self.solve, course="steady")

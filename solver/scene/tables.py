@@ -221,7 +221,7 @@ class Friction:
 class Loading:
     """How the bone is driven: down within 1 s, by an indentation or a force, then along the surface.
 
-    A drag can be given in place of a slide to the steady state. It grows within 1 s after the press, and the shift of
+    A drag can be given in place of a slide to the settled state. It grows within 1 s after the press, and the shift of
     the bone is part of the solution.
     """
 
@@ -229,7 +229,7 @@ class Loading:
     slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x"  # "+x": proximal to distal; several: one after the other
     speed: float = 15.0  # [mm/s]; in an elastic finger it only scales time
     normal_force: float | None = None  # in place of the indentation
-    tangential_force: float | None = None  # in place of a slide to the steady state: drag opposing the slide, positive
+    tangential_force: float | None = None  # in place of a slide to the settled state: drag opposing the slide, positive
     force_unit: Literal["N/mm", "N"] = "N/mm"  # of both forces; "N": of the whole finger, by its width
 
     def __post_init__(self) -> None:
@@ -304,7 +304,7 @@ class Solve:
     """
 
     kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
-    course: Literal["steady", "history"] = "steady"  # "steady": the steady state alone; "history": all the way to it
+    course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
     tolerance: float | None = None  # required relative error of the ending-averaged SED [-]; None: the solver's own
     evidence: Literal["quick", "estimated", "measured"] = "estimated"  # of the size of omitted effects
     contrast_tolerance: float | None = None  # required error of differences of SED between surfaces, by their range [-]

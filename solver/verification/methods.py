@@ -40,7 +40,7 @@ class MeshMethod(ABC, Generic[AnyFinger]):
 
     @abstractmethod
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Return the steady state of `scene`, from the undeformed finger or from the state of a similar surface.
+        """Return the settled state of `scene`, from the undeformed finger or from the state of a similar surface.
 
         Raises SolveFailure where there is none.
         """

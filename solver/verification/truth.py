@@ -2,7 +2,7 @@
 
 The cases are the ten published surfaces, at small and at finite strain. The truth of a number is the mean of three
 solves on fine meshes, one of them moved along the skin by half an element. Its doubt is their distance from the mean.
-No truth is stored, so it is never older than the solver. A surface without steady sliding has the solver's refusal
+No truth is stored, so it is never older than the solver. A surface without settled sliding has the solver's refusal
 instead.
 """
 

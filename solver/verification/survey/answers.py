@@ -62,7 +62,7 @@ def _with_tolerance(scene: Scene, tolerance: float | None, *, together: bool) ->
 
 
 def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) -> Estimate:
-    """Return the estimate of a difference in SED, by the range of the truth, `solves` (3, n, 3)."""
+    """Return estimate and error of a difference in SED, by the range of the truth, `solves` (3, n, 3)."""
     sed = np.array([answer.sed_ending for answer in answers])
     error, doubt = apart(sed, solves[:, :, 0])
     first = answers[0]
