@@ -41,19 +41,19 @@ def _cache_folder() -> Path:
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
     setting = os.environ.get("NUMBA_CACHE_DIR")
-    places = [_FOLDER / "__pycache__"] if only_mine(_FOLDER) else []
+    places = [_FOLDER / "__pycache__"] if is_private(_FOLDER) else []
     places.append(user_cache_path("daq-app", appauthor=False))
     if setting:
         places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
     for place in places:
         with suppress(OSError):
             (place / version).mkdir(mode=0o700, parents=True, exist_ok=True)
-            if all(only_mine(folder) for folder in (place, place / version)):
+            if all(is_private(folder) for folder in (place, place / version)):
                 return place / version
     return Path(mkdtemp(prefix="daq-app-"))
 
 
-def only_mine(folder: Path) -> bool:
+def is_private(folder: Path) -> bool:
     """Return whether this user may write in `folder` and nobody else may, on systems where files have owners."""
     if not os.access(folder, os.W_OK) or not hasattr(os, "getuid"):
         return os.access(folder, os.W_OK)

@@ -205,7 +205,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
         radii = with_middles(np.array(lines.bone))[:-1]
         points = np.concatenate([outline.bone(every_arc[:, None], radii), points], axis=1)
         layers[: len(radii) // 2] = BONE
-    low, high = _touchable(outline, arcs, sizing)
+    low, high = _contact_lines(outline, arcs, sizing)
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
     held = [number[:, 0]]
@@ -213,13 +213,13 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     if finger.cut == "driven":
         held += [number[0], number[-1]]
         low, high = max(low, 1), min(high, len(arcs) - 2)
-        loose &= _far(arcs, outline.palmar_cut, outline.palmar_cut, finger)
-        loose &= _far(arcs, outline.dorsal_cut, outline.dorsal_cut, finger)
+        loose &= _clear_of_held(arcs, outline.palmar_cut, outline.palmar_cut, finger)
+        loose &= _clear_of_held(arcs, outline.dorsal_cut, outline.dorsal_cut, finger)
     if finger.nail_length > 0.0:
         nail = np.flatnonzero((every_arc >= outline.dorsal - 1e-9) & (every_arc <= outline.nail_end + 1e-9))
         held.append(number[nail, -1])
         high = min(high, int(nail[0]) // 2 - 1)
-        loose &= _far(arcs, outline.dorsal, outline.nail_end, finger)
+        loose &= _clear_of_held(arcs, outline.dorsal, outline.nail_end, finger)
     mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), distinct(np.concatenate(held)))
     return FingerMesh(mesh, outline, sizing, base, arcs, depths, below, number[:, -1].copy(), loose)
 
@@ -227,10 +227,10 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
 def _lines(outline: Outline, receptor: Receptor, sizing: Sizing, fineness: float) -> Lines:
     """Return the lines for a `fineness`."""
     finger = outline.finger
-    fine, size = _fine(outline, sizing.indentation, fineness), finger.tip_radius / fineness
+    fine, size = _finest_size(outline, sizing.indentation, fineness), finger.tip_radius / fineness
     row = _Row.of(outline, fine, receptor, sizing, 1.0 / fineness)
     arcs = row.lines(row.gaps(), shift=sizing.shift)
-    thin = np.inf if sizing.fold is None else SIZES.fold_aspect * _fold(finger)
+    thin = np.inf if sizing.fold is None else SIZES.fold_aspect * _fold_size(finger)
     skin, fat = _layers(finger, fine, size, receptor, thin)
     bone = np.empty(0)
     if finger.bone == "meshed":
@@ -239,18 +239,18 @@ def _lines(outline: Outline, receptor: Receptor, sizing: Sizing, fineness: float
     return Lines(*(tuple(part.tolist()) for part in (arcs, bone, fat, skin)))
 
 
-def _far(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
+def _clear_of_held(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
     """Return the elements (a,) between the lines at `arcs` that are apart from skin held between `start` and `stop`."""
     apart = SIZES.held_distance * finger.tip_radius
     return (arcs[1:] < start - apart) | (arcs[:-1] > stop + apart)
 
 
-def _fold(finger: Finger) -> float:
+def _fold_size(finger: Finger) -> float:
     """Return the size along the skin of elements at a fold [mm]."""
     return max(min(FOLD[0] * finger.tip_radius, FOLD[1] * finger.epidermis), 2.0 * FINEST * finger.tip_radius)
 
 
-def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
+def _arcs_below(outline: Outline, height: float) -> tuple[float, float]:
     """Return the arc positions between which the undeformed skin is lower than `height` [mm]."""
     side = np.geomspace(1e-9, 1.0, 2001)
     ends: list[float] = []
@@ -260,16 +260,16 @@ def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def _touchable(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
+def _contact_lines(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
     """Return the indices in `arcs` of the first and last line between which the skin may touch."""
-    first, last = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
+    first, last = _arcs_below(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
     low = max(int(np.searchsorted(arcs, first)) - 1, 0)
     return low, min(int(np.searchsorted(arcs, last)), len(arcs) - 1)
 
 
-def _fine(outline: Outline, indentation: float, fineness: float) -> float:
+def _finest_size(outline: Outline, indentation: float, fineness: float) -> float:
     """Return the size of the smallest elements along the skin [mm]."""
-    low, high = _lower_than(outline, indentation)
+    low, high = _arcs_below(outline, indentation)
     radius = outline.finger.tip_radius
     overlap = min(1.0, (high - low) / 2.0 / (SIZES.short_overlap * radius))
     return max(radius / fineness * SIZES.in_contact * overlap, FINEST * radius)
@@ -301,7 +301,7 @@ class _Row:
         Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature. They also
         lie at the ends of the nerve ending and of a nail plate.
         """
-        low, high = _lower_than(outline, sizing.indentation)
+        low, high = _arcs_below(outline, sizing.indentation)
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
         palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
         arc = np.concatenate([palmar, np.linspace(low, high, 1000), dorsal])
@@ -313,7 +313,7 @@ class _Row:
             SIZES.palmar_growth * np.maximum(low - arc, 0.0) + SIZES.dorsal_growth * np.maximum(arc - high, 0.0)
         )
         if sizing.fold is not None:
-            least = _fold(outline.finger)
+            least = _fold_size(outline.finger)
             from_fold = np.maximum(np.abs(arc - sizing.fold) - SIZES.fold_elements * least, 0.0)
             sizes = np.minimum(sizes, least + SIZES.from_fold * from_fold)
         near, far = outline.along(0.0, receptor.depth, receptor.ending[1] * np.array([-0.5, 0.5])).tolist()
