@@ -19,7 +19,7 @@ A point is in one of four states, s = +1 or -1 being the sense of the friction f
     cap     g = 0, T = s tau_max L    until N < 0, mu N < tau_max L or s v > 0
 
 `solver._kernels.active_set` searches for states without contradiction, at both kinematics; at finite strain L is that
-of the deformed skin. The list of laws is at the foot.
+of the deformed skin. The list of laws is at the foot; one test checks the states of every law.
 
 Contact ends between two nodes. The end is known to about a tenth of an element, because pressure falls there like the
 square root of the distance. So the force beyond a line between elements has its centre at 2/5 of the way to the end.
@@ -128,7 +128,7 @@ class SkinCompression(NamedTuple):
     """
 
     least: float  # least ratio of deformed to undeformed length, over halves of elements' sides
-    place: int  # number of that element
+    place: int  # element with the least ratio
     lowest: float  # least stretch, at the ends of elements too: more accurate where elements are large
     kink: float  # largest jump of the tangent between elements, by undeformed length: large at a crease.
     # Only open, compressed skin counts: jumps where it touches, or is stretched at an edge of contact, are the mesh's.

@@ -209,7 +209,7 @@ def scatter_answer(
 def look_ahead(
     position: SkinPosition, steps: Array, motion: Array, loose: bool, ahead: Array, above: Array, slip: Array
 ) -> None:
-    """Fill positions along and over the surface that the skin's nodes step to, and their slip (k,).
+    """Fill the next positions of the skin's nodes along and over the surface, and their slip (k,).
 
     The slip is zero where the body is `loose`: the surface does not hold it along x.
     """
@@ -268,7 +268,7 @@ def recover_steps(compliance: Array, answer: Array, unloaded_step: Array, steps:
 def change_states(states: ContactStates, changes: StateChanges, slip: Array, entries: Narrow, one_by_one: bool) -> None:
     """Change all states that contradict the solution, or the worst one alone.
 
-    A node that comes into contact repeatedly slips every second time, by its count in `entries` (k,).
+    `entries` (k,) counts how often a node comes into contact; every second time it starts to slip.
     """
     state, sense, _ = states
     next_state, next_sense, violations = changes

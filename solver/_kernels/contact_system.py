@@ -80,7 +80,7 @@ def assemble_contact_system(
 ) -> int:
     """Assemble the skin's system of contact in displacement steps; return its size f.
 
-    Fills `matrix` (f f,), `right` (f, 4) and the list of unknowns `free` (f,); `steps` (2 k, 4) where the contact
+    Fills `matrix` (f f,), `right` (f, 4), the list of unknowns `free` (f,), and `steps` (2 k, 4) where contact
     conditions prescribe displacements. The columns are the step to equilibrium, and its derivatives with respect to
     depth, mu and travel of the surface along +x. `length` is that of `bounded_length`.
     """
