@@ -43,7 +43,7 @@ _BY_ERRNO = {number: words for words, numbers, _ in _REMEDIES for number in numb
 _BY_SQLITE = {code: words for words, _, codes in _REMEDIES for code in codes}
 
 
-def read_limited(path: Path, most: int = LARGEST_DOCUMENT) -> bytes:
+def read_within_limit(path: Path, most: int = LARGEST_DOCUMENT) -> bytes:
     """Return the bytes of a file, which may be a pipe. Raises OSError, also where there are more than `most`."""
     with path.open("rb") as file:
         if os.fstat(file.fileno()).st_size <= most and len(content := file.read(most + 1)) <= most:
@@ -57,7 +57,7 @@ def open_new(path: Path) -> BinaryIO:
     return path.open("xb")
 
 
-def packed_lines(path: Path) -> Iterator[str]:
+def gzip_lines(path: Path) -> Iterator[str]:
     """Yield the lines of a table packed by gzip. Raises ValueError where it grows as no readings do, OSError."""
     size, most = 0, MOST_PACKED * path.stat().st_size + LARGEST_TEXT
     with gzip.open(path, "rt", encoding="utf-8") as file:
@@ -68,8 +68,8 @@ def packed_lines(path: Path) -> Iterator[str]:
             yield line
 
 
-def bounded(connection: sqlite3.Connection) -> sqlite3.Connection:
-    """Return a connection whose values are of a bounded size, and whose texts come even where they are no UTF-8."""
+def limit_values(connection: sqlite3.Connection) -> sqlite3.Connection:
+    """Limit the size of a connection's values, let it return texts that are no UTF-8, and return it."""
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_DOCUMENT)
     connection.text_factory = _text
     return connection
@@ -195,8 +195,8 @@ def _finite(text: str) -> float:
     return number if math.isfinite(number) else _no_number(text)
 
 
-def converted(value: object, form: type[T]) -> T:
-    """Return plain data as the type `form`. Raises ValueError that says where it is of another kind, and which."""
+def as_type(value: object, form: type[T]) -> T:
+    """Return plain data as the type `form`. Raises ValueError that says which part is of another kind."""
     try:
         return msgspec.convert(value, form)
     except msgspec.ValidationError as error:
@@ -206,9 +206,9 @@ def converted(value: object, form: type[T]) -> T:
 def complete(document: Mapping[str, Any], form: type[T]) -> T:
     """Return a document that the program wrote itself, as the type `form`.
 
-    A name may be missing only where nothing is known under it. Raises ValueError as `converted` does.
+    A name may be missing only where nothing is known under it. Raises ValueError as `as_type` does.
     """
-    typed = converted(document, form)
+    typed = as_type(document, form)
     for name in _missing(document, msgspec.to_builtins(typed)):
         raise ValueError(f"Object missing required field `{name}`")
     return typed

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 import msgspec
 from msgspec import inspect
 
-from sessions.file_access import LARGEST_TEXT, name_failure, read_limited
+from sessions.file_access import LARGEST_TEXT, name_failure, read_within_limit
 
 T = TypeVar("T")
 
@@ -65,7 +65,7 @@ def text_of(path: Path) -> str:
         what = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {what}; give the path of a TOML file")
     with name_failure(SettingsError, f"{path} cannot be read"):
-        content = read_limited(path, LARGEST_TEXT)
+        content = read_within_limit(path, LARGEST_TEXT)
     try:
         return content.decode("utf-8-sig")  # some editors begin a file with a mark
     except UnicodeDecodeError as error:

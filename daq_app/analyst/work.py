@@ -21,7 +21,7 @@ from sessions.prediction import PredictionOptions, TrialPrediction, predict
 from sessions.prediction.scenes import Way
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
-from sessions.recording.derived import revealed
+from sessions.recording.derived import reveal
 from sessions.recording.head import software_versions
 from sessions.report import findings
 from sessions.report.contents import Field, Report
@@ -318,7 +318,7 @@ class NothingToShow(Exception):
 
 
 def _opened(folder: Path) -> Recording:
-    recording = revealed(Recording.open(folder))
+    recording = reveal(Recording.open(folder))
     if recording.plan.blinded:
         raise Blinded(f"{folder} is blinded: its results are told by index; 'daq-app unblind' opens the key")
     return recording

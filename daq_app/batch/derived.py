@@ -15,13 +15,13 @@ from sessions.prediction.stored import check_prediction, with_present_names
 from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import (
-    checked_gain_error,
     differences,
     first_sentences,
     force_visit,
     gain_error_set,
     load_derived,
-    revealed,
+    parse_gain_error,
+    reveal,
     set_gain_error,
     store_derived,
     why,
@@ -187,7 +187,7 @@ def repeat(
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
     original = plan_of or recording
-    plan = (original if blind else revealed(original)).plan
+    plan = (original if blind else reveal(original)).plan
     analysis = analyse(recording, settings_of(stored), decisions)
     prediction = _predict(analysis, plan, options, lambda _: True)
     return with_present_names(_with_firing(prediction, _afferent_of(stored)))
@@ -242,7 +242,7 @@ def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     seed = settings.get("bootstrap_seed", 0)
     if not isinstance(seed, int) or seed < 0:
         raise SettingsError(f"bootstrap_seed = {seed!r} is not allowed: a whole number from 0 on")
-    return AnalysisSettings(area=area, gain_error=checked_gain_error(settings.get("gain_error")), bootstrap_seed=seed)
+    return AnalysisSettings(area=area, gain_error=parse_gain_error(settings.get("gain_error")), bootstrap_seed=seed)
 
 
 def is_current(stored: Mapping[str, Any], decisions: Decisions) -> bool:
@@ -260,7 +260,7 @@ def open_visit(path: Path, subject: str | None) -> Recording:
         if subject is None:
             raise WrongValue(f"{path} is a study: say whose visit with --subject")
         return force_visit(path, subject)
-    recording = revealed(Recording.open(path))
+    recording = reveal(Recording.open(path))
     if subject not in (None, recording.plan.subject):
         raise WrongValue(f"--subject {subject} is not allowed: {path} is a session of {recording.plan.subject}")
     return recording

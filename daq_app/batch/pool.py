@@ -19,7 +19,7 @@ from typing import Any, cast
 
 from daq_app.child_process import process_pool
 from daq_app.console import Console
-from sessions.file_access import converted, write_whole
+from sessions.file_access import as_type, write_whole
 from sessions.prediction.sealed_predictions import SEAL
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import GAIN_ERROR, UNBLINDING
@@ -219,7 +219,7 @@ class Shelf:
         with suppress(OSError, ValueError, KeyError, TypeError):
             kept = json.loads(self.file(key).read_bytes())
             if kept["sha256"] == _digest(kept["visit"]):
-                return converted(kept["visit"], Visit)
+                return as_type(kept["visit"], Visit)
         return None
 
     def file(self, key: str) -> Path:
@@ -278,7 +278,7 @@ def visits(
                 console.note(f"{name}: {answer}")
             else:
                 shelf.keep(named[name], answer)
-                done.append(converted(answer, Visit))
+                done.append(as_type(answer, Visit))
             left = (time.monotonic() - start) / count * (len(missing) - count)
             remaining = "" if console.at_terminal else f", {left:.0f} s left"
             console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{remaining}")

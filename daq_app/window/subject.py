@@ -172,7 +172,7 @@ class _Page:
 
     def _stroke(self) -> str:
         trial = self.session.of(self.session.trial)
-        allowed = 1 if trial is None else self.session.plan.strokes_allowed(trial.trial)
+        allowed = 1 if trial is None else self.session.plan.stroke_limit(trial.trial)
         return self.say(SubjectText.STROKE) if allowed == 1 else self.say(SubjectText.STROKES).format(number=allowed)
 
     def _notice(self, to_do: str) -> str:

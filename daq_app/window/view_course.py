@@ -256,7 +256,7 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     hand = session.plan.stroking_hand
     finger = tr("{hand} index finger", hand=hand) if hand else tr("index finger")
     way = tr("away from the body") if trial.direction == PROXIMAL_TO_DISTAL else tr("towards the body")
-    allowed = session.plan.strokes_allowed(trial)
+    allowed = session.plan.stroke_limit(trial)
     often = tr("once") if allowed == 1 else tr("at most {allowed}×", allowed=allowed)
     sentence = tr(
         "Subject strokes {code} {often}, {way}, with the {finger}.",

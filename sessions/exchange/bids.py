@@ -21,7 +21,7 @@ from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import MISSING, columns, read_rows, rows, write_rows
 from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
-from sessions.file_access import json_object, packed_lines, read_limited, write_json
+from sessions.file_access import gzip_lines, json_object, read_within_limit, write_json
 from sessions.recording import Recording
 from sessions.recording.manifest import description
 
@@ -77,8 +77,8 @@ def read(path: Path) -> ExportedSession:
     if len(event_files) != 1:
         raise ValueError(f"it holds the events of {len(event_files)} sessions, and one is needed")
     (event_file,) = event_files
-    head = head_of(json_object(read_limited(event_file.with_suffix(".json")))["DaqAppSession"])
-    header, *lines = (line.split("\t") for line in read_limited(event_file).decode().splitlines())
+    head = head_of(json_object(read_within_limit(event_file.with_suffix(".json")))["DaqAppSession"])
+    header, *lines = (line.split("\t") for line in read_within_limit(event_file).decode().splitlines())
     rows_read = (
         {name: "" if cell == MISSING else cell for name, cell in zip(header, line, strict=True)} for line in lines
     )
@@ -166,7 +166,7 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                 stem = f"{names.stem}{f'_recording-{part}' if several else ''}_physio"
                 if file is not None:
                     file.close()
-                file = io.TextIOWrapper(_Packed(folder / f"{stem}.tsv.gz"), encoding="utf-8", newline="")
+                file = io.TextIOWrapper(_ReproducibleGzip(folder / f"{stem}.tsv.gz"), encoding="utf-8", newline="")
                 write_json(
                     folder / f"{stem}.json",
                     {
@@ -179,11 +179,11 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                         "Manufacturer": recording.info.driver,
                         "ManufacturersModelName": recording.info.model,
                         "DeviceSerialNumber": recording.info.serial,
-                        **{column.heading: _described(column) for column in described},
+                        **{column.heading: _describe(column) for column in described},
                     },
                 )
                 last = None
-            write_rows(file, _filled(block, last, rows(block, calibration), len(described), mark), "\t")
+            write_rows(file, _rows_with_gaps(block, last, rows(block, calibration), len(described), mark), "\t")
             last = int(block.sequence[-1])
             written += len(block)
             progress(min(written / expected, 1.0))
@@ -210,10 +210,10 @@ def _stretches(recording: Recording) -> Iterator[tuple[ReadingBlock, bool]]:
         last, previous = float(block.time[-1]), int(block.sequence[-1])
 
 
-def _filled(
+def _rows_with_gaps(
     block: ReadingBlock, last: int | None, cells: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
 ) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows, with one of n/a for each that never arrived; what BIDS knows not (NaN, infinity) is n/a too."""
+    """Yield the rows, and a row of n/a for each reading that never arrived; NaN and infinity are written as n/a too."""
     finite = bool(np.isfinite(block.raw).all())
     expected = None if last is None else last + 1
     for row in cells:
@@ -224,8 +224,8 @@ def _filled(
         expected = row[0] + 1
 
 
-class _Packed(gzip.GzipFile):
-    """A gzip file that tells neither its name nor when it was written: the same session gives the same bytes."""
+class _ReproducibleGzip(gzip.GzipFile):
+    """A gzip file that holds neither its name nor a time, so that the same session gives the same bytes."""
 
     def __init__(self, path: Path) -> None:
         self._raw = path.open("wb")
@@ -237,12 +237,12 @@ class _Packed(gzip.GzipFile):
 
 
 def _sidecar(part: Path) -> dict[str, Any]:
-    return json_object(read_limited(part.parent / part.name.replace(".tsv.gz", ".json")))
+    return json_object(read_within_limit(part.parent / part.name.replace(".tsv.gz", ".json")))
 
 
 def _blocks(parts: Iterable[Path]) -> Iterator[ReadingBlock]:
     for part in parts:
-        yield from read_rows(packed_lines(part), _sidecar(part)["Columns"], "\t")
+        yield from read_rows(gzip_lines(part), _sidecar(part)["Columns"], "\t")
 
 
 # ---- files
@@ -258,12 +258,12 @@ def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[s
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
             cells = (MISSING if cell is None or cell == "" else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
             file.write("\t".join(cells) + "\n")
-    described = {column.heading: _described(column) for column in columns_written if column.heading not in _KNOWN}
+    described = {column.heading: _describe(column) for column in columns_written if column.heading not in _KNOWN}
     sidecar = {**recording.mark, "Description": table.meaning, **(more or {}), **described}
     write_json(stem.with_name(f"{stem.name}.json"), sidecar)
 
 
-def _described(column: Column) -> dict[str, str]:
+def _describe(column: Column) -> dict[str, str]:
     return {"Description": column.meaning, **({"Units": column.unit} if column.unit else {})}
 
 

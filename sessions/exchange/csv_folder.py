@@ -10,7 +10,7 @@ from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import columns, plain, read_rows, rows, write_rows
 from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
-from sessions.file_access import json_object, read_limited, write_json
+from sessions.file_access import json_object, read_within_limit, write_json
 from sessions.recording import Recording
 from sessions.recording.manifest import description
 from sessions.recording.schema import DESCRIPTION_FILE, SEALED_FILE
@@ -48,7 +48,7 @@ def find(path: Path) -> Path | None:
 
 def read(path: Path) -> ExportedSession:
     """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
-    head = head_of(json_object(read_limited(path / DESCRIPTION_FILE)))
+    head = head_of(json_object(read_within_limit(path / DESCRIPTION_FILE)))
     events = tuple(logged_event(row, "kind") for row in _rows_of(path / EVENTS))
     return ExportedSession("csv", path, head, events, lambda: _read_readings(path / READINGS), side_files(path))
 
@@ -85,7 +85,7 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
 
 
 def _rows_of(path: Path) -> list[dict[str, str]]:
-    lines = read_limited(path).decode().splitlines(keepends=True)
+    lines = read_within_limit(path).decode().splitlines(keepends=True)
     return [{name: plain(text) for name, text in row.items()} for row in csv.DictReader(lines)]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from sessions.exchange.session_tables import AXES, Column
-from sessions.file_access import LARGEST_TABLE, read_limited, remedy
+from sessions.file_access import LARGEST_TABLE, read_within_limit, remedy
 from sessions.prediction.press_curves import DisplacementLog
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -68,7 +68,7 @@ class ImportRefused(Exception):
 def content_of(path: Path) -> bytes:
     """Return what a CSV file holds. Raises ImportRefused where it cannot be read."""
     try:
-        return read_limited(path, LARGEST_TABLE)
+        return read_within_limit(path, LARGEST_TABLE)
     except OSError as error:
         raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
 

@@ -14,7 +14,7 @@ from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS
 from sessions.exchange.csv_text import ImportRefused
-from sessions.file_access import converted, holds_something, remedy, whole_folder, write_whole
+from sessions.file_access import as_type, holds_something, remedy, whole_folder, write_whole
 from sessions.plan.plan import SessionPlan
 from sessions.recording.derived import GAIN_ERROR, bytes_of
 from sessions.recording.head import info_from_dict, software_versions
@@ -78,7 +78,7 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
     after. Raises RecordingError where the folder cannot be written, ValueError where the export is damaged.
     """
     head = exported.head
-    plan = converted(head.plan, SessionPlan)
+    plan = as_type(head.plan, SessionPlan)
     info = info_from_dict(head.transducer) if head.transducer else None
     earlier = cast("list[Any]", head.provenance.get("restored_from", []))
     source = {
@@ -133,15 +133,15 @@ _DAMAGED = (
 
 
 @dataclass(frozen=True, slots=True)
-class Restored:
-    """What came back."""
+class RestoreResult:
+    """How much of a session came back from an export, and what differs."""
 
     readings: int
     events: int
     differences: tuple[str, ...]  # what is not as it was recorded, a sentence each
 
 
-def exported(path: Path) -> ExportedSession | None:
+def read_export(path: Path) -> ExportedSession | None:
     """Return the session in an export of ours; None for anything else, such as a CSV file. Raises ImportRefused."""
     if (path / LIVE_FILE).exists():
         raise ImportRefused(f"{path} is a session folder already: every verb takes it as it is")
@@ -158,7 +158,7 @@ def exported(path: Path) -> ExportedSession | None:
     return None
 
 
-def import_session(source: ExportedSession, folder: Path) -> Restored:
+def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
     """Make a session folder of an export; nothing is left behind where it is damaged.
 
     Raises ImportRefused for a damaged export, RecordingError for a folder that cannot be written.
@@ -171,7 +171,7 @@ def import_session(source: ExportedSession, folder: Path) -> Restored:
     except _DAMAGED as error:
         raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error
     restored = Recording.open(folder)
-    return Restored(sum(len(block) for block in restored.blocks()), len(restored.events), differences)
+    return RestoreResult(sum(len(block) for block in restored.blocks()), len(restored.events), differences)
 
 
 def _remedy(error: Exception) -> str:

@@ -72,7 +72,7 @@ def columns(
     `header` is its first row, None where that holds numbers already. `axes` names the columns from the first on ("-"
     for one that is neither), and `units` those of forces and torques, as stated. Raises ColumnsUnknown.
     """
-    places = dict(_stated(axes, width)) if axes is not None else dict(_headed(header))
+    places = dict(_axes_from_option(axes, width)) if axes is not None else dict(_axes_from_header(header))
     missing = [axis for axis in AXES if axis not in places]
     if missing:
         raise ColumnsUnknown(
@@ -80,8 +80,8 @@ def columns(
             "with - for a column that is none of these"
         )
     headed = {axis: _unit(header[places[axis]]) for axis in places} if header is not None else {}
-    force = _agreed("forces", {headed.get(axis) for axis in AXES[:3]}, units[0] if units else None, FORCE_UNITS)
-    torque = _agreed("torques", {headed.get(axis) for axis in AXES[3:]}, units[1] if units else None, TORQUE_UNITS)
+    force = _common_unit("forces", {headed.get(axis) for axis in AXES[:3]}, units[0] if units else None, FORCE_UNITS)
+    torque = _common_unit("torques", {headed.get(axis) for axis in AXES[3:]}, units[1] if units else None, TORQUE_UNITS)
     time_unit = headed.get(TIME) or "s"
     if time_unit not in TIME_UNITS:
         raise ColumnsUnknown(
@@ -99,7 +99,7 @@ def columns(
     )
 
 
-def _headed(header: Sequence[str] | None) -> list[tuple[str, int]]:
+def _axes_from_header(header: Sequence[str] | None) -> list[tuple[str, int]]:
     """Return axis and position of every column whose heading names one."""
     places: list[tuple[str, int]] = []
     for position, heading in enumerate(header or ()):
@@ -114,7 +114,7 @@ def _headed(header: Sequence[str] | None) -> list[tuple[str, int]]:
     return places
 
 
-def _stated(axes: Sequence[str], width: int) -> list[tuple[str, int]]:
+def _axes_from_option(axes: Sequence[str], width: int) -> list[tuple[str, int]]:
     if len(axes) > width:
         raise ColumnsUnknown(f"--axes names {len(axes)} columns, but the file has {width}")
     places = [(name, position) for position, name in enumerate(axes) if name != SKIPPED]
@@ -133,7 +133,7 @@ def _unit(heading: str) -> str | None:
     return re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
 
 
-def _agreed(what: str, headed: set[str | None], stated: str | None, factors: Mapping[str, float]) -> str:
+def _common_unit(what: str, headed: set[str | None], stated: str | None, factors: Mapping[str, float]) -> str:
     """Return the one unit in which the forces, or the torques, are."""
     names = headed - {None}
     units = ", ".join(factors)
@@ -187,8 +187,8 @@ class ImportOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Imported:
-    """What an import made."""
+class ImportResult:
+    """The session that an import made, and what it had to assume."""
 
     folder: Path
     readings: int
@@ -197,7 +197,7 @@ class Imported:
     extra: tuple[str, ...]  # columns kept in the original file alone
 
 
-def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -> Imported:
+def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -> ImportResult:
     """Make a session folder of a CSV file; nothing is written before all of the file was understood.
 
     Raises ImportRefused for a file that cannot be taken, SettingsError for an option that is wrong or contradicts the
@@ -239,7 +239,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer.readings(block)
     writer.event("ended", data={"reason": "the file ends", "cause": "finished", "readings": len(block)})
     writer.close()
-    return Imported(folder, len(block), rate, _defaults(frame), layout.extra)
+    return ImportResult(folder, len(block), rate, _defaults(frame), layout.extra)
 
 
 def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, Array, list[int]]:

@@ -28,12 +28,12 @@ AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), (
 _LISTED: Mapping[str, Any] = tomllib.loads((Path(__file__).parent / "columns.toml").read_text("utf-8"))
 
 
-def _listed(name: str) -> Columns:
+def _columns_of(name: str) -> Columns:
     return {column: (unit, meaning) for column, (unit, meaning) in _LISTED[name].items()}
 
 
-def _predicted_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
-    """Return what one trial's prediction was made with, as cells of the columns behind `wall_s`."""
+def _prediction_cells(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
+    """Return options, scene and mesh of one trial's prediction, as cells of the columns behind `wall_s`."""
     options: Mapping[str, Any] = prediction.get("options") or {}
     area: Mapping[str, Any] = prediction.get("area") or {}
     table: Mapping[str, Any] | None = prediction.get("scene")
@@ -68,7 +68,7 @@ def _columns(record: type, name: str) -> dict[str, tuple[str, str]]:
 
 
 TRIAL = {
-    **_listed("trial"),
+    **_columns_of("trial"),
     "outcome": ("", OUTCOMES),
     **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in AXES},
 }
@@ -78,7 +78,7 @@ ALTERNATIVE = {
     "trial": ("", "number of the trial"), **_columns(Variant, "variant"), **_columns(Alternative, "alternative")
 }  # fmt: skip
 PREDICTION = _columns(TrialPrediction, "prediction")
-FLAW, DECISION, ANSWER, POSITION, RESPONSE = map(_listed, ("flaw", "decision", "answer", "position", "response"))
+FLAW, DECISION, ANSWER, POSITION, RESPONSE = map(_columns_of, ("flaw", "decision", "answer", "position", "response"))
 
 _NESTED = ("solver", "alternatives", "interval", "opposite_interval")
 _OF_INTERVALS = (
@@ -171,7 +171,7 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
             **_sed_interval("sed", row.get("interval")),
             **_sed_interval("opposite_sed", row.get("opposite_interval")),
             **_force_intervals(row.get("interval")),
-            **_predicted_with(prediction, row),
+            **_prediction_cells(prediction, row),
         }
         for row in prediction["trials"]
     ]

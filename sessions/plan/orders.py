@@ -25,13 +25,13 @@ DRAWS = 10_000  # of an order that is to meet constraints
 Item = int | str
 
 
-def shuffled(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
-    """Return the items in an order that chance, seeded with `seed` and `name`, put them in.
+def shuffle(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
+    """Return the items in a random order that `seed` and `name` fix.
 
     The rule: sort by the SHA-256 digest of the UTF-8 text "seed/name/item", each a decimal number or the name itself.
     Every order is equally likely over seeds. Items must differ.
 
-    >>> shuffled((0, 20, 50, 80, 100), 1, "stickiness")
+    >>> shuffle((0, 20, 50, 80, 100), 1, "stickiness")
     (80, 100, 20, 50, 0)
     """
     return tuple(sorted(items, key=lambda item: _digest(f"{seed}/{name}/{item}")))
@@ -42,11 +42,11 @@ def draw(
 ) -> tuple[Item, ...] | None:
     """Return the first order that `meets` a constraint; None where none of many draws does.
 
-    The rule: the order `shuffled` gives for `name`, or else for "name~1", "name~2", and so on. Every order that meets
+    The rule: the order `shuffle` gives for `name`, or else for "name~1", "name~2", and so on. Every order that meets
     the constraint is equally likely over seeds.
     """
     for draw in range(DRAWS):
-        order = shuffled(items, seed, f"{name}~{draw}" if draw else name)
+        order = shuffle(items, seed, f"{name}~{draw}" if draw else name)
         if meets(order):
             return order
     return None
@@ -70,18 +70,18 @@ def williams(count: int) -> tuple[tuple[int, ...], ...]:
 def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item], ...]:
     """Return every two of the items once, in an order by chance, each item first as often as second (or nearly).
 
-    The rule: items stand round a circle in the order `shuffled` gives for "name/first"; of two, the one from which the
+    The rule: items stand round a circle in the order `shuffle` gives for "name/first"; of two, the one from which the
     other is reached sooner clockwise is first (of two that face one another, the earlier one). Pairs come in the order
-    `shuffled` gives for `name` and the texts "first,second".
+    `shuffle` gives for `name` and the texts "first,second".
     """
-    circle = shuffled(items, seed, f"{name}/first")
+    circle = shuffle(items, seed, f"{name}/first")
     count = len(circle)
     orders = {
         f"{a},{b}": (a, b)
         for i, j in combinations(range(count), 2)
         for a, b in [(circle[i], circle[j]) if 2 * (j - i) <= count else (circle[j], circle[i])]
     }
-    return tuple(orders[str(key)] for key in shuffled(tuple(orders), seed, name))
+    return tuple(orders[str(key)] for key in shuffle(tuple(orders), seed, name))
 
 
 def pairs_with(
@@ -90,11 +90,11 @@ def pairs_with(
     """Return each item once with the standard, in an order by chance; over two repetitions it is first once.
 
     Repetitions count from 1. The rule: of two repetitions, 2 k - 1 and 2 k, the first has those items first that
-    `shuffled` puts into the first half for "name/first/k", and the second has the others first. Pairs come in the order
-    `shuffled` gives for `name` in repetition 1, and for "name#repetition" after it.
+    `shuffle` puts into the first half for "name/first/k", and the second has the others first. Pairs come in the order
+    `shuffle` gives for `name` in repetition 1, and for "name#repetition" after it.
     """
-    leading = shuffled(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
-    order = shuffled(items, seed, name if repetition == 1 else f"{name}#{repetition}")
+    leading = shuffle(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
+    order = shuffle(items, seed, name if repetition == 1 else f"{name}#{repetition}")
     return tuple((item, standard) if (item in leading) == (repetition % 2 == 1) else (standard, item) for item in order)
 
 
@@ -152,21 +152,21 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
         return plan
     stimulus = next_comparison(block.candidates, answers)
 
-    def chosen(trial: Trial) -> Trial:
+    def choose(trial: Trial) -> Trial:
         compared = trial.number in (number, number + 1) and not trial.standard
         return replace(trial, stimulus=stimulus) if compared else trial
 
-    return plan.with_trials(chosen)
+    return plan.with_trials(choose)
 
 
-def with_mounted(plan: SessionPlan, codes: Mapping[int, str]) -> SessionPlan:
+def with_mounted_stimuli(plan: SessionPlan, codes: Mapping[int, str]) -> SessionPlan:
     """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` go by trial number."""
     stimuli = {(block.name, one.code): one for block in plan.blocks for one in block.candidates}
 
-    def mounted(trial: Trial) -> Trial:
+    def mount(trial: Trial) -> Trial:
         return replace(trial, stimulus=stimuli.get((trial.block, codes.get(trial.number, "")), trial.stimulus))
 
-    return plan.with_trials(mounted) if stimuli else plan
+    return plan.with_trials(mount) if stimuli else plan
 
 
 @cache

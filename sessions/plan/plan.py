@@ -30,8 +30,8 @@ class Stimulus:
     code: str  # opaque label on its back, all that experimenter and subject are shown
 
     @property
-    def called(self) -> str:
-        """Return what people call it: its descriptor with its index, or with its code while that is sealed."""
+    def display_name(self) -> str:
+        """Return its name for people: its descriptor with its index, or with its code while the index is sealed."""
         return f"{self.descriptor} {self.code if self.index is None else self.index}"
 
     @property
@@ -105,8 +105,8 @@ class Rests:
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
-    """What is shown to whom, besides what each must know to act."""
+class Visibility:
+    """What the subject and the experimenter see, besides what each must know to act."""
 
     subject: tuple[SubjectSees, ...] = ("instruction",)
     experimenter: tuple[ExperimenterSees, ...] = ("trial count", "answer", "forces")
@@ -139,7 +139,7 @@ class SessionPlan:
     answering_hand: Hand | None = None
     finger: Finger = Finger()
     rests: Rests = Rests()
-    shown: Shown = Shown()
+    shown: Visibility = Visibility()
     masking: str = ""  # of sounds; empty: none
     language: str = "en"  # that the subject reads
     study: str | None = None  # name of the study the subject is enrolled in
@@ -152,7 +152,7 @@ class SessionPlan:
         """Say whether the plan hides which stimulus bears which code."""
         return any(trial.stimulus.index is None for trial in self.trials)
 
-    def strokes_allowed(self, trial: Trial) -> int:
+    def stroke_limit(self, trial: Trial) -> int:
         """Return how many strokes a trial may have; 1 where no block holds it."""
         return next((block.strokes_allowed for block in self.blocks if trial in block.trials), 1)
 

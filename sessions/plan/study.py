@@ -19,8 +19,15 @@ from typing import Annotated, Any
 
 import msgspec
 
-from sessions.file_access import DATABASE_FAILURES, bounded, json_object, name_failure, read_limited, write_whole
-from sessions.plan.orders import opaque_codes, shuffled
+from sessions.file_access import (
+    DATABASE_FAILURES,
+    json_object,
+    limit_values,
+    name_failure,
+    read_within_limit,
+    write_whole,
+)
+from sessions.plan.orders import opaque_codes, shuffle
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.plan.protocols import Body, Labels, Protocol, StudyPlace, design_rows, is_code
 from sessions.plan.protocols.planning import check_body
@@ -40,7 +47,7 @@ class Key:
         lines = [self.salt, *(f"{code} {of} {index}" for code, (of, index) in sorted(self.stimuli.items()))]
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
-    def sealed(self) -> str:
+    def seal(self) -> str:
         """Return the key as a text that reveals nothing to whoever opens its file by chance (Base64 of JSON)."""
         return base64.b64encode(json.dumps(self.to_dict()).encode()).decode()
 
@@ -50,8 +57,8 @@ class Key:
         return {stimulus: code for code, stimulus in self.stimuli.items()}
 
     @staticmethod
-    def opened(sealed: str) -> "Key":
-        """Return the key that `sealed` gave the text for. Raises ValueError where it is none."""
+    def unseal(sealed: str) -> "Key":
+        """Return the key that `seal` gave the text for. Raises ValueError where it is none."""
         return Key.from_dict(json.loads(base64.b64decode(sealed, validate=True)))
 
     def to_dict(self) -> dict[str, Any]:
@@ -155,7 +162,7 @@ class Study:
         if self.rows is None:
             return slot + 1
         cycles, within = divmod(slot, self.rows)
-        return int(shuffled(range(self.rows), self.seed, f"rows/{cycles}")[within]) + 1
+        return int(shuffle(range(self.rows), self.seed, f"rows/{cycles}")[within]) + 1
 
     def session_seed(self, slot: int) -> int:
         """Return the seed of what else chance decides for a slot: the same for all visits of a subject."""
@@ -225,7 +232,7 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool) 
             connection.execute(table)
         connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
         if key is not None:  # before the study counts as made: without its key it would be lost
-            document = {"what": "which stimulus bears which code; 'daq-app unblind' opens it", "sealed": key.sealed()}
+            document = {"what": "which stimulus bears which code; 'daq-app unblind' opens it", "sealed": key.seal()}
             write_whole(folder / KEY_FILE, json.dumps(document, indent=1).encode() + b"\n")
         _tell(connection, "created", "", {"protocol": protocol.name, "blinded": blinded})
     return open_study(folder)
@@ -252,7 +259,7 @@ def enrol(folder: Path, subject: str, body: Body) -> Member:
             raise StudyError(f"{subject} was enrolled in {study.name} before: every subject has a code of its own")
         return "enrolled", {"slot": free_slot(list(study.members.values())), "body": msgspec.to_builtins(body)}
 
-    return _changed(folder, subject, choose).members[subject]
+    return _add_event(folder, subject, choose).members[subject]
 
 
 def withdraw(folder: Path, subject: str, reason: str) -> Member:
@@ -263,12 +270,12 @@ def withdraw(folder: Path, subject: str, reason: str) -> Member:
     def choose(study: Study) -> tuple[str, Mapping[str, Any]]:
         return "withdrawn", {"slot": study.member(subject).slot, "reason": reason}
 
-    return _changed(folder, subject, choose).members[subject]
+    return _add_event(folder, subject, choose).members[subject]
 
 
 def note(folder: Path, kind: str, data: Mapping[str, Any]) -> Study:
     """Record that the labels were shown, or that a key was opened, and return the study."""
-    return _changed(folder, "", lambda _: (kind, data))
+    return _add_event(folder, "", lambda _: (kind, data))
 
 
 def study_key(folder: Path) -> Key | None:
@@ -278,9 +285,9 @@ def study_key(folder: Path) -> Key | None:
         return None
     path = folder / KEY_FILE
     with name_failure(StudyError, f"{path} cannot be read"):
-        content = read_limited(path)
+        content = read_within_limit(path)
     try:
-        key = Key.opened(json_object(content)["sealed"])
+        key = Key.unseal(json_object(content)["sealed"])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StudyError(f"{path} cannot be read ({error}); restore it from a copy") from error
     if key.sha256 != expected:
@@ -295,7 +302,7 @@ def _new_key(protocol: Protocol) -> Key:
     return Key(secrets.token_hex(16), dict(zip(codes, stimuli, strict=True)))
 
 
-def _changed(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
+def _add_event(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
     """Add the event that `choose` makes of the study as it stands, while nobody else can change it."""
     open_study(folder)  # says what is wrong where it is none
     with _changing(folder) as connection:
@@ -340,7 +347,7 @@ def _reading(folder: Path) -> Generator[sqlite3.Connection]:
     with name_failure(StudyError, f"{path} cannot be read", failures=DATABASE_FAILURES):
         path.open("rb").close()  # says why it cannot be read, which SQLite does not
         address = f"{path.resolve().as_uri()}?mode=ro"
-        with closing(bounded(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
+        with closing(limit_values(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
             yield connection
 
 
@@ -350,7 +357,7 @@ def _changing(folder: Path) -> Generator[sqlite3.Connection]:
     path = folder / STUDY_FILE
     with (
         name_failure(StudyError, f"{path} cannot be changed", ", and repeat", (sqlite3.Error,)),
-        closing(bounded(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None))) as connection,
+        closing(limit_values(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None))) as connection,
     ):
         connection.execute("PRAGMA synchronous=FULL")
         connection.execute("BEGIN IMMEDIATE")

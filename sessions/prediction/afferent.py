@@ -144,13 +144,13 @@ def session_firing(
     Where tissues relax, courses are known of the SED alone: another quantity makes no firing there.
     """
     chosen = settings or AfferentSettings()
-    sizes = [abs(value) for row in prediction.trials if (value := _settled(row, chosen.quantity)) is not None]
+    sizes = [abs(value) for row in prediction.trials if (value := _settled_response(row, chosen.quantity)) is not None]
     if not sizes:
         return None, ()
     reference = float(np.median(sizes))
     firings: list[Firing] = []
     for number, row in enumerate(prediction.trials):
-        value = _settled(row, chosen.quantity)
+        value = _settled_response(row, chosen.quantity)
         if row.history is None or value is None:
             continue
         course = np.abs(row.history.responses[:, NAMES.index(chosen.quantity)])
@@ -170,7 +170,7 @@ def session_firing(
     return reference, tuple(firings)
 
 
-def _settled(row: TrialPrediction, quantity: str) -> float | None:
+def _settled_response(row: TrialPrediction, quantity: str) -> float | None:
     """Return a quantity at the ending in the settled state; None where there is none."""
     if quantity == SED.name:
         return row.sed
@@ -187,7 +187,7 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
     """Return the firing in each trial as plain data, with what it is and every parameter."""
     reference, firings = session_firing(prediction, settings)
     return {
-        "about": ABOUT.format(label=_named(settings).label),
+        "about": ABOUT.format(label=_quantity_of(settings).label),
         "quantity": settings.quantity,
         "reference": reference,
         "reference_sed": reference if settings.quantity == SED.name else None,  # its name before; for one release
@@ -203,7 +203,7 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
     `reference` is kept with them where it is given, in the unit of the quantity.
     """
     rows: list[dict[str, Any]] = []
-    quantity, usual = _named(settings), usual_settings(settings.quantity)
+    quantity, usual = _quantity_of(settings), usual_settings(settings.quantity)
     if reference is not None:
         basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
         of_reference = {"name": "reference", "value": reference, "unit": quantity.unit}
@@ -240,5 +240,5 @@ def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = S
     return replace(usual_settings(quantity), seed=seed, **changes)
 
 
-def _named(settings: AfferentSettings) -> Quantity:
+def _quantity_of(settings: AfferentSettings) -> Quantity:
     return QUANTITIES[NAMES.index(settings.quantity)]

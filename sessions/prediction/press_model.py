@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from sessions.prediction.scenes import settled
+from sessions.prediction.scenes import settled_predictions
 from solver import Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
 from solver.progress import Progress, report_part
 from solver.response.nearby import stiffness_shares
@@ -105,7 +105,7 @@ def press_model(
     blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
     for at, finger in enumerate(blank.fingers(contrast)):
         report_part(progress, at / count)
-        presses = _pressed(finger, depth, 0.0)
+        presses = _solve_presses(finger, depth, 0.0)
         force[at] = np.log([one.normal_force for one in presses])
         shares = stiffness_shares(presses)[:, : len(LAYERS)]
         slope[at] = spread * CONTRASTS @ shares.T
@@ -120,7 +120,7 @@ def press_model(
         more = np.empty((len(sticking), DEPTHS))
         for at, finger in enumerate(blank.fingers(sticking)):
             report_part(progress, (len(contrast) + at) / count)
-            more[at] = np.log([one.normal_force for one in _pressed(finger, depth, mu)])
+            more[at] = np.log([one.normal_force for one in _solve_presses(finger, depth, mu)])
         more -= _basis(sticking, DEGREE)[0] @ coefficients
         basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
         friction = np.linalg.lstsq(basis, more, rcond=None)[0]
@@ -150,8 +150,8 @@ def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
     upto = np.flatnonzero(model.depth <= deepest)[-CHECKED:]
     depth = model.depth[upto]
     fitted = model.log_force(contrast[None])[0, upto] + mean
-    free = _pressed(finger, depth, 0.0)
-    sticking = _pressed(finger, depth, model.mu) if model.mu else free
+    free = _solve_presses(finger, depth, 0.0)
+    sticking = _solve_presses(finger, depth, model.mu) if model.mu else free
     deviation = np.abs(np.exp(fitted) / np.array([one.normal_force for one in sticking]) - 1.0)
     return Check(float(deviation.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
 
@@ -172,7 +172,7 @@ def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
     return value, value * slope / depth
 
 
-def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
+def _solve_presses(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
     """Return presses with friction; without it those of a slide, which are the same states."""
     slide: Slide = "none" if mu else "+x"
     loads = [Loading(float(one), slide) for one in depth]
@@ -180,7 +180,7 @@ def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
         scenes = [replace(finger, friction=Friction(mu), loading=one, solve=Solve(evidence="quick")) for one in loads]
     except SceneError as unfit:
         raise FitError(f"The presses do not fit this finger: {unfit}") from unfit
-    states = [one for one in settled(scenes) if one is not None]
+    states = [one for one in settled_predictions(scenes) if one is not None]
     if len(states) < len(scenes):
         raise FitError(
             f"The model has no press of {depth[-1]:.2f} mm on this finger: leave out presses that are so deep, or give "

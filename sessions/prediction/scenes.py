@@ -43,8 +43,8 @@ class _Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
-    """What the model gets of one case."""
+class ModelInput:
+    """The row and the scene of one trial or stroke, before it is solved."""
 
     row: TrialPrediction  # as far as it is known before solving
     scene: Scene | None  # None where there is nothing to solve
@@ -52,13 +52,13 @@ class Prepared:
 
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
     """Return the scene of each trial that `predict` would solve, by the trial's number."""
-    prepared = prepared_cases(analysis, plan, with_own_finger(options, plan))
+    prepared = model_inputs(analysis, plan, with_own_finger(options, plan))
     return {one.row.trial: one.scene for one in prepared if one.scene is not None and one.row.trial is not None}
 
 
-def prepared_cases(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> list[Prepared]:
-    """Return what the model gets of every planned trial, or of every stroke where there is no plan."""
-    return [_prepared(case, options) for case in _cases(analysis, plan)]
+def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> list[ModelInput]:
+    """Return the model's input for every planned trial, or for every stroke where there is no plan."""
+    return [_model_input(case, options) for case in _cases(analysis, plan)]
 
 
 def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
@@ -81,8 +81,8 @@ def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
             yield _Case(trial, block, friction, number, stroke)
 
 
-def _prepared(case: _Case, options: PredictionOptions) -> Prepared:
-    """Return what the model gets of one case, with the reason for every number that is missing."""
+def _model_input(case: _Case, options: PredictionOptions) -> ModelInput:
+    """Return the model's input for one case, with the reason for every number that is missing."""
     friction, stroke, trial = case.friction, case.stroke, case.trial
     direction = friction.direction if friction is not None else None
     if direction is None and trial is not None:
@@ -105,8 +105,8 @@ def _prepared(case: _Case, options: PredictionOptions) -> Prepared:
     why = _missing(row, stroke)
     if why is not None:
         names = ("sed", "normal_force", "tangential_force", "matching_depth", "opposite_sed")
-        return Prepared(replace(row, reasons=dict.fromkeys(names, why)), None)
-    return Prepared(row, _scene(row, options))
+        return ModelInput(replace(row, reasons=dict.fromkeys(names, why)), None)
+    return ModelInput(row, _scene(row, options))
 
 
 def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
@@ -131,7 +131,7 @@ def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
     assert row.indentation is not None
     assert row.direction is not None
     base = template(options)
-    surface = "" if row.stimulus is None else row.stimulus.called
+    surface = "" if row.stimulus is None else row.stimulus.display_name
     return replace(
         base,
         title=f"trial {row.trial}: {surface}" if surface else f"stroke {row.stroke}",
@@ -185,13 +185,13 @@ def part_of(progress: Progress | None, low: float, high: float) -> Progress | No
     return None if progress is None else lambda done: progress(low + (high - low) * done)
 
 
-def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
-    """Return what the solver finds of each scene, None where it finds no settled state. Raises Cancelled."""
-    return tuple(None if isinstance(one, str) else one for one in solved(scenes, progress))
+def settled_predictions(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
+    """Return the prediction of each scene, None where it has no settled state. Raises Cancelled."""
+    return tuple(None if isinstance(one, str) else one for one in predict_scenes(scenes, progress))
 
 
-def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | str, ...]:
-    """Return what the solver finds of each scene, or why it finds no settled state. Raises Cancelled."""
+def predict_scenes(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | str, ...]:
+    """Return the prediction of each scene, or why it has no settled state. Raises Cancelled."""
     answers = solve_many([quick(scene) for scene in scenes], progress)
     return tuple(str(one) if isinstance(one, SolveFailure) else one for one in answers)
 
@@ -219,7 +219,7 @@ def seds_at(
         )
         for mu, tau_max, depth, direction, speed in strokes
     ]
-    return tuple(None if one is None else one.sed_ending for one in settled(scenes))
+    return tuple(None if one is None else one.sed_ending for one in settled_predictions(scenes))
 
 
 def slides(predictions: Sequence[Prediction], progress: Progress | None = None) -> Iterator[Nearby | None]:
@@ -252,7 +252,7 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
     }
 
 
-def traction_reached(prediction: Prediction) -> float:
+def greatest_traction(prediction: Prediction) -> float:
     """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
     return float(abs(prediction.skin.traction).max())
 
@@ -290,7 +290,7 @@ def predict(
     options make no scene, Cancelled where `progress` says so.
     """
     chosen = with_own_finger(options or PredictionOptions(), plan)
-    prepared, width = prepared_cases(analysis, plan, chosen), template(chosen).finger.width
+    prepared, width = model_inputs(analysis, plan, chosen), template(chosen).finger.width
     rows = [one.row for one in prepared]
     report: Watch = watch or (lambda _number, _row, _way: None)
     for number, one in enumerate(prepared):
@@ -304,10 +304,10 @@ def predict(
     ways: dict[int, Way] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
 
-    def known(at: int) -> TrialPrediction:
-        return _filled(prepared[order[at]], answers[2 * at], answers[2 * at + 1], depths[at])
+    def fill_row(at: int) -> TrialPrediction:
+        return _fill_row(prepared[order[at]], answers[2 * at], answers[2 * at + 1], depths[at])
 
-    def seen(
+    def take_answer(
         number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
     ) -> None:
         answers[number] = answer
@@ -315,12 +315,12 @@ def predict(
         if not back:
             ways[at] = Way(scenes[at], finger, march)
         elif 2 * at in answers:
-            report(order[at], known(at), ways.get(at))
+            report(order[at], fill_row(at), ways.get(at))
 
     pairs = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
-    answers |= dict(enumerate(solve_many(pairs, progress, seen if watch else None)))
+    answers |= dict(enumerate(solve_many(pairs, progress, take_answer if watch else None)))
     for at, number in enumerate(order):
-        rows[number] = known(at)
+        rows[number] = fill_row(at)
         if not small:
             report(number, rows[number], None)
     return SessionPrediction(
@@ -343,10 +343,10 @@ def _depths(scenes: Sequence[Scene], forces: Sequence[float | None]) -> list[flo
     return [None if force is None else next(matched) for force in forces]
 
 
-def _filled(
-    prepared: Prepared, answer: Prediction | SolveFailure, back: Prediction | SolveFailure, depth: float | None
+def _fill_row(
+    prepared: ModelInput, answer: Prediction | SolveFailure, back: Prediction | SolveFailure, depth: float | None
 ) -> TrialPrediction:
-    """Return the row with what the solver found, or with the reason for what it did not."""
+    """Return the row with the solver's numbers, and with the reason for each one that is missing."""
     row, scene = prepared.row, prepared.scene
     assert scene is not None  # the caller solved it
     reasons: dict[str, str] = {}

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
-from sessions.file_access import complete, converted
+from sessions.file_access import as_type, complete
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.strokes.decisions import Decision
@@ -257,12 +257,12 @@ class _Solver(msgspec.Struct):
     dofs: int
 
 
-class _Solved(msgspec.Struct):
+class _SolvedTrial(msgspec.Struct):
     solver: _Solver | None
 
 
 class _SolvedTrials(msgspec.Struct):
-    trials: tuple[_Solved, ...]
+    trials: tuple[_SolvedTrial, ...]
 
 
 class _Document(msgspec.Struct):
@@ -296,7 +296,7 @@ def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
 def check_prediction(document: Mapping[str, Any]) -> None:
     """Raise ValueError where a document is no prediction that this program writes: where, and what is expected."""
     parts = complete(document, _Document)
-    converted(document, _SolvedTrials)
+    as_type(document, _SolvedTrials)
     from_table(parts.options, PredictionOptions, "options")
     from_table(parts.scene, Scene, "scene")
 

@@ -21,11 +21,11 @@ from sessions.prediction.scenes import (
     Progress,
     derivatives_by,
     doubt_of,
+    greatest_traction,
     part_of,
+    predict_scenes,
     scene_along,
     slides,
-    solved,
-    traction_reached,
     with_loads,
 )
 from sessions.prediction.stored import (
@@ -147,18 +147,18 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
         indentation=_ends(along("indentation", prediction.indentation)),
     )
 
-    def solved(which: Indices) -> Array:
+    def solve_draws(which: Indices) -> Array:
         scenes = [with_loads(prediction.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
         seds = slide.seds([prediction.scene, *scenes])[:, 0]
         return prediction.sed_ending + (seds[1:] - seds[0])
 
     tried = _extremes(carried, draws)
-    missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state
+    missed = np.abs(solve_draws(tried) - carried[tried])  # nan, and so no less, where one has no settled state
     if bool((missed <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
         return whole
     # Each stands for an equal share of all: the middle one, by what the derivatives carry.
     middles = ((np.arange(SAMPLES) + 0.5) / SAMPLES * len(carried)).astype(np.int64)
-    some = solved(np.argsort(carried, kind="stable")[middles])
+    some = solve_draws(np.argsort(carried, kind="stable")[middles])
     lost = int(np.isnan(some).sum())
     if lost:
         reason = f"{lost} of {SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
@@ -215,12 +215,12 @@ def with_alternatives(
     kinds, options = tuple(variants(prediction.options.variants)), prediction.options
     drawn = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None
 
-    def drawn_of(variant: Variant) -> Sequence[Drawn] | None:
+    def draws_for(variant: Variant) -> Sequence[Drawn] | None:
         return drawn if variant.kinematics == "small" or options.variant_intervals else None
 
     count = len(kinds)
     along = [
-        _along(prediction, variant, drawn_of(variant), part_of(progress, n / count, (n + 1) / count))
+        _along(prediction, variant, draws_for(variant), part_of(progress, n / count, (n + 1) / count))
         for n, variant in enumerate(kinds)
     ]
     trials = tuple(
@@ -254,8 +254,8 @@ def _along(
 ) -> tuple[Alternative, ...]:
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
-    known = _known(prediction, variant)
-    answers = known or _solved(prediction, variant, part_of(progress, 0.0, 0.8))
+    known = _answers_of_prediction(prediction, variant)
+    answers = known or _solve_variant(prediction, variant, part_of(progress, 0.0, 0.8))
     out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, answers, strict=True)]
     if drawn is not None:
         before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
@@ -272,8 +272,8 @@ def _along(
 _Answers = list[tuple[float | None, Prediction | str]]
 
 
-def _known(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
-    """Return what was predicted anyway: at the planned depth, slid either way."""
+def _answers_of_prediction(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
+    """Return the answers that the prediction holds already: at the planned depth, slid either way."""
     options = prediction.options
     if (variant.kinematics, variant.tau_reading) != (options.kinematics, options.tau_reading):
         return None
@@ -284,10 +284,10 @@ def _known(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
     return None
 
 
-def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Answers:
-    """Return the same of a variant that is solved now."""
+def _solve_variant(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Answers:
+    """Solve the scenes of a variant, and return their answers."""
     scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
-    answers = iter(solved([scene for scene in scenes if not isinstance(scene, str)], progress))
+    answers = iter(predict_scenes([scene for scene in scenes if not isinstance(scene, str)], progress))
     return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]
 
 
@@ -302,7 +302,7 @@ def _alternative(
         tau_max,
         answer.indentation,
         **settled_numbers(answer),
-        traction=traction_reached(answer),
+        traction=greatest_traction(answer),
         indentation_error=known_error(answer, answer.indentation_error),
         doubt=doubt_of(answer),
     )

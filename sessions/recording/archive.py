@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from sessions.file_access import json_value, put_in_place, read_limited, remedy, write_whole
+from sessions.file_access import json_value, put_in_place, read_within_limit, remedy, write_whole
 from sessions.recording.derived import ABSENT, unlike
 from sessions.recording.manifest import changed_files, description, head_of_manifest, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
@@ -29,7 +29,7 @@ def seal(folder: Path) -> None:
     recording = Recording.open(folder)
     new = folder / f".{SEALED_FILE}.part"
     try:
-        _clear_unfinished(folder)
+        _clear_unfinished_copies(folder)
         new.unlink(missing_ok=True)
         write_copy(recording, new)
         put_in_place(new, folder / SEALED_FILE)
@@ -64,17 +64,17 @@ def problems(folder: Path) -> tuple[str, ...]:
         *changed_files(recording),
         *recording.losses,
         *differences(recording),
-        *_otherwise_described(recording),
+        *_contradictions(recording),
     )
 
 
-def _otherwise_described(recording: Recording) -> Iterator[str]:
-    """Yield a sentence for each part of `session.json` that the live file tells otherwise."""
+def _contradictions(recording: Recording) -> Iterator[str]:
+    """Yield a sentence for each part of `session.json` that differs from the live file."""
     path = recording.folder / DESCRIPTION_FILE
     if not path.is_file():
         return  # the manifest tells
     try:
-        stored = json_value(read_limited(path))
+        stored = json_value(read_within_limit(path))
     except (OSError, ValueError) as error:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
@@ -84,8 +84,8 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
             yield f"{place.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"
 
 
-def _clear_unfinished(folder: Path) -> None:
-    """Remove what an earlier sealing left that did not come to its end: copies, made anew from the live file."""
+def _clear_unfinished_copies(folder: Path) -> None:
+    """Remove the copies that an interrupted sealing left; they are made anew from the live file."""
     for name in (SEALED_FILE, DESCRIPTION_FILE):
         if (folder / name).exists():
             (folder / name).chmod(0o644)  # some systems remove no read-only file

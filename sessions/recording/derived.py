@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from sessions.file_access import json_object, json_text, name_failure, read_limited, write_whole
+from sessions.file_access import json_object, json_text, name_failure, read_within_limit, write_whole
 from sessions.plan.study import Key, StudyError
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
@@ -46,7 +46,7 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
 def bytes_of(path: Path) -> bytes:
     """Return the bytes of a file, none where there is no file. Raises RecordingError where it cannot be read."""
     with name_failure(RecordingError, f"{path} cannot be read"):
-        return read_limited(path) if path.is_file() else b""
+        return read_within_limit(path) if path.is_file() else b""
 
 
 def _store(folder: Path, name: str, content: bytes) -> Path:
@@ -71,7 +71,7 @@ def gain_error_set(folder: Path) -> float | None:
     """
     try:
         stored = load_derived(folder, GAIN_ERROR)
-        return None if stored is None else checked_gain_error(stored.get("gain_error"))
+        return None if stored is None else parse_gain_error(stored.get("gain_error"))
     except (RecordingError, SettingsError) as damaged:
         raise RecordingError(
             f"{folder / GAIN_ERROR} is damaged, and what was set for the session is not known: set it anew with "
@@ -84,7 +84,7 @@ def set_gain_error(folder: Path, gain_error: float) -> None:
     store_derived(folder, GAIN_ERROR, {"gain_error": gain_error})
 
 
-def checked_gain_error(stored: object) -> float | None:
+def parse_gain_error(stored: object) -> float | None:
     """Return a stored gain error [-], None where none was set. Raises SettingsError where it is no such number."""
     if stored is None:
         return None
@@ -177,8 +177,8 @@ def first_sentences(sentences: Sequence[str]) -> tuple[str, ...]:
 UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
 
 
-def revealed(recording: Recording) -> Recording:
-    """Return a session with all that is known of its stimuli by now: a blinded one as it is, until its key was opened.
+def reveal(recording: Recording) -> Recording:
+    """Return a session with the indices of its stimuli once its key has been opened; until then as it is.
 
     Raises RecordingError where the opened key is not the one that was sealed.
     """
@@ -201,7 +201,7 @@ def revealed(recording: Recording) -> Recording:
 def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:
     """Return the sessions in a study's folder, by name, those of one subject where a code is given."""
     paths = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
-    recordings = (revealed(Recording.open(path)) for path in paths)
+    recordings = (reveal(Recording.open(path)) for path in paths)
     return tuple(recording for recording in recordings if subject in (None, recording.plan.subject))
 
 

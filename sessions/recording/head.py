@@ -20,7 +20,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.transducer import StatusBit, StatusTable, TransducerInfo, bit
-from sessions.file_access import converted, json_object, read_limited, write_whole
+from sessions.file_access import as_type, json_object, read_within_limit, write_whole
 from sessions.plan.plan import Origin
 from sessions.recording.log import SixNumbers, Whole
 
@@ -132,7 +132,7 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
     for place in places:
         path = place / CERTIFICATE_FILE
         try:
-            certificate = json_object(read_limited(path))
+            certificate = json_object(read_within_limit(path))
             if certificate["format"] != FORMAT or path.stat().st_dev != disk:
                 continue
             return {**certificate, "same_program": certificate["software"] == software_versions()}
@@ -242,7 +242,7 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
 
     Raises ValueError for another shape, and when the matrix is not the one its hash was taken of.
     """
-    info = converted(data, _Info)
+    info = as_type(data, _Info)
     stored = info.calibration
     if len(stored.tool) not in (0, 6):
         raise ValueError("the tool transform is no list of six numbers")

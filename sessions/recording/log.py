@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 
 from drivers.transducer import COUNTS, Health
-from sessions.file_access import converted, json_object
+from sessions.file_access import as_type, json_object
 from sessions.plan.plan import Answer, Choice, SessionPlan, Trial
 
 Outcome = Literal["scored", "numbered", "chosen", "presented", "not answered", "skipped", "open"]
@@ -90,10 +90,10 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
             case "scored" | "number_given" | "chosen" if event.kind == _ANSWERED.get(trial.answer):
                 answers[in_hand] = event.data[ANSWERS[event.kind]]
             case "take_kept" if number in takes:
-                takes[number] = _ended(takes[number], event, None)
+                takes[number] = _end_take(takes[number], event, None)
                 outcome, kept = _outcome(trial, answers.get(number)), number
             case "take_discarded" if number in takes:
-                takes[number] = _ended(takes[number], event, event.data["reason"])
+                takes[number] = _end_take(takes[number], event, event.data["reason"])
                 outcome, kept = ("skipped" if outcome == "skipped" else "open"), None
             case "take_restored" if number in takes:
                 in_hand = number
@@ -121,8 +121,8 @@ _ANSWERED: Mapping[Answer, str] = {"line": "scored", "number": "number_given", "
 _OUTCOMES: Mapping[Answer, Outcome] = {"line": "scored", "number": "numbered", "choice": "chosen", "none": "presented"}
 
 
-def _ended(take: Take, event: LoggedEvent, discarded: str | None) -> Take:
-    """Return a take at its end; one that ended before, and was restored or discarded since, ends where it did."""
+def _end_take(take: Take, event: LoggedEvent, discarded: str | None) -> Take:
+    """Return a take with its end; one that had ended before it was restored or discarded keeps that end."""
     return replace(take, stop_ns=event.time_ns if take.stop_ns is None else take.stop_ns, discarded=discarded)
 
 
@@ -161,7 +161,7 @@ SHAPES = {kind: msgspec.defstruct("Event", fields) for kind, fields in _FIELDS.i
 def event_data(kind: str, text: str) -> dict[str, Any]:
     """Return the data of an event from its JSON text. Raises ValueError where it is none of that kind."""
     data = json_object(text)
-    converted(data, SHAPES.get(kind, dict[str, Any]))
+    as_type(data, SHAPES.get(kind, dict[str, Any]))
     return data
 
 

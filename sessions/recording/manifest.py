@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from drivers.readings import ReadingBlock
-from sessions.file_access import converted, json_object, name_failure, read_limited, write_whole
+from sessions.file_access import as_type, json_object, name_failure, read_within_limit, write_whole
 from sessions.recording.head import json_text
 from sessions.recording.log import LoggedEvent, TrialRecord
 from sessions.recording.reader import Recording
@@ -141,7 +141,7 @@ def changed_files(recording: Recording) -> tuple[str, ...]:
     return tuple(problems)
 
 
-class _Listed(msgspec.Struct):
+class _ListedFile(msgspec.Struct):
     sha256: str
     bytes: int
 
@@ -150,10 +150,10 @@ def _manifest(folder: Path) -> dict[str, Any]:
     """Return what the manifest holds. Raises RecordingError when it cannot be read."""
     path = folder / MANIFEST_FILE
     with name_failure(RecordingError, f"{path} cannot be read"):
-        content = read_limited(path)
+        content = read_within_limit(path)
     try:
         document = json_object(content)
-        converted(document["files"], dict[str, _Listed])
+        as_type(document["files"], dict[str, _ListedFile])
     except (ValueError, KeyError) as error:
         raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
     return document

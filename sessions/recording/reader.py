@@ -15,8 +15,8 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo, flagged_words
-from sessions.file_access import DATABASE_FAILURES, bounded, converted, json_value, name_failure
-from sessions.plan.orders import with_mounted
+from sessions.file_access import DATABASE_FAILURES, as_type, json_value, limit_values, name_failure
+from sessions.plan.orders import with_mounted_stimuli
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
 from sessions.recording.head import Provenance, info_from_dict
@@ -66,16 +66,16 @@ class Recording:
         losses: list[str] = []
         with name_failure(RecordingError, f"{path} cannot be read", failures=DATABASE_FAILURES):
             losses += torn_log(path)
-            with _connected(path) as connection:
+            with _connect(path) as connection:
                 head = _head(path, connection)
                 events = _events(connection, losses)
         losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
-            plan = with_mounted(converted(head["plan"], SessionPlan), _mounted(events))
+            plan = with_mounted_stimuli(as_type(head["plan"], SessionPlan), _mounted_codes(events))
             info = info_from_dict(head["transducer"]) if head["transducer"] else None
-            converted(head["provenance"], Provenance)
+            as_type(head["provenance"], Provenance)
         except (ValueError, KeyError, TypeError) as error:
             raise RecordingError(f"{path}: its head is damaged ({error}); restore it from a copy") from error
         simulated = None if head["simulated"] == "no" else head["simulated"]
@@ -121,7 +121,7 @@ class Recording:
         rates = [event.data["rate_words"] for event in losses if "rate_words" in event.data]
         trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(rates)]
         for record in self.trials:
-            allowed = self.plan.strokes_allowed(record.trial)
+            allowed = self.plan.stroke_limit(record.trial)
             if record.take and record.take.strokes > allowed:
                 allowed_words = "one was" if allowed == 1 else f"{allowed} were"
                 trouble.append(
@@ -149,7 +149,7 @@ class Recording:
         """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
         path = self.folder / schema.LIVE_FILE
         bytes_held = sum(side.stat().st_size for side in (path, _side_file(path, "-wal")) if side.is_file())
-        most = min(bytes_held // schema.BYTES_A_READING, self._stored())
+        most = min(bytes_held // schema.BYTES_A_READING, self._row_capacity())
         room = {name: np.empty((most, 6) if name == "raw" else most, kind) for name, kind in schema.COLUMNS.items()}
         count = 0
         for block in self.blocks():
@@ -161,10 +161,10 @@ class Recording:
         columns: Any = {name: column[:count] for name, column in room.items()}
         return ReadingBlock(**columns)
 
-    def _stored(self) -> int:
+    def _row_capacity(self) -> int:
         """Return how many readings the rows have room for, without reading them; a damaged row may claim too much."""
         try:
-            with _connected(self.folder / schema.LIVE_FILE) as connection:
+            with _connect(self.folder / schema.LIVE_FILE) as connection:
                 (size,) = connection.execute("SELECT coalesce(sum(length(sequence)), 0) FROM blocks").fetchone()
         except DATABASE_FAILURES:
             return sum(len(block) for block in self.blocks())
@@ -186,7 +186,7 @@ class Recording:
         """Return the last block of readings (an empty one where there is none). Raises RecordingError when damaged."""
         path = self.folder / schema.LIVE_FILE
         try:
-            with _connected(path) as connection:
+            with _connect(path) as connection:
                 (last,) = connection.execute("SELECT max(number) FROM blocks").fetchone()
                 return ReadingBlock.empty() if last is None else _block(connection, last)
         except (ValueError, TypeError, OSError, sqlite3.DatabaseError) as error:
@@ -202,7 +202,7 @@ class Recording:
         damaged: list[str] = [] if losses is None else losses
         path = self.folder / schema.LIVE_FILE
         try:
-            with _connected(path) as connection:
+            with _connect(path) as connection:
                 yield from _blocks(connection, damaged, between)
         except DATABASE_FAILURES as error:
             damaged.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
@@ -274,7 +274,7 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     return head
 
 
-def _mounted(events: Sequence[LoggedEvent]) -> Mapping[int, str]:
+def _mounted_codes(events: Sequence[LoggedEvent]) -> Mapping[int, str]:
     """Return the code of the stimulus that was mounted last in each trial."""
     kind = "stimulus_mounted"
     return {event.trial: event.data["code"] for event in events if event.kind == kind and event.trial is not None}
@@ -298,24 +298,24 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
 
 def _event(number: int, row: Sequence[object]) -> LoggedEvent:
     """Return an event from its row. Raises ValueError where it is damaged or oddly shaped."""
-    time_ns, kind, trial, readings, text, crc = converted(row, tuple[int, str, int | None, int, str, int])
+    time_ns, kind, trial, readings, text, crc = as_type(row, tuple[int, str, int | None, int, str, int])
     if schema.event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
         raise ValueError("CRC-32 differs")
     return LoggedEvent(number, time_ns, kind, trial, readings, event_data(kind, text))
 
 
 @contextmanager
-def _connected(path: Path) -> Generator[sqlite3.Connection]:
+def _connect(path: Path) -> Generator[sqlite3.Connection]:
     """Open the file for reading, in place where SQLite can do so without writing to it, else as a copy."""
     sides = (_side_file(path, "-wal"), _side_file(path, "-journal"))
     left_over = [side for side in sides if side.is_file() and side.stat().st_size]
     address = f"{path.resolve().as_uri()}?mode=ro"
     path.open("rb").close()  # says why it cannot be read, which SQLite does not
     if not left_over:
-        with closing(bounded(sqlite3.connect(address + "&immutable=1", uri=True))) as connection:
+        with closing(limit_values(sqlite3.connect(address + "&immutable=1", uri=True))) as connection:
             yield connection
         return
-    with closing(bounded(sqlite3.connect(address, uri=True))) as connection:
+    with closing(limit_values(sqlite3.connect(address, uri=True))) as connection:
         if _answers(connection):
             yield connection
             return
@@ -325,7 +325,7 @@ def _connected(path: Path) -> Generator[sqlite3.Connection]:
             raise OSError(errno.ENOSPC, f"the copy that is read has no room in {room}")
         for file in files:
             shutil.copy(file, room)
-        with closing(bounded(sqlite3.connect(Path(room) / path.name))) as connection:
+        with closing(limit_values(sqlite3.connect(Path(room) / path.name))) as connection:
             yield connection
 
 

@@ -129,8 +129,8 @@ def identities(path: Path) -> tuple[Identity, ...]:
     return tuple(_identity(path.with_name(path.name + side)) for side in SIDES)
 
 
-def rescued(source: sqlite3.Connection, path: Path) -> Path:
-    """Write all that an open live file holds into a new folder, and return the path of the file there.
+def rescue(source: sqlite3.Connection, path: Path) -> Path:
+    """Copy an open live file, whose name may be gone, into a new folder, and return the path of the copy.
 
     SQLite reads by the files it holds open, so that names which are gone or name other files do not matter. The folder
     is made beside that of `path`, in the user's home or in the system's temporary folder, the first that takes it.

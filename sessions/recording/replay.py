@@ -30,7 +30,7 @@ class RecordedReadings:
         """Hand the same over as one."""
         return ReadingBlock.joined(list(self.blocks_up_to(position)))
 
-    def received_by(self, instant_ns: int) -> ReadingBlock:
+    def take_until(self, instant_ns: int) -> ReadingBlock:
         """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""
         taken: list[ReadingBlock] = []
         while self._look():
@@ -105,14 +105,14 @@ class ReplayTransducer:
         if shift is None:
             return ReadingBlock.empty()
         if self._stopped_ns is not None:
-            return self._shifted(self._readings.received_by(self._stopped_ns), shift)
+            return self._shift(self._readings.take_until(self._stopped_ns), shift)
         next_ns = self._readings.next_received_ns()
         if next_ns is None:
             raise LinkLost(f"the recording {self._name} ends here")
         wait = (next_ns + shift - self._clock.now_ns()) * 1e-9
         if wait > 0.0:
             self._clock.sleep(min(wait, timeout))
-        return self._shifted(self._readings.received_by(self._clock.now_ns() - shift), shift)
+        return self._shift(self._readings.take_until(self._clock.now_ns() - shift), shift)
 
     def stop(self) -> None:
         """Speak no further than to this instant."""
@@ -124,7 +124,7 @@ class ReplayTransducer:
         self.stop()
         self._blocks.close()
 
-    def _shifted(self, block: ReadingBlock, shift_ns: int) -> ReadingBlock:
+    def _shift(self, block: ReadingBlock, shift_ns: int) -> ReadingBlock:
         if not len(block):
             return block
         block = replace(block, received_ns=block.received_ns + shift_ns)

@@ -134,7 +134,7 @@ class Mount(NamedTuple):
 def unsafe(folder: Path) -> str | None:
     """Return a sentence why a session must not be recorded in `folder`, which need not be there yet; None: it may."""
     place = folder.resolve()
-    return _on_a_network(place) or _synchronised(place, os.environ)
+    return _on_a_network(place) or _sync_warning(place, os.environ)
 
 
 def file_system(folder: Path) -> str | None:
@@ -212,13 +212,13 @@ def _windows_network(place: Path) -> bool:
     return windows is not None and windows.kernel32.GetDriveTypeW(f"{place.drive}\\") == 4
 
 
-def _synchronised(place: Path, environment: Mapping[str, str]) -> str | None:
-    program = sync_folder_above(place) or _marked(place) or _sync_service(place, environment)
+def _sync_warning(place: Path, environment: Mapping[str, str]) -> str | None:
+    program = sync_folder_above(place) or _program_by_mark(place) or _sync_service(place, environment)
     return None if program is None else f"{place} is kept in step with a cloud by {program}; {MOVE}"
 
 
-def _marked(place: Path) -> str | None:
-    """Return the program that left its mark in a folder above `place`."""
+def _program_by_mark(place: Path) -> str | None:
+    """Return the synchronising program whose marker file lies in `place` or above it; None where there is none."""
     for folder in (place, *place.parents):
         try:
             names = {entry.name for entry in folder.iterdir()} if folder != folder.parent else set[str]()

@@ -19,7 +19,7 @@ from sessions.recording.head import info_to_dict, json_text, simulated_sentence,
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
-from sessions.recording.recovery import fold_log, identities, rescued
+from sessions.recording.recovery import fold_log, identities, rescue
 from sessions.recording.schema import RecordingError
 from sessions.recording.storage import release_reserve, take_reserve
 
@@ -268,7 +268,7 @@ class SessionWriter:
     def _rescue(self) -> None:
         """Go on in a new folder that holds all that the open file does. Raises RecordingError where none can be."""
         lost, self._failure = self._path, "it was removed, renamed or replaced"
-        self._path = rescued(self._connection, lost)
+        self._path = rescue(self._connection, lost)
         self._connection.close()
         self._has_reserve = False
         self._connection = sqlite3.connect(self._path, isolation_level=None)

@@ -25,7 +25,7 @@ from sessions.prediction import (
     SessionPrediction,
     part_of,
 )
-from sessions.prediction.scenes import scenes_of, settled, slides
+from sessions.prediction.scenes import scenes_of, settled_predictions, slides
 from sessions.recording import Recording
 from sessions.statistics.correlations import pearson
 from sessions.statistics.scores import by_key, surface_means
@@ -173,13 +173,13 @@ def _solved(
     first = {kind: group[0] for kind, group in alike.items()}
     solved = {kind: one for one in known if (kind := _kind(one.scene)) in first}
     new = [kind for kind in first if kind not in solved]
-    answers = settled([first[kind] for kind in new], part_of(progress, 0.0, 0.5))
+    answers = settled_predictions([first[kind] for kind in new], part_of(progress, 0.0, 0.5))
     solved |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
     pairs: dict[Scene, Pair | None] = {}
     for kind, slide in zip(solved, slides(list(solved.values()), part_of(progress, 0.5, 0.7)), strict=True):
         pairs |= _near(slide, alike[kind], quantity)
     rest = [scene for scene in scenes if scene not in pairs]
-    answers = [answer for answer in settled(rest, part_of(progress, 0.7, 0.9)) if answer is not None]
+    answers = [answer for answer in settled_predictions(rest, part_of(progress, 0.7, 0.9)) if answer is not None]
     for answer, slide in zip(answers, slides(answers, part_of(progress, 0.9, 1.0)), strict=True):
         pairs |= _near(slide, [answer.scene], quantity)
     return pairs

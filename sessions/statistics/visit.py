@@ -14,7 +14,7 @@ from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.stored import model_facts
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
-from sessions.recording.derived import gain_error_set, revealed
+from sessions.recording.derived import gain_error_set, reveal
 from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import file_sha256
 from sessions.recording.schema import LIVE_FILE
@@ -168,7 +168,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
-    known = revealed(recording)
+    known = reveal(recording)
     gain_error = gain_error_set(known.folder) if options.gain_error is None else options.gain_error
     analysis = analyse(known, AnalysisSettings(area=options.area, gain_error=gain_error))
     prediction = None

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 import msgspec
 from msgspec import Meta
 
-from sessions.file_access import converted, json_object, remedy
+from sessions.file_access import as_type, json_object, remedy
 from sessions.recording.derived import bytes_of
 from sessions.recording.head import json_text
 from sessions.recording.schema import RecordingError
@@ -286,7 +286,7 @@ def _decision(line: bytes) -> Decision | str | None:
         if zlib.crc32(json_text(document).encode()) != crc:
             return "its CRC-32 is not that of its text, which was changed or damaged"
         document.pop("SIMULATED", None)
-        decision = converted(document, Decision)
+        decision = as_type(document, Decision)
     except (ValueError, KeyError):
         return "it holds no decision"
     known = document.keys() <= asdict(decision).keys()

@@ -234,7 +234,7 @@ def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: Tri
     """Yield a flaw where there is no stroke, or more than the trial asks for."""
     if not strokes:
         yield Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused")
-    if trial is None or len(strokes) <= (allowed := context.plan.strokes_allowed(trial)):
+    if trial is None or len(strokes) <= (allowed := context.plan.stroke_limit(trial)):
         return
     task = "one" if allowed == 1 else f"up to {allowed}"
     model = next((stroke.number for stroke in strokes_for_model(strokes, trial, context.decisions)), None)

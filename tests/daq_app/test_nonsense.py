@@ -16,7 +16,7 @@ from sessions.exchange import ExportSource
 from sessions.exchange.session_tables import tables
 from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
-from sessions.recording.derived import revealed
+from sessions.recording.derived import reveal
 from sessions.statistics.findings import checked_planted, planted_effects, planted_flaws, planted_friction
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
@@ -74,7 +74,7 @@ def test_a_stored_document_with_nonsense_is_named_with_its_verb_or_makes_every_t
         assert VERB[name] in told
         return
     source = {ANALYSIS: documents[ANALYSIS], PREDICTION: documents[PREDICTION], name: found}
-    for table in tables(ExportSource(revealed(Recording.open(session)), source[ANALYSIS], source[PREDICTION])):
+    for table in tables(ExportSource(reveal(Recording.open(session)), source[ANALYSIS], source[PREDICTION])):
         assert all(isinstance(cell, str | int | float | None) for column in table.columns for cell in column.values)
 
 

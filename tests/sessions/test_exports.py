@@ -21,7 +21,7 @@ from recordings import PLAN, plainly_read, with_a_long_answer
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS, ExportError, ExportSource, export
-from sessions.exchange.exported import exported, import_session, side_files
+from sessions.exchange.exported import import_session, read_export, side_files
 from sessions.exchange.import_csv import ImportRefused
 from sessions.exchange.session_tables import tables
 from sessions.recording import Recording, RecordingError
@@ -74,7 +74,7 @@ def test_no_file_of_a_real_session_says_that_it_was_simulated(exports, form):
 @pytest.mark.parametrize("name", MADE)
 def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, name):
     recorded = sources[name].recording
-    made = import_session(exported(exports[form, name]), tmp_path / "s")
+    made = import_session(read_export(exports[form, name]), tmp_path / "s")
     again = Recording.open(tmp_path / "s")
     for column in ("sequence", "counter", "status", "time", "received_ns", "raw"):
         assert getattr(again.readings(), column).tobytes() == getattr(recorded.readings(), column).tobytes()
@@ -100,7 +100,7 @@ def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, 
 
 @pytest.mark.parametrize("form", AGAIN)
 def test_what_was_lost_before_an_export_is_named_after_it_comes_back(exports, tmp_path, form):
-    made = import_session(exported(exports[form, "torn"]), tmp_path / "s")
+    made = import_session(read_export(exports[form, "torn"]), tmp_path / "s")
     assert made.differences == (
         "block 4 of the readings is damaged and left out (its bytes do not give the CRC-32 stored with them)",
     )
@@ -162,10 +162,10 @@ def test_a_number_changed_after_the_export_is_named_when_it_is_imported(exports,
         content[chunk.byte_offset + 100] ^= 1
         (folder / "session.h5").write_bytes(content)
         with pytest.raises(ImportRefused, match=r"session.h5 is damaged .*export the session anew"):
-            import_session(exported(folder), tmp_path / "s")
+            import_session(read_export(folder), tmp_path / "s")
         assert not (tmp_path / "s").exists()
         return
-    made = import_session(exported(folder), tmp_path / "s")
+    made = import_session(read_export(folder), tmp_path / "s")
     assert made.differences == (named,)
     assert named in Recording.open(tmp_path / "s").losses
 
@@ -178,7 +178,7 @@ def test_a_row_taken_out_of_an_export_is_named(exports, tmp_path, form):
     lines = text.splitlines(keepends=True)
     text = "".join(lines[:200] + lines[201:])
     path.write_bytes(text.encode() if form == "csv" else gzip.compress(text.encode()))
-    made = import_session(exported(folder), tmp_path / "s")
+    made = import_session(read_export(folder), tmp_path / "s")
     assert made.differences[0] == "since it was exported: there were 400 readings and there are 399"
 
 
@@ -190,14 +190,14 @@ def test_an_export_that_is_no_longer_whole_is_refused_and_leaves_nothing(exports
     in_a_row = content.index(b"\n", len(content) // 2) + 5  # a text cut between two numbers is a shorter text
     victims[0].write_bytes(content[:in_a_row])
     with pytest.raises(ImportRefused, match="export the session anew") as refusal:
-        import_session(exported(folder), tmp_path / "s")
+        import_session(read_export(folder), tmp_path / "s")
     assert "\n" not in str(refusal.value)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["export"]
 
 
 def test_a_session_folder_is_not_imported_over_again(sources):
     with pytest.raises(ImportRefused, match="is a session folder already"):
-        exported(sources["whole"].recording.folder)
+        read_export(sources["whole"].recording.folder)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -381,7 +381,7 @@ def test_without_pynwb_one_sentence_says_what_to_install(sources, tmp_path, monk
 def test_a_full_folder_for_an_import_is_refused(exports, tmp_path):
     (tmp_path / "mine").write_text("")
     with pytest.raises(RecordingError, match="not empty"):
-        import_session(exported(exports["csv", "whole"]), tmp_path)
+        import_session(read_export(exports["csv", "whole"]), tmp_path)
 
 
 def test_the_plan_of_these_tests_has_texts_beyond_ascii():

@@ -9,8 +9,8 @@ import pytest
 from recordings import PLAN, TRIAL, begun, ended, readings
 
 from sessions.exchange import FORMATS, ExportSource, export
-from sessions.exchange.exported import exported, import_session
-from sessions.file_access import packed_lines
+from sessions.exchange.exported import import_session, read_export
+from sessions.file_access import gzip_lines
 from sessions.recording import Recording
 
 BARE = {"made_by": {}, "strokes": [], "friction": [], "flaws": []}  # an analysis of nothing
@@ -30,7 +30,7 @@ def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back
         ("hdf5", ()),
         ("bids", ("since it was exported: raw of the readings is not what it was",)),
     ):
-        made = import_session(exported(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
+        made = import_session(read_export(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
         assert made.differences == named
 
 
@@ -43,7 +43,7 @@ def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinde
     source = ExportSource(recording, BARE, None)
     out = export(source, form, tmp_path / "out")
     if hasattr(importlib.import_module(FORMATS[form]), "read"):
-        import_session(exported(out), tmp_path / "again")
+        import_session(read_export(out), tmp_path / "again")
         assert Recording.open(tmp_path / "again").plan == plan
 
 
@@ -54,5 +54,5 @@ def test_a_packed_table_that_unpacks_without_end_is_refused(tmp_path, line):
         for _ in range(40):
             file.write(line)
     with pytest.raises(ValueError, match="unpacks to more than readings can"):
-        for _ in packed_lines(path):
+        for _ in gzip_lines(path):
             pass

@@ -8,7 +8,7 @@ import pytest
 from recordings import ended
 
 from daq_app.cli.main import run
-from sessions.file_access import read_limited, remedy, write_whole
+from sessions.file_access import read_within_limit, remedy, write_whole
 from sessions.recording import RecordingError, archive
 from sessions.recording.archive import seal
 from sessions.recording.derived import bytes_of, store_derived
@@ -75,13 +75,13 @@ def test_a_file_of_twenty_gigabytes_is_refused_in_one_sentence_before_it_is_read
     with pytest.raises(RecordingError, match="it holds more than 256 MB"):
         bytes_of(path)
     with pytest.raises(OSError, match="more than 1 MB"):
-        read_limited(path, 2**20)
+        read_within_limit(path, 2**20)
 
 
 def test_a_file_without_end_is_refused():
 
     with pytest.raises(OSError, match="more than 1 MB"):
-        read_limited(Path("/dev/zero"), 2**20)
+        read_within_limit(Path("/dev/zero"), 2**20)
 
 
 def test_a_latin_1_protocol_is_named_when_a_study_is_made_of_it(tmp_path, capsys):

@@ -10,7 +10,7 @@ import pytest
 from recordings import begun, change, ended, rows
 
 from daq_app.cli.main import run
-from sessions.exchange.exported import exported, import_session
+from sessions.exchange.exported import import_session, read_export
 from sessions.recording import Recording, RecordingError, writer
 from sessions.recording.archive import problems, seal
 from sessions.recording.manifest import digest_of
@@ -51,7 +51,7 @@ def test_a_sealed_session_of_every_version_gives_what_was_planted_in_it(tmp_path
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_copy_of_every_version_is_imported_as_the_session_it_was_made_of(tmp_path, version):
     folder = kept(version, "sealed", tmp_path)
-    made = import_session(exported(folder / "session.h5"), tmp_path / "again")
+    made = import_session(read_export(folder / "session.h5"), tmp_path / "again")
     assert made.differences == ()
     before, after = Recording.open(folder), Recording.open(tmp_path / "again")
     assert digest_of(after.blocks(), after.events) == digest_of(before.blocks(), before.events)

@@ -6,7 +6,7 @@ import pytest
 from report_session import record
 
 from sessions.prediction import BY_NAME, PredictionOptions, predict
-from sessions.prediction.scenes import scenes_of, settled
+from sessions.prediction.scenes import scenes_of, settled_predictions
 from sessions.recording import Recording
 from sessions.statistics.multiverse import (
     PATHS,
@@ -58,7 +58,7 @@ def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recordin
     scene = scenes_of(analysis, recording.plan, STEADY)[trial]
     mu = scene.friction.mu
     areas = {"planned": 1.0, "half": 0.5, "twice": 2.0}
-    alone = settled([replace(scene, friction=replace(scene.friction, tau_max=scene.friction.tau_max / a))
+    alone = settled_predictions([replace(scene, friction=replace(scene.friction, tau_max=scene.friction.tau_max / a))
                      for a in areas.values()])  # fmt: skip
     (first,) = {path.filter for path in SMALL[:1]}
     for area, answer in zip(areas, alone, strict=True):
@@ -83,7 +83,7 @@ def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysi
         for rule in WINDOWS.values()
     ]
     assert len(set(mus)) > 2  # the whole of this slide is steady
-    alone = settled([deepest, *(replace(scene, friction=replace(scene.friction, mu=mu)) for mu in mus)])[1:]
+    alone = settled_predictions([deepest, *(replace(scene, friction=replace(scene.friction, mu=mu)) for mu in mus)])[1:]
     for window, answer in zip(WINDOWS, alone, strict=True):
         (n,) = [n for n, path in enumerate(SMALL) if path == replace(SMALL[0], window=window)]
         assert along[trial][n] == pytest.approx(answer.sed_ending, rel=1e-9)

@@ -10,7 +10,7 @@ from recordings import rows
 from told_session import Session
 
 from drivers.transducer import COUNTS
-from sessions.plan.plan import Rests, Shown
+from sessions.plan.plan import Rests, Visibility
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -73,7 +73,7 @@ def test_every_key_of_a_protocol_is_told():
         "order.": OrderRules,
         "scale.": Scale,
         "rests.": Rests,
-        "shown.": Shown,
+        "shown.": Visibility,
         "pre_evaluation.": PreEvaluation,
         "face.": Face,
         "blocks.": BlockOutline,

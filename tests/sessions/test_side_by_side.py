@@ -104,7 +104,7 @@ def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its
         asked.extend(scene.solve.kinematics for scene in scenes)
         return tuple("There is none." for _ in scenes)
 
-    monkeypatch.setattr(uncertainty, "solved", none)
+    monkeypatch.setattr(uncertainty, "predict_scenes", none)
     (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", variants="both"))).trials
     assert asked == ["small"] * 2 + ["finite"] * 4
     assert of(row, "computed", "depth", "finite").sed is None

@@ -29,7 +29,7 @@ from sessions.plan.study import (
 )
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
-from sessions.recording.derived import UNBLINDING, revealed, score_visits, sessions_of, store_derived
+from sessions.recording.derived import UNBLINDING, reveal, score_visits, sessions_of, store_derived
 from sessions.run.replay import different_events, different_readings, replay
 from sessions.run.runner import run_session
 from sessions.run.steps import AskScore, Scored
@@ -197,11 +197,11 @@ def test_labels_of_a_blinded_study_are_dealt_anew_and_hold_throughout_it(blind, 
 def test_scores_by_index_say_that_they_are_sealed_and_come_out_when_the_key_is_opened(blind):
     enrol(blind, "P01", Body())
     session = scored_visit(blind, "P01")
-    assert revealed(Recording.open(session)).plan.blinded
+    assert reveal(Recording.open(session)).plan.blinded
     with pytest.raises(Blinded, match="daq-app unblind"):
-        score_table(revealed(Recording.open(session)))
+        score_table(reveal(Recording.open(session)))
     open_key(blind, session)
-    scores = score_table(revealed(Recording.open(session))).scores
+    scores = score_table(reveal(Recording.open(session))).scores
     assert len(scores) == 10
     assert all(score.score == score.index for score in scores)  # the subject knew the key
 
@@ -226,8 +226,8 @@ def test_a_key_that_was_changed_is_found(blind):
     swapped = Key(key.salt, {first: other, second: one, **dict(rest)})
     store_derived(session, UNBLINDING, {"by": "E01", "key": swapped.to_dict()})
     with pytest.raises(RecordingError, match="not the key that was sealed"):
-        revealed(Recording.open(session))
-    (blind / KEY_FILE).write_text(json.dumps({"sealed": swapped.sealed()}))
+        reveal(Recording.open(session))
+    (blind / KEY_FILE).write_text(json.dumps({"sealed": swapped.seal()}))
     with pytest.raises(StudyError, match="its SHA-256 differs"):
         study_key(blind)
 

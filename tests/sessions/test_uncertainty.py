@@ -9,7 +9,7 @@ import test_planted_truth as planted_truth
 
 from sessions.plan.plan import Block, SessionPlan
 from sessions.prediction import PredictionOptions, predict, uncertainty
-from sessions.prediction.scenes import scene_along, settled, with_loads
+from sessions.prediction.scenes import scene_along, settled_predictions, with_loads
 from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
 from simulators.bench import BenchSettings
@@ -49,7 +49,7 @@ def beside(analysis, prediction):
 
 def solved(scenes):
     """Return the SEDs of scenes, each solved from nothing: the other route."""
-    return [one.sed_ending for one in settled(scenes)]
+    return [one.sed_ending for one in settled_predictions(scenes)]
 
 
 def test_draws_are_those_of_the_intervals_of_friction(analysis):
@@ -66,7 +66,9 @@ def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, int
     assert found.method == "derivatives"
     mu, tau_max, _ = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     scene = row.prediction.scene
-    drawn = settled([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu[:24], tau_max[:24], strict=True)])
+    drawn = settled_predictions(
+        [with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu[:24], tau_max[:24], strict=True)]
+    )
     low, high = np.quantile([one.sed_ending for one in drawn], [0.025, 0.975])
     carried = found.by_mu * (mu[:24] - row.mu) + found.by_tau_max * (tau_max[:24] - row.tau_max)
     assert np.quantile(row.sed + carried, [0.025, 0.975]) == pytest.approx([low, high], abs=0.05 * (high - low))
@@ -182,7 +184,7 @@ def test_the_depth_that_matches_holds_the_uncertainty_of_force_and_friction(anal
     draws = dict(zip(("mu", "tau_max", "force"), friction_draws(analysis.strokes[0], 0, "maximum"), strict=True))
     ends = {name: np.quantile(drawn, [0.025, 0.975]).tolist() for name, drawn in draws.items()}
     scene = scene_along(row, pressed.variant, beside.options)
-    found = settled([with_loads(scene, {name: end}) for name, pair in ends.items() for end in pair])
+    found = settled_predictions([with_loads(scene, {name: end}) for name, pair in ends.items() for end in pair])
     depths = np.array([one.indentation for one in found]).reshape(-1, 2)
     slopes = np.diff(depths)[:, 0] / np.diff(list(ends.values()))[:, 0]
     carried = sum(slope * (drawn - drawn.mean()) for slope, drawn in zip(slopes, draws.values(), strict=True))
@@ -251,4 +253,4 @@ def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled
     assert "of 60 draws of the friction have no settled state" in row.interval.reason
     largest = int(np.argmax(friction_draws(analysis.strokes[0], 0, "maximum").mu))
     mu, tau_max, _ = (column[largest] for column in friction_draws(analysis.strokes[0], 0, "maximum"))
-    assert settled([with_loads(row.prediction.scene, {"mu": mu, "tau_max": tau_max})]) == (None,)
+    assert settled_predictions([with_loads(row.prediction.scene, {"mu": mu, "tau_max": tau_max})]) == (None,)

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _measured(options: argparse.Namespace, console: Console) -> "RunResults":
     """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
-    from sessions.file_access import read_limited
+    from sessions.file_access import read_within_limit
     from sessions.recording.head import software_versions
     from solver.verification.measuring import measure, restore
     from solver.verification.request import Host
@@ -60,6 +60,6 @@ def _measured(options: argparse.Namespace, console: Console) -> "RunResults":
     if options.data is None:
         return measure(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))
     try:
-        return restore(json.loads(read_limited(options.data)))
+        return restore(json.loads(read_within_limit(options.data)))
     except (ValueError, KeyError, TypeError) as error:
         raise WrongValue(f"{options.data} is no accuracy.json of this program ({error}); give another file") from error

@@ -13,7 +13,7 @@ from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console
 from sessions.exchange import FORMATS, ExportSource, export
 from sessions.recording import Recording
-from sessions.recording.derived import gain_error_set, revealed
+from sessions.recording.derived import gain_error_set, reveal
 from sessions.recording.head import software_versions
 from sessions.strokes.decisions import read
 
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    recording = revealed(Recording.open(options.session))
+    recording = reveal(Recording.open(options.session))
     folder = options.out or Path("exports") / f"{options.session.resolve().name}-{options.format}"
     source = _source(recording, console)
     export(source, options.format, folder, lambda part: console.progress(part, f"writing {options.format}"))

@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from sessions.exchange.exported import exported
+    from sessions.exchange.exported import read_export
 
-    session = exported(options.file)
+    session = read_export(options.file)
     return _import_foreign(options, console) if session is None else _restore_export(session, options, console)
 
 

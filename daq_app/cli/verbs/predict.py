@@ -93,7 +93,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     rows = [
         [
             _trial_label(row),
-            "–" if row.stimulus is None else row.stimulus.called,
+            "–" if row.stimulus is None else row.stimulus.display_name,
             number(row.mu),
             number(row.tau_max, factor=1e3),
             *_response(row, quantity),

@@ -24,7 +24,7 @@ from sessions.plan.study import is_study
 from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
-from sessions.recording.derived import revealed, score_visits, store_page
+from sessions.recording.derived import reveal, score_visits, store_page
 from sessions.report import Further
 from sessions.report.trials import afferent_facts
 from sessions.statistics.multiverse import trial_paths
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
     recording = open_visit(options.session, options.subject)
-    score_only = [revealed(Recording.open(folder)) for folder in options.scores]
+    score_only = [reveal(Recording.open(folder)) for folder in options.scores]
     if is_study(options.session):
         score_only += score_visits(options.session, besides=recording)
     for one in (recording, *score_only):

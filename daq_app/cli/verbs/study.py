@@ -35,7 +35,7 @@ from daq_app.cli.options import (
     within,
 )
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
-from sessions.file_access import json_text, read_limited
+from sessions.file_access import json_text, read_within_limit
 from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.prediction.surface_series import StudyDesign, planted_strokes
 from sessions.recording import RecordingError
@@ -226,7 +226,7 @@ def _load_planted(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        settings = checked_planted(json.loads(read_limited(path)))
+        settings = checked_planted(json.loads(read_within_limit(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
     return settings

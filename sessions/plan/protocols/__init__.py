@@ -1,6 +1,6 @@
 """The protocols we run, a validated TOML file each, their reader, and the plan of a session. The folder is the list."""
 
-from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, blinded, design_rows, is_code, plan
+from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, blind, design_rows, is_code, plan
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -19,7 +19,7 @@ __all__ = [
     "Protocol",
     "StudyPlace",
     "VisitSetting",
-    "blinded",
+    "blind",
     "design_rows",
     "is_code",
     "plan",

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 
-from sessions.plan.orders import Item, draw, next_comparison, pairs, pairs_with, shuffled, williams
+from sessions.plan.orders import Item, draw, next_comparison, pairs, pairs_with, shuffle, williams
 from sessions.plan.plan import (
     DISTAL_TO_PROXIMAL,
     PROXIMAL_TO_DISTAL,
@@ -114,7 +114,7 @@ def plan(
         key_sha256=None if place is None else place.key_sha256,
     )
     if plan.key_sha256 is not None:
-        plan = blinded(plan)
+        plan = blind(plan)
     return plan if area is None else replace(plan, contact_area=area, contact_area_origin="set")
 
 
@@ -145,7 +145,7 @@ def block_order(protocol: Protocol, number: int) -> tuple[BlockOutline, ...]:
     return protocol.blocks[first:] + protocol.blocks[:first]
 
 
-def blinded(plan: SessionPlan) -> SessionPlan:
+def blind(plan: SessionPlan) -> SessionPlan:
     """Return the plan with codes alone: which stimulus bears which is hidden."""
     return plan.with_trials(lambda trial: replace(trial, stimulus=replace(trial.stimulus, index=None)))
 
@@ -193,7 +193,7 @@ class _Blocks:
         name = f"{outline.name}, pre-evaluation"
         pre_evaluation = self.protocol.pre_evaluation
         instruction = outline.instruction if pre_evaluation is None else pre_evaluation.instruction
-        return self._block(outline, "pre-evaluation", name, [self._shuffled(outline, name)], instruction)
+        return self._block(outline, "pre-evaluation", name, [self._random_order(outline, name)], instruction)
 
     def _practice(self, outline: BlockOutline) -> Block:
         order = outline.practice
@@ -214,13 +214,13 @@ class _Blocks:
             elif self.row is not None:
                 orders.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
             else:
-                orders.append(self._shuffled(outline, name, [order[0] for order in orders]))
+                orders.append(self._random_order(outline, name, [order[0] for order in orders]))
         return orders
 
     def _adaptive_orders(self, outline: BlockOutline, standard: int, comparisons: int) -> list[tuple[int, ...]]:
         """Return each comparison as the answers that there are not yet ask for it; half begin with the standard."""
         first = next_comparison(self._candidates(outline), ()).known_index
-        leading = shuffled(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
+        leading = shuffle(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
         return [(first, standard) if n in leading else (standard, first) for n in range(comparisons)]
 
     def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
@@ -241,8 +241,8 @@ class _Blocks:
         comparisons = [code for code in codes if code != standard]
         return pairs_with(standard, comparisons, self.seed, outline.name, repetition)
 
-    def _shuffled(self, outline: BlockOutline, name: str, begun_with: Sequence[int] = ()) -> tuple[int, ...]:
-        """Return an order by chance that meets the protocol's constraints. Codes are drawn: an order tells no index."""
+    def _random_order(self, outline: BlockOutline, name: str, begun_with: Sequence[int] = ()) -> tuple[int, ...]:
+        """Return a random order that meets the protocol's constraints; it orders codes, so that it reveals no index."""
         by_code = self._by_code(outline)
         order = draw(
             tuple(by_code),
@@ -257,7 +257,7 @@ class _Blocks:
     def _row_of_design(self, outline: BlockOutline, row: int) -> tuple[int, ...]:
         """Return a row of the Williams design, whose letters chance deals to the codes for the whole study."""
         by_code = self._by_code(outline)
-        letters = shuffled(tuple(by_code), self.design_seed, f"{outline.name}/letters")
+        letters = shuffle(tuple(by_code), self.design_seed, f"{outline.name}/letters")
         rows = williams(len(letters))
         return tuple(by_code[str(letters[letter])] for letter in rows[row % len(rows)])
 

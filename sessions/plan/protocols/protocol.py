@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from sessions.plan.orders import Item, draw, opaque_codes
-from sessions.plan.plan import Frame, Phase, Rests, Shown
+from sessions.plan.plan import Frame, Phase, Rests, Visibility
 from sessions.plan.protocols.languages import (
     ENGLISH,
     PRE_EVALUATION,
@@ -59,10 +59,10 @@ class BlockOutline:
         check_range("repetitions", self.repetitions, 1, 20)
         if not set(self.practice) <= set(self.indices):
             raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
-        self._check_planted()
+        self._check_planted_friction()
         self._check_standard()
 
-    def _check_planted(self) -> None:
+    def _check_planted_friction(self) -> None:
         if self.planted_friction and len(self.planted_friction) != len(self.indices):
             count = f"one number for each of the {len(self.indices)} indices, or none at all"
             raise NotAllowed("planted_friction", list(self.planted_friction), count)
@@ -184,7 +184,7 @@ class Protocol:
     order: OrderRules = field(default_factory=OrderRules)
     scale: Scale = field(default_factory=Scale)
     rests: Rests = field(default_factory=Rests)
-    shown: Shown = field(default_factory=Shown)
+    shown: Visibility = field(default_factory=Visibility)
     pre_evaluation: PreEvaluation | None = None
     face: Face = field(default_factory=Face)
     language: str = ENGLISH  # of the texts above

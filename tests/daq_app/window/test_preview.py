@@ -6,7 +6,7 @@ import pytest
 
 from daq_app.window.new_session import Refused, SessionForm
 from daq_app.window.subject import mirror_view, preview, subject_view
-from sessions.plan.plan import Shown
+from sessions.plan.plan import Visibility
 from sessions.plan.protocols import protocol, protocol_names
 from tests.daq_app.session_messages import PLAN, READY, after
 
@@ -79,7 +79,7 @@ def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
 def test_the_mirror_keeps_what_the_protocol_keeps_from_the_experimenter():
     subject = ("instruction", "trial count", "forces")
     for experimenter, counted in ((("answer",), False), (("trial count", "forces"), True)):
-        plan = replace(PLAN, shown=Shown(subject, experimenter))
+        plan = replace(PLAN, shown=Visibility(subject, experimenter))
         session = replace(after(*READY).session, plan=plan)
         assert subject_view(session).force
         assert "Surface 1 of 10." in subject_view(session).text

@@ -10,7 +10,7 @@ from daq_app.recorder import messages as m
 from daq_app.window.course_state import Judged, StrokePicture
 from daq_app.window.state import BenchState
 from daq_app.window.view_course import KINDS, course_view, inspection, tiles, verdict
-from sessions.plan.plan import Shown
+from sessions.plan.plan import Visibility
 from sessions.run import steps
 
 PICTURE = StrokePicture(np.arange(3.0), np.ones((4, 3)), 0.5, 1.5, (1.234, 0.5, 0.41, 20.6))
@@ -74,7 +74,7 @@ def test_a_trial_without_a_stroke_says_why(messages, number, why):
 
 
 def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
-    blind = replace(PLAN, shown=Shown(experimenter=()))
+    blind = replace(PLAN, shown=Visibility(experimenter=()))
     begun = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
     judged = Judged(1, 1, replace(GOOD, picture=PICTURE))
     shown = inspection(after(BEGUN[0], begun, *TARE[2:], judged, *KEPT).session, 1)

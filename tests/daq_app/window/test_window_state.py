@@ -33,7 +33,7 @@ from daq_app.window.live_feed import Load
 from daq_app.window.state import AppState, Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
 from daq_app.window.view import derive_view
 from drivers.transducer import Health
-from sessions.plan.plan import Frame, Shown
+from sessions.plan.plan import Frame, Visibility
 from sessions.run import steps
 
 CUT_SHORT = (*MOUNT, m.SessionEnded("recordings/P07", LOST, True))
@@ -310,7 +310,7 @@ def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
 
 def test_the_subject_sees_how_hard_it_presses_only_where_the_protocol_says_so():
     assert not derive_view(after(*READY)).subject.force
-    plan = replace(PLAN, shown=Shown(subject=("instruction", "forces")))
+    plan = replace(PLAN, shown=Visibility(subject=("instruction", "forces")))
     told = [structs.replace(said, plan=plan) if isinstance(said, m.SessionBegun) else said for said in READY]
     assert derive_view(after(*told)).subject.force
 
