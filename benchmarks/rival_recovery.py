@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sessions.prediction.surface_series import AREA, StudyDesign, planted_strokes
-from sessions.statistics.power import Judgement, preferred, study_weights, twins
+from sessions.statistics.power import Judgement, preferred_rivals, study_weights, twins
 from solver.quantities import NAMES
 from solver.scene.published import STICKINESS
 
@@ -52,7 +52,7 @@ STUDIES = (Study("10 × 5", 10, PAPER), Study("20 × 12", 20, WIDE), Study("24 �
 
 def row(study: Study, planted: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
     """Return a row of the table: how often what was planted, a twin of it, and a wrong one is preferred or decided."""
-    first = preferred(weights)
+    first = preferred_rivals(weights)
     sure = [name for name, one in zip(first, weights, strict=True) if one[name] >= DECIDED]
     wrong = [name for name in first if name not in alike]
     most = f"`{max(sorted(set(wrong)), key=wrong.count)}`" if wrong else "–"

@@ -106,12 +106,12 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
     for key, (value, form) in places.items():
         if isinstance(value, float) and not math.isfinite(value):
             raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
-        nested = _nested(form)
+        nested = _member_with_places(form)
         if isinstance(value, Mapping) and isinstance(nested, inspect.DataclassType):
             allowed = [field.name for field in nested.fields]
             for name in cast("Mapping[str, Any]", value):
                 if name not in allowed:
-                    full = _joined(key, name)
+                    full = _join_key(key, name)
                     raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(allowed)}")
     try:
         return msgspec.convert(table, cls)
@@ -127,11 +127,11 @@ def _places(value: Any, form: inspect.Type | None, key: str) -> Iterator[tuple[s
             yield from _places(item, _inside(form, at), f"{key}[{at}]")
     if isinstance(value, Mapping):
         for name, item in cast("Mapping[str, Any]", value).items():
-            yield from _places(item, _inside(form, name), _joined(key, name))
+            yield from _places(item, _inside(form, name), _join_key(key, name))
 
 
-def _nested(form: inspect.Type | None) -> inspect.Type | None:
-    """Return the choice of a union that has places inside, or the type where it is no union."""
+def _member_with_places(form: inspect.Type | None) -> inspect.Type | None:
+    """Return the member of a union that holds other values, or the type itself where it is no union."""
     kinds = (inspect.DataclassType, inspect.VarTupleType, inspect.TupleType)
     types = form.types if isinstance(form, inspect.UnionType) else (form,)
     return next((one for one in types if isinstance(one, kinds)), None)
@@ -139,7 +139,7 @@ def _nested(form: inspect.Type | None) -> inspect.Type | None:
 
 def _inside(form: inspect.Type | None, part: str | int) -> inspect.Type | None:
     """Return the type at a name or a position inside a type; None where it has none there."""
-    match _nested(form), part:
+    match _member_with_places(form), part:
         case inspect.DataclassType(fields=fields), str():
             return next((field.type for field in fields if field.name == part), None)
         case inspect.VarTupleType(item_type=item), int():
@@ -158,7 +158,7 @@ def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, in
     if cause is None:
         value, form = places[path]
         if missing := re.match(r"Object missing required field `(.*?)`", message):
-            return path, f"{_joined(path, missing[1])} is missing; it must be {_in_words(_inside(form, missing[1]))}"
+            return path, f"{_join_key(path, missing[1])} is missing; it must be {_in_words(_inside(form, missing[1]))}"
         return path, f"{path} = {toml_value(value)} is not allowed: it must be {_in_words(form)}"
     # A dataclass that checks itself names the key, in full or from itself on.
     key = str(getattr(cause, "key", ""))
@@ -169,10 +169,10 @@ def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, in
     return full, f"{full} = {toml_value(getattr(cause, 'value', None))} is not allowed: {allowed}"
 
 
-def _joined(key: str, name: str) -> str:
+def _join_key(key: str, name: str) -> str:
     """Return the key of a name inside a table, as TOML writes it.
 
-    >>> _joined("finger", "tip_radius"), _joined("", ""), _joined("a", "a b")
+    >>> _join_key("finger", "tip_radius"), _join_key("", ""), _join_key("a", "a b")
     ('finger.tip_radius', '""', 'a."a b"')
     """
     bare_or_quoted = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
@@ -236,7 +236,7 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_inline, cast("tuple[Any, ...]", value))) + "]"
     if isinstance(value, str):
-        return "".join(c if c.isprintable() else _escaped(c) for c in json.dumps(value, ensure_ascii=False))
+        return "".join(c if c.isprintable() else _escape(c) for c in json.dumps(value, ensure_ascii=False))
     if isinstance(value, date | time):
         return value.isoformat()
     if isinstance(value, bool):
@@ -246,8 +246,8 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
     return hex(value)  # of any length, whereas Python limits decimal digits
 
 
-def _escaped(character: str) -> str:
-    """Return a character as it stands in a text in quotes: one that a terminal would obey, or nobody would see."""
+def _escape(character: str) -> str:
+    """Return the escape of a character that a terminal would obey or nobody would see, for a text in quotes."""
     code = ord(character)
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 

@@ -14,7 +14,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, se
 from daq_app.accuracy_page.figures import plates
 from daq_app.console import number
 from sessions.report.figures.style import Plate
-from sessions.report.pages import drawn, swap_in
+from sessions.report.pages import embed, swap_in
 from solver.prediction import percent
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate
@@ -298,7 +298,7 @@ def page(measured: RunResults, figures: Mapping[str, Plate] | None = None) -> st
         sections=[(name, words) for name, words, _ in there],
         parts={name: parts for name, _, parts in there},
         wide=("benchmarks", "orders", "costs"),
-        drawn=drawn,
+        drawn=embed,
         processor_time=PROCESSOR_TIME,
     )
 

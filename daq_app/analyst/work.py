@@ -218,14 +218,14 @@ class Work:
         return field_at(finding.experiment, finding.index, film.film, int(step))
 
     def _compared_panel(self) -> "Panel | None":
-        from sessions.report.figures.relation import compared_panel
+        from sessions.report.figures.relation import comparison_panel
         from sessions.report.figures.style import look
 
         if (other := self._other) is None:
             return None
         names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
         with look():
-            return compared_panel(NAMES, names, compared(self._report, other), simulated=simulated)
+            return comparison_panel(NAMES, names, compared(self._report, other), simulated=simulated)
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""

@@ -32,7 +32,7 @@ class NotNow(Exception):
 def _breakable(uri: str) -> Generator[None]:
     """Let a stop break off what waits for a device, which may take its time. Raises NotNow when one did."""
     try:
-        with interruptions() as interrupted, interrupted.raised():
+        with interruptions() as interrupted, interrupted.raise_at_once():
             yield
     except KeyboardInterrupt:
         raise NotNow(f"{uri} was not connected: stopped by the user") from None

@@ -29,7 +29,7 @@ from sessions.recording.manifest import is_sealed
 from sessions.recording.recovery import fold_log
 from sessions.recording.storage import RESERVE, check_room, need, unsafe
 from sessions.run import resuming
-from sessions.run.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
+from sessions.run.runner import STOPPED, Continuation, Ending, Operator, Status, run_session
 from sessions.run.steps import Command, Event
 
 WHY = "a session is being recorded"
@@ -104,7 +104,7 @@ class Prepared:
     people: m.People
     info: TransducerInfo | None
     clock_offset_ns: int = 0
-    resumed: Resumed | None = None
+    resumed: Continuation | None = None
     before: tuple[LoggedEvent, ...] = ()  # all that was recorded before
 
 
@@ -148,7 +148,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     if clock.factor != factor:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
     at, last = resuming.resumption(recording.plan, recording.events), recording.last_block()
-    going_on, gap = resuming.continued(recording, last, clock, datetime.now(UTC))
+    going_on, gap = resuming.continue_clock(recording, last, clock, datetime.now(UTC))
     people = _recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
         people = replace(request.people, planted=people.planted)
@@ -157,7 +157,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
     writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
-    resumed = Resumed(at, resuming.resumed_data(gap, info, software_versions()), last)
+    resumed = Continuation(at, resuming.resumed_data(gap, info, software_versions()), last)
     return Prepared(
         recording.plan, writer, going_on, people, info, going_on.offset_ns, resumed, tuple(recording.events)
     )

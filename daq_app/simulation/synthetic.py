@@ -28,7 +28,7 @@ from sessions.prediction.scenes import seds_at
 from sessions.recording import FleetingWriter, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.archive import seal
 from sessions.recording.schema import LIVE_FILE
-from sessions.report.contents import Planted
+from sessions.report.contents import GroundTruth
 from sessions.run import steps
 from sessions.run.resuming import RESUMABLE
 from sessions.run.runner import RunnerSettings, SessionEnd, Status, run_session
@@ -85,7 +85,7 @@ class Study:
 
     scored: tuple[Path, ...]  # a folder a subject
     stroked: Path
-    planted: tuple[Planted, ...]  # a row a trial
+    planted: tuple[GroundTruth, ...]  # a row a trial
     readings: int
     lost: int
 
@@ -114,7 +114,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         people = SimulatedPeople(SimulatedSubject(own), clock, bench)
         end = visit(plan(chosen, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
         planted = tuple(
-            Planted(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
+            GroundTruth(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
             for trial, stroke in people.strokes.items()
         )
     return Study(tuple(scored), folder, planted, end.readings, end.health.lost)

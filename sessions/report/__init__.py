@@ -19,14 +19,14 @@ from sessions.report.contents import (
     Answers,
     Experiment,
     Fact,
-    Planted,
+    GroundTruth,
     PredictionFinding,
     Report,
     StrokeFinding,
     same_fields,
 )
 from sessions.report.facts import scene_file, session_commands
-from sessions.report.trials import course, fields, flaws, left_out, model_in_short, predictions, strokes
+from sessions.report.trials import course, fields, flaws, model_in_short, omissions, predictions, strokes
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.psychometric import Psychometric, function_of
@@ -52,7 +52,7 @@ def findings(
     analysis: Analysis,
     prediction: SessionPrediction | None = None,
     scores: Sequence[ScoreTable] | None = None,
-    planted: Sequence[Planted] | None = None,
+    planted: Sequence[GroundTruth] | None = None,
     further: Further | None = None,
 ) -> Report:
     """Return the findings of a session.
@@ -78,7 +78,7 @@ def findings(
         versions=tuple(Fact(name, version) for name, version in software_versions().items()),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
-        excluded=facts.excluded(recording, analysis, stroke_findings, tables),
+        excluded=facts.exclusion_sentences(recording, analysis, stroke_findings, tables),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
         experiments=with_psychometric(judged, recording, analysis),
@@ -87,11 +87,11 @@ def findings(
         predictions=predicted,
         fields=fields(prediction),
         planted=tuple(planted or ()),
-        sealed=_sealed(recording, tables, predicted),
+        sealed=_seal_sentence(recording, tables, predicted),
         response=more.response,
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         modelled=tuple(Fact(*fact) for fact in model_facts(prediction)),
-        left_out=left_out(prediction),
+        left_out=omissions(prediction),
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
         again=facts.again(recording, analysis),
         commands=session_commands(
@@ -106,7 +106,7 @@ def findings(
     )
 
 
-def _sealed(recording: Recording, tables: Sequence[ScoreTable], predicted: Sequence[PredictionFinding]) -> str:
+def _seal_sentence(recording: Recording, tables: Sequence[ScoreTable], predicted: Sequence[PredictionFinding]) -> str:
     if not predicted or not any(table.scores for table in tables):
         return ""
     return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in predicted])
@@ -213,9 +213,9 @@ def experiments(
                 indices=indices,
                 scores=means,
                 answers=tuple(Answers(subject, tuple(map(row.get, indices))) for subject, row in rows.items()),
-                score_relation=_related(score_of, predicted),
-                index_relation=_related({index: float(index) for index in indices}, predicted),
-                own_relation=_related(own, predicted),
+                score_relation=_relation(score_of, predicted),
+                index_relation=_relation({index: float(index) for index in indices}, predicted),
+                own_relation=_relation(own, predicted),
                 own_scores=own,
                 rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
                 response=response,
@@ -225,7 +225,7 @@ def experiments(
     return tuple(judged)
 
 
-def _related(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
+def _relation(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
     """Return how responses go with x, over the indices that have both; None where there is none."""
     shared = [index for index in sorted(x) if index in responses]
     if not shared:

@@ -144,8 +144,8 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True)
-class Planted:
-    """What a simulator planted in one trial: handed in, never known here."""
+class GroundTruth:
+    """Friction and motion that a simulator set in one trial: for comparison only, no result uses them."""
 
     trial: int
     mu: float  # [-]
@@ -183,7 +183,7 @@ class Report:
     strokes: tuple[StrokeFinding, ...]
     predictions: tuple[PredictionFinding, ...]
     fields: tuple[Field, ...]
-    planted: tuple[Planted, ...]
+    planted: tuple[GroundTruth, ...]
     modelled: tuple[Fact, ...]
     left_out: tuple[Fact, ...]
     again: tuple[Fact, ...]  # everything needed to do it again ...

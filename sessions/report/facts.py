@@ -192,10 +192,10 @@ def _tilt(analysis: Analysis) -> tuple[str, str]:
     return f"{along}, {across}", f"{tilt.kind}; {done}"
 
 
-def excluded(
+def exclusion_sentences(
     recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]
 ) -> tuple[str, ...]:
-    """Return what was kept out of the results, by whom and why, a sentence each."""
+    """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
     sentences = [full_stop(f"By {one.sentence}") for one in analysis.decisions if one.leaves_out]
     sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
@@ -252,17 +252,17 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         for name, words in settings.items()
     ]
     if info is not None:
-        facts.append(Fact("analysis", "; ".join(_listed(analysis.settings, AnalysisSettings()))))
+        facts.append(Fact("analysis", "; ".join(_describe_settings(analysis.settings, AnalysisSettings()))))
     return tuple(fact for fact in facts if fact.value)
 
 
-def _listed(chosen: Any, usual: Any, prefix: str = "") -> list[str]:  # noqa: ANN401 - any settings dataclass
+def _describe_settings(chosen: Any, usual: Any, prefix: str = "") -> list[str]:  # noqa: ANN401 - any settings dataclass
     """Return every setting with its value; those that differ from the usual ones are marked."""
     words: list[str] = []
     for field in fields(chosen):
         value, default = getattr(chosen, field.name), getattr(usual, field.name)
         if is_dataclass(value):
-            words += _listed(value, default, f"{prefix}{field.name}.")
+            words += _describe_settings(value, default, f"{prefix}{field.name}.")
         else:
             shown = f"{value:g}" if isinstance(value, float) else str(value)
             words.append(f"{prefix}{field.name} {shown}{'' if value == default else ' (set)'}")

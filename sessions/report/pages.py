@@ -28,7 +28,7 @@ from sessions.report.tables.study_models import missing_models, missing_scores
 from sessions.statistics.findings import StudyFindings
 from sessions.statistics.multiverse import CHOICES
 from sessions.statistics.rivals import Rival
-from sessions.statistics.visit import TrialRow, decided
+from sessions.statistics.visit import TrialRow, exclusion_of
 from sessions.strokes.stroke import meanings
 
 
@@ -66,7 +66,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
         doubts=doubts(report),
         distinctions=distinctions(report),
         figures=figures,
-        drawing=drawn,
+        drawing=embed,
         text_address=text_address,
         csv_of=partial(panel_csv, head=report.head if report.simulated else ""),
         numbers=_numbers(figures, {**tables, "further": further}),
@@ -81,12 +81,12 @@ def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = 
 
     Raises ReportError when that cannot be done, or when `path` holds something that is no page.
     """
-    leave_others_alone(path)
+    check_replaceable(path)
     swap_in(path, page(report, drawings))
 
 
-def leave_others_alone(path: Path) -> None:
-    """Raise ReportError where a page would replace something that is none."""
+def check_replaceable(path: Path) -> None:
+    """Raise ReportError where `path` holds something other than a page of ours, which a new page would replace."""
     if not path.exists():
         return
     try:
@@ -114,10 +114,10 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
 def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
     """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
     order = ("relation", "scores", "course", "friction", "speed", "finger", "response", "paths", "forces")
-    return _numbered([name for name in order if name in figures], chain.from_iterable(tables.values()))
+    return _numbers_by_name([name for name in order if name in figures], chain.from_iterable(tables.values()))
 
 
-def _numbered(figures: Iterable[str], tables: Iterable[Table]) -> dict[str, int]:
+def _numbers_by_name(figures: Iterable[str], tables: Iterable[Table]) -> dict[str, int]:
     """Return the numbers of figures and of tables, each counted from 1, by their names."""
     return {name: n for n, name in enumerate(figures, 1)} | {table.name: n for n, table in enumerate(tables, 1)}
 
@@ -144,7 +144,7 @@ def _contents(
     return tuple((anchor, words) for anchor, words, there in parts if there)
 
 
-def drawn(panel: Panel) -> Markup:
+def embed(panel: Panel) -> Markup:
     """Return the picture as it stands in a page: without the head an SVG file has."""
     return Markup(panel.svg[panel.svg.index("<svg") :])
 
@@ -190,8 +190,8 @@ def study_page(study: StudyFindings, name: str) -> str:
         figures=figures,
         tables={**tables, "trials": trials},
         further=further,
-        numbers=_numbered(figures, (*chain.from_iterable(tables.values()), *further, *trials)),
-        drawing=drawn,
+        numbers=_numbers_by_name(figures, (*chain.from_iterable(tables.values()), *further, *trials)),
+        drawing=embed,
         text_address=text_address,
         csv_of=partial(panel_csv, head=study.simulated),
     )
@@ -263,7 +263,7 @@ def trials_csv(study: StudyFindings) -> str:
     copies = dict(study.copies)
     for visit in study.visits:
         for row in visit.rows:
-            decision = decided(study.excluded, visit.subject, row.descriptor)
+            decision = exclusion_of(study.excluded, visit.subject, row.descriptor)
             why = "" if decision is None else decision.why
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
             cells = ["yes" if visit.simulated else "no"] if mark else []

@@ -7,7 +7,7 @@ from typing import Literal
 from sessions.prediction.stored import Variant
 from sessions.report.contents import Experiment, PredictionFinding, Report
 from sessions.report.tables.rivals import rivals_sentences
-from sessions.report.tables.scales import compared_with_standard, psychometric_sentences
+from sessions.report.tables.scales import psychometric_sentences, session_functions
 from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import (
     ShownResponse,
@@ -60,14 +60,14 @@ def _in_variant(report: Report, variant: Variant, opening: str, untried: str) ->
         f"{experiment.name} {words}, n = {plural(related.n, 'stimulus', 'stimuli')}"
         for experiment in report.experiments
         if experiment.name in tried
-        for related in [_related(report, experiment, sed)]
+        for related in [_relation(report, experiment, sed)]
         for r in [related.pearson]
         for words in [related.reason if r is None else f"r = {correlation(r)}{ends_of(related)}"]
     ]
     return f"{opening}: {'; '.join(parts)}." if parts else untried
 
 
-def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
+def _relation(report: Report, experiment: Experiment, value: _Value) -> Relation:
     means = {mean.index: mean.mean for mean in experiment.scores}
     scored = [(p.index, value(p)) for p in report.predictions if p.experiment == experiment.name and p.index in means]
     known = [(index, number) for index, number in scored if number is not None]
@@ -82,7 +82,7 @@ def _by_place(report: Report) -> str:
         rows = [dict(p.row) for p in report.predictions if p.experiment == experiment.name and p.row]
         arcs = rows[0] if rows else {}
         places = sorted(arc for arc in arcs if abs(arc) <= REACH and all(arc in row for row in rows))
-        by_place = {arc: _related(report, experiment, _at(arc)) for arc in places}
+        by_place = {arc: _relation(report, experiment, _at(arc)) for arc in places}
         known = {arc: related.pearson for arc, related in by_place.items() if related.pearson is not None}
         if 0.0 in known:
             low, high = _alike(known)
@@ -136,14 +136,16 @@ def summary(report: Report) -> tuple[str, ...]:
         )
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
-    for judged in compared_with_standard(report):
+    for judged in session_functions(report):
         sentences += psychometric_sentences(judged)
     for experiment in report.experiments:
         shown = shown_response(report.response)
         responses = [shown.of(p) for p in report.predictions if p.experiment == experiment.name]
         values = [shown.factor * one[0] for one in responses if one is not None]
         if values:
-            sentences.append(_predicted(experiment, shown, (min(values), max(values)), report.model.split(",")[0]))
+            sentences.append(
+                _prediction_sentence(experiment, shown, (min(values), max(values)), report.model.split(",")[0])
+            )
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     missing = sum(p.sed is None for p in report.predictions)
@@ -171,7 +173,7 @@ def _strokes(report: Report) -> str:
     return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
 
 
-def _predicted(experiment: Experiment, shown: ShownResponse, ends: tuple[float, float], strain: str) -> str:
+def _prediction_sentence(experiment: Experiment, shown: ShownResponse, ends: tuple[float, float], strain: str) -> str:
     """Return how prediction and score go together in one experiment; `ends` are in the shown unit."""
     low, high = ends
     decimals, unit = (2, " kPa") if shown.unit == "kPa" else (shown.places, "")

@@ -14,7 +14,7 @@ from sessions.report.contents import Fact
 from sessions.report.facts import area_words, calibration_words, model_words
 from sessions.report.prose import OTHER_FINGERS
 from sessions.report.tables.rivals import rivals_sentences
-from sessions.report.tables.scales import compared_in_study, psychometric_sentences, scale_sentences
+from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
 from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import capital, correlation, digits, full_stop, plural, significant
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
@@ -30,7 +30,7 @@ def summary(study: StudyFindings) -> list[str]:
     read = "was" if len(study.visits) == 1 else "were"
     sentences = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
     for one in study.descriptors:
-        sentences += _related(one, study)
+        sentences += _relation_sentences(one, study)
         sentences += scale_sentences(one)
         sentences += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
     if any(one.repeated is not None for one in study.descriptors):
@@ -38,7 +38,7 @@ def summary(study: StudyFindings) -> list[str]:
             "With the receptor elsewhere or under the measured force the sign may differ, too, as the report of each "
             f"session says. {OTHER_FINGERS}"
         )
-    sentences += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
+    sentences += chain.from_iterable(map(psychometric_sentences, study_functions(study)))
     if (f := study.friction) is not None:
         sentences.append(
             f"Of {f.strokes} strokes the planted µ came back with a median error of "
@@ -59,7 +59,7 @@ def distinctions(study: StudyFindings) -> list[str]:
     ]
 
 
-def _related(one: DescriptorFindings, study: StudyFindings) -> list[str]:
+def _relation_sentences(one: DescriptorFindings, study: StudyFindings) -> list[str]:
     name, label = capital(one.descriptor), BY_NAME[study.response].label
     strain = study.options.prediction.kinematics
     other = "finite" if strain == "small" else "small"
@@ -105,8 +105,8 @@ def who(study: StudyFindings) -> list[Fact]:
     ]
 
 
-def excluded(study: StudyFindings) -> list[str]:
-    """Return a sentence for all that was kept out of the results, by whom and why."""
+def exclusion_sentences(study: StudyFindings) -> list[str]:
+    """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
     sentences = [f"Session {name} could not be read, and nothing of it counts: {why}." for name, why in study.failed]
     sentences += [
         f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
@@ -117,10 +117,10 @@ def excluded(study: StudyFindings) -> list[str]:
         for one in study.excluded
         if _fits(study, one)
     ]
-    return [*sentences, *_decided(study, leaving_out=True), *_missing(study)]
+    return [*sentences, *_decision_sentences(study, leaving_out=True), *_missing(study)]
 
 
-def _decided(study: StudyFindings, *, leaving_out: bool) -> list[str]:
+def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]:
     """Return the decisions about strokes that leave one out, or all others."""
     decided = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
     return [f"Session {name}: {full_stop(one)}" for name, one in decided if (" is left out: " in one) == leaving_out]
@@ -128,7 +128,7 @@ def _decided(study: StudyFindings, *, leaving_out: bool) -> list[str]:
 
 def remarks(study: StudyFindings) -> list[str]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
-    sentences = _decided(study, leaving_out=False)
+    sentences = _decision_sentences(study, leaving_out=False)
     sentences += [
         f"Session {visit.session} ended before its last trial; what it holds counts."
         for visit in study.visits
@@ -143,7 +143,7 @@ def remarks(study: StudyFindings) -> list[str]:
     ]
     for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
-        sentences += [f"{words}: {_listed(places)}."] if places else []
+        sentences += [f"{words}: {_first_few(places)}."] if places else []
     sentences += [
         f"A decision of {one.who} leaves out {_whats(one)} of subject {one.subject} ({one.why}), and no session read "
         "has such trials; see exclusions.toml."
@@ -164,7 +164,7 @@ def _meshes(study: StudyFindings) -> list[str]:
     errors = [row.error_estimate for visit in study.visits for row in visit.rows if row.error_estimate is not None]
     if len(solved) < 2 or not errors:
         return []
-    meshes = "; ".join(f"{value}: {_listed(sessions)}" for value, sessions in solved.items())
+    meshes = "; ".join(f"{value}: {_first_few(sessions)}" for value, sessions in solved.items())
     sentence = (
         f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as the differences "
         "between its own trials ask for. Within a subject all trials share one mesh; between subjects an SED may "
@@ -207,17 +207,17 @@ def _missing(study: StudyFindings) -> list[str]:
         if row.sed is None and row.why and row.outcome != "open"
     )
     for places in alike.values():
-        named, reasons = _listed([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
+        named, reasons = _first_few([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
         why = f"{'' if len(reasons) == 1 else 'of the first: '}{full_stop(reasons[0])}"
         sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
     return sentences
 
 
-def _listed(places: Sequence[str]) -> str:
+def _first_few(places: Sequence[str]) -> str:
     return ", ".join(places[:_FEW]) + (f" and {len(places) - _FEW} more" if len(places) > _FEW else "")
 
 
-def sealed(study: StudyFindings) -> str:
+def seal_sentence(study: StudyFindings) -> str:
     """Return whether predictions were sealed before scores."""
     alike = by_key((visit.sealed, visit.session) for visit in study.visits if visit.sealed)
     if len(alike) == 1:
@@ -226,14 +226,14 @@ def sealed(study: StudyFindings) -> str:
     return " ".join(f"{', '.join(sessions)}: {sentence}" for sentence, sessions in alike.items())
 
 
-def modelled(study: StudyFindings) -> list[Fact]:
-    """Return what was modelled; where sessions differ, each of the first few that do."""
+def model_facts(study: StudyFindings) -> list[Fact]:
+    """Return the facts about the model; where sessions differ, each value with the first few that have it."""
     effects = by_key((name, (fact, visit.session)) for visit in study.visits for name, *fact in visit.model)
     facts: list[Fact] = []
     for name, pairs in effects.items():
         values = by_key(((value, remark), session) for (value, remark), session in pairs)
         for (value, remark), sessions in list(values.items())[:_FEW]:
-            whose = "" if len(values) == 1 else f"in {_listed(sessions)}"
+            whose = "" if len(values) == 1 else f"in {_first_few(sessions)}"
             facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))
     return facts
 

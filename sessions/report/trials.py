@@ -80,7 +80,11 @@ def course(recording: Recording) -> Course | None:
     drag = np.hypot(wrench[kept, 0], wrench[kept, 1])
     behind = np.searchsorted(kept, gaps) + 1
     normal, tangential = (np.insert(force, behind, np.nan) for force in (-wrench[kept, 2], drag))
-    return Course(_numbers(np.insert(block.time[kept], behind, block.time[gaps])), _known(normal), _known(tangential))
+    return Course(
+        _numbers(np.insert(block.time[kept], behind, block.time[gaps])),
+        _none_for_nan(normal),
+        _none_for_nan(tangential),
+    )
 
 
 def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:
@@ -111,8 +115,8 @@ def _trace(stroke: Stroke) -> Trace | None:
         time=_numbers(curve.time[kept] - begin),
         normal=_numbers(curve.normal[kept]),
         tangential=_numbers(curve.tangential[kept]),
-        mu=_known(curve.ratio[kept]),
-        speed=_known(curve.speed[kept]),
+        mu=_none_for_nan(curve.ratio[kept]),
+        speed=_none_for_nan(curve.speed[kept]),
         every=every,
     )
 
@@ -139,8 +143,8 @@ def _numbers(values: Array) -> tuple[float, ...]:
     return tuple(values.tolist())
 
 
-def _known(values: Array) -> tuple[float | None, ...]:
-    """Return None for nan: JSON has none, and no number is meant."""
+def _none_for_nan(values: Array) -> tuple[float | None, ...]:
+    """Return the values with None for nan, which JSON does not have."""
     return tuple(None if np.isnan(value) else float(value) for value in values)
 
 
@@ -202,8 +206,8 @@ def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
     return f"{options.kinematics} strain, settled sliding, τ max {options.tau_reading}, contact area {area.law}"
 
 
-def left_out(stored: SessionPrediction | None) -> tuple[Fact, ...]:
-    """Return what was left out, how much that may have changed the SED, and how this was estimated."""
+def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
+    """Return the effects that the model omits, how much each may change the SED, and how that was estimated."""
     solved = [] if stored is None else [row.prediction for row in stored.trials if row.prediction is not None]
     by_effect = by_key(item for prediction in solved for item in prediction.model.get("left_out", {}).items())
     # Sentences that differ in their numbers only stand together.

@@ -67,10 +67,10 @@ def places(n: int) -> Callable[[float], str]:
     return lambda value: digits(value, n)
 
 
-def signed(value: float) -> str:
+def with_sign(value: float) -> str:
     """Return a number with one decimal and its sign.
 
-    >>> signed(-0.25), signed(-0.01)
+    >>> with_sign(-0.25), with_sign(-0.01)
     ('−0.2', '0.0')
     """
     if abs(value) < 0.05:

@@ -21,8 +21,8 @@ class Interruptions:
             raise KeyboardInterrupt
 
     @contextmanager
-    def raised(self) -> Generator[None]:
-        """Let a signal raise KeyboardInterrupt at once while inside, where nothing can be left half written."""
+    def raise_at_once(self) -> Generator[None]:
+        """Let a signal raise KeyboardInterrupt at once inside; for work that leaves nothing half written."""
         self._at_once = True
         try:
             yield

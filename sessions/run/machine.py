@@ -58,16 +58,16 @@ def advance(state: State, event: steps.Event) -> Step:
         case _, steps.Redo() | steps.UndoRedo():
             return _again(state, event)
         case _, steps.Skip(reason):
-            return _left_out(state, reason)
+            return _leave_out(state, reason)
         case _, steps.ContactOnset() | steps.FingerLifted() | steps.Settled():
-            return _touched(state, event)
+            return _follow_contact(state, event)
         case Scoring(), steps.Scored() | steps.MagnitudeEstimate() | steps.PairedChoice():
-            return _answered(state, event)
+            return _take_answer(state, event)
         case _:
             return _went_on(state, event)
 
 
-def interrupted(state: State, reason: str) -> Step:
+def resume_interrupted(state: State, reason: str) -> Step:
     """Return the state in which a session that was cut short goes on, and the commands that enter it.
 
     It goes on at the same trial. A take that was open is discarded for `reason`: nobody knows what came after its last
@@ -81,7 +81,7 @@ def interrupted(state: State, reason: str) -> Step:
         case Ended():
             return state, ()
         case _:
-            place, undone = _pair_undone(state.place, reason)
+            place, undone = _undo_pair(state.place, reason)
             return Mounting(place), (*_discarding(state, reason), *undone, *_asking_for(place, new_block=True))
 
 
@@ -95,7 +95,7 @@ def _went_on(state: State, event: steps.Event) -> Step:
         case Idle(place), steps.Begin():
             return Mounting(place), _asking_for(place, new_block=True)
         case Mounting(place), steps.StimulusMounted(code) if code == place.trial.stimulus.code:
-            return _take_begun(place)
+            return _begin_take(place)
         case Mounting(place), steps.StimulusMounted(code):
             wanted = place.trial.stimulus.code
             return state, (steps.Refuse(f"trial {place.trial.number} needs the stimulus {wanted}, not {code}"),)
@@ -110,7 +110,7 @@ def _went_on(state: State, event: steps.Event) -> Step:
             return state, (_refusal(state, event),)
 
 
-def _touched(state: State, event: steps.ContactOnset | steps.FingerLifted | steps.Settled) -> Step:
+def _follow_contact(state: State, event: steps.ContactOnset | steps.FingerLifted | steps.Settled) -> Step:
     match state, event:
         case Ready(place), steps.ContactOnset() if place.plan.forces:
             return Stroking(place.at(place.index)), ()
@@ -134,7 +134,7 @@ def _touched(state: State, event: steps.ContactOnset | steps.FingerLifted | step
             return state, (_refusal(state, event),)
 
 
-def _answered(state: Scoring, answer: AnswerEvent) -> Step:
+def _take_answer(state: Scoring, answer: AnswerEvent) -> Step:
     """Take an answer; the take ends once the finger has been off for a moment, so that what follows it is recorded."""
     place = state.place
     wrong = answer_problem(answer, place.trial.answer)
@@ -158,7 +158,7 @@ def _resting(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -
         case Paused(place, scoring=True, strokes=strokes), steps.Resume():
             return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
         case Paused(place), steps.Resume():
-            before, undone = _pair_undone(place, "a pause parted the two stimuli")
+            before, undone = _undo_pair(place, "a pause parted the two stimuli")
             return Mounting(before), (*undone, steps.AskMount(before.trial))
         case Resting(place), steps.Resume() | steps.RestOver():
             return Mounting(place), _asking_for(place, new_block=place.trial == place.block.trials[0])
@@ -170,28 +170,28 @@ def _again(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
     """Repeat a trial, or undo that; a redo that discards no whole stroke cannot be undone."""
     if isinstance(event, steps.UndoRedo):
         return _redo_undone(state)
-    after, commands = _repeated(state, event.reason)
+    after, commands = _repeat(state, event.reason)
     between_takes = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
     if between_takes and after != state and isinstance(after, Mounting | Taring | Ready):
         after = structs.replace(after, place=replace(after.place, before_redo=state))
     return after, commands
 
 
-def _repeated(state: State, reason: str) -> Step:
+def _repeat(state: State, reason: str) -> Step:
     """Repeat the trial in hand, or the one before where none is in hand yet; the order after it stays as it was."""
     match state:
         case Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
             if place.trial.compared_with is not None:
-                before, undone = _pair_undone(place, reason)
+                before, undone = _undo_pair(place, reason)
                 return Mounting(before), (*_discarding(state, reason), *undone, steps.AskMount(before.trial))
-            after, commands = _take_begun(place)
+            after, commands = _begin_take(place)
             return after, (*_discarding(state, reason), *commands)
         case Mounting(place) if place.take > 0:
             return state, (steps.Refuse(f"trial {place.trial.number} is about to be repeated already"),)
         case Mounting(place) | Resting(place) if place.index > 0:
-            return _taken_up(place.at(place.index - 1), reason)
+            return _return_to(place.at(place.index - 1), reason)
         case Closing(place):
-            return _taken_up(place, reason)
+            return _return_to(place, reason)
         case _:
             return state, (_refusal(state, steps.Redo(reason)),)
 
@@ -213,12 +213,12 @@ def _redo_undone(state: State) -> Step:
         else:
             restored.append(steps.LeaveOut(number, UNDONE))
         then = replace(then.at(index).with_progress(replace(was, takes=takes)), index=then.index)
-    after, commands = _gone_back(structs.replace(before, place=then))
+    after, commands = _go_back(structs.replace(before, place=then))
     return after, (*_discarding(state, UNDONE), *restored, *commands)
 
 
-def _gone_back(before: State) -> Step:
-    """Enter the state that a redo had left; the finger has been off since."""
+def _go_back(before: State) -> Step:
+    """Return to the state from which the trial was redone; the finger has been off since."""
     match before:
         case Scoring(place, strokes=strokes):
             return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
@@ -232,7 +232,7 @@ def _gone_back(before: State) -> Step:
             return before, (steps.AskFinish(),)
 
 
-def _left_out(state: State, reason: str) -> Step:
+def _leave_out(state: State, reason: str) -> Step:
     """Leave the trial in hand out and go on to the next."""
     match state:
         case Mounting(place) | Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
@@ -248,7 +248,7 @@ def _left_out(state: State, reason: str) -> Step:
             return state, (_refusal(state, steps.Skip(reason)),)
 
 
-def _take_begun(place: Place) -> Step:
+def _begin_take(place: Place) -> Step:
     """Open the next take of the trial in hand, its stimulus being on."""
     place = place.with_take(place.progress[place.index].takes + 1)
     begun = steps.StartTake(place.trial.number, place.take)
@@ -277,18 +277,18 @@ def _keep_take(place: Place) -> Step:
     return after, (keep, *commands)
 
 
-def _taken_up(place: Place, reason: str) -> Step:
-    """Return to a trial that was done or left out."""
-    before, undone = _pair_undone(place, reason)
+def _return_to(place: Place, reason: str) -> Step:
+    """Return to an earlier trial, whose kept take is discarded."""
+    before, undone = _undo_pair(place, reason)
     return Mounting(before), (*_undoing(place, reason), *undone, steps.AskMount(before.trial))
 
 
-def _pair_undone(place: Place, reason: str) -> tuple[Place, tuple[steps.Command, ...]]:
+def _undo_pair(place: Place, reason: str) -> tuple[Place, tuple[steps.Command, ...]]:
     """Return to the first of two that are compared, its take discarded; any other place stays as it is, not kept."""
     if place.trial.compared_with is None:
-        return _not_kept(place), ()
-    first = _not_kept(place).at(place.index - 1)
-    return _not_kept(first), _undoing(first, reason)
+        return _without_kept_take(place), ()
+    first = _without_kept_take(place).at(place.index - 1)
+    return _without_kept_take(first), _undoing(first, reason)
 
 
 def _undoing(place: Place, reason: str) -> tuple[steps.Command, ...]:
@@ -296,7 +296,7 @@ def _undoing(place: Place, reason: str) -> tuple[steps.Command, ...]:
     return (steps.DiscardTake(place.trial.number, place.take, reason),) if place.progress[place.index].kept else ()
 
 
-def _not_kept(place: Place) -> Place:
+def _without_kept_take(place: Place) -> Place:
     return place.with_take(place.take)
 
 

@@ -21,7 +21,7 @@ from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings
 from sessions.run.event_log import Step, parts, steps_of
 from sessions.run.resuming import Seam, resumption
-from sessions.run.runner import STOPPED, Ending, Resumed, RunnerSettings, run_session
+from sessions.run.runner import STOPPED, Continuation, Ending, RunnerSettings, run_session
 from sessions.run.steps import Command, Event
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
@@ -307,13 +307,13 @@ def _run(
 
             player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, show)
             writer.follow_part(log)
-            resumed = None if number == 0 else _resumed(recording.plan, writer.log_written, log)
+            resumed = None if number == 0 else _resume_part(recording.plan, writer.log_written, log)
             _run_part(recording.plan, player, writer, resumed)
     finally:
         writer.finish()
 
 
-def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Resumed | None) -> None:
+def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Continuation | None) -> None:
     transducer, settings = player if plan.forces else None, player.settings
     with suppress(_CutShort, _Again):  # as the part ends
         end = run_session(plan, writer, player, transducer, settings=settings, resumed=resumed, stop=player.go_on)
@@ -321,23 +321,23 @@ def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Re
             raise Stopped
 
 
-def _resumed(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Resumed:
-    """Return how a part goes on after those before it, as they came out in the replay."""
+def _resume_part(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Continuation:
+    """Return where a part of the session continues, after the parts that are replayed already."""
     resumed = next(event.data for event in log if event.kind == "resumed")
     seams = [event.data for event in log if event.kind == "readings_joined"]
 
     def joins(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
-        return _JoinedBefore(**seams[0]) if seams else _JoinedBefore(0, 0.0)
+        return _RecordedSeam(**seams[0]) if seams else _RecordedSeam(0, 0.0)
 
     data = {name: value for name, value in resumed.items() if name != "run"}
-    return Resumed(resumption(plan, before), data, ReadingBlock.empty(), joins)
+    return Continuation(resumption(plan, before), data, ReadingBlock.empty(), joins)
 
 
 @dataclass(frozen=True, slots=True)
-class _JoinedBefore(Seam):
-    """A seam whose readings were recorded as they go on."""
+class _RecordedSeam(Seam):
+    """A seam in a recording, whose readings are continuous already."""
 
-    def joined(self, block: ReadingBlock) -> ReadingBlock:
+    def join(self, block: ReadingBlock) -> ReadingBlock:
         return block
 
 

@@ -14,7 +14,7 @@ from sessions.plan.plan import SessionPlan
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.head import calibration_hash
 from sessions.run.event_log import Line, event_of, line_of
-from sessions.run.machine import advance, interrupted, start
+from sessions.run.machine import advance, resume_interrupted, start
 from sessions.run.states import State
 from sessions.run.steps import Command, Refuse
 
@@ -57,8 +57,8 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
         elif line in owed:
             owed.remove(line)
         elif logged.kind in ("take_discarded", "resumed"):  # by the end of an earlier part, or by its resumption
-            state, _ = interrupted(state, CUT_SHORT)
-    state, commands = interrupted(state, CUT_SHORT)
+            state, _ = resume_interrupted(state, CUT_SHORT)
+    state, commands = resume_interrupted(state, CUT_SHORT)
     due = _of_takes(commands)
     pending = tuple(command for command in commands if line_of(command) not in due)
     return Resumption(state, (*owed, *due), pending)
@@ -129,8 +129,8 @@ class Gap:
     resumed_utc: str
 
 
-def continued(recording: Recording, last: ReadingBlock, clock: Clock, now: datetime) -> tuple[ContinuedClock, Gap]:
-    """Return the session's clock going on, and the gap.
+def continue_clock(recording: Recording, last: ReadingBlock, clock: Clock, now: datetime) -> tuple[ContinuedClock, Gap]:
+    """Return a clock that continues the session's, and the gap between.
 
     `last` holds the last readings (or none), `now` is the date. The session clock goes on from its last instant by as
     much as the wall clock says has passed, a second more or less: no two clocks of a computer survive its restart.
@@ -171,8 +171,8 @@ class Seam:
             float(before.time[-1]) + passed - float(after.time[0]),
         )
 
-    def joined(self, block: ReadingBlock) -> ReadingBlock:
-        """Return the readings as they go on; raw numbers, counter and status stay what the device said."""
+    def join(self, block: ReadingBlock) -> ReadingBlock:
+        """Return the readings with continuous numbers and times; raw values, counter and status stay the device's."""
         return replace(block, sequence=block.sequence + self.sequence_offset, time=block.time + self.time_offset)
 
 

@@ -49,8 +49,8 @@ class RunnerSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Resumed:
-    """How a session that was cut short goes on."""
+class Continuation:
+    """Where a session that was cut short continues, and the readings before it."""
 
     at: Resumption
     data: Mapping[str, Any]  # of the event `resumed`
@@ -89,7 +89,7 @@ def run_session(
     transducer: Transducer | None,
     *,
     settings: RunnerSettings | None = None,
-    resumed: Resumed | None = None,
+    resumed: Continuation | None = None,
     stop: Callable[[], Ending | None] = lambda: None,
     progress: Callable[[Status], None] = lambda _: None,
 ) -> SessionEnd:
@@ -125,13 +125,13 @@ class _Run:
         self._state, self._first_commands = start(self.plan)
         self._watch: TakeWatch | None = None
         self._readings = self.writer.acknowledged.readings
-        self._resumed: Resumed | None = None
+        self._resumed: Continuation | None = None
         self._seam: Seam | None = None
         self._reported = Health()
         self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), self.clock.now_ns())
         self._rested_ns: int | None = None  # when the rest is over [session clock]
 
-    def go_on(self, resumed: Resumed) -> None:
+    def go_on(self, resumed: Continuation) -> None:
         """Begin where a session that was cut short left off."""
         self._resumed = resumed
         self._state, self._first_commands = resumed.at.state, resumed.at.commands
@@ -141,7 +141,7 @@ class _Run:
         try:
             self._write_beginning()
             if self.transducer is not None:
-                with interrupted.raised():  # a device that does not answer may take its time
+                with interrupted.raise_at_once():  # a device that does not answer may take its time
                     self.transducer.start()
             cause, reason = self._go_round(lambda: ("stopped", STOPPED) if interrupted.heard else stop())
         except (LinkLost, DeviceFault, SetupError) as error:
@@ -210,7 +210,7 @@ class _Run:
         if self._seam is None:
             self._seam = self._resumed.joins(self._resumed.last, block)
             self.writer.event("readings_joined", data=asdict(self._seam), commit=False)
-        return self._seam.joined(block)
+        return self._seam.join(block)
 
     def _keep(self, block: ReadingBlock) -> None:
         self.writer.readings(block)

@@ -160,8 +160,8 @@ def steiger_z(first: float, second: float, mutual: float, n: int) -> float | Non
     return (math.atanh(first) - math.atanh(second)) * math.sqrt((n - 3) / error)
 
 
-def cases_needed(first: float, second: float, mutual: float) -> int | None:
-    """Return how many cases give Steiger's test at p < 0.05 its `POWER` where the correlations are these.
+def required_cases(first: float, second: float, mutual: float) -> int | None:
+    """Return how many cases Steiger's test needs to tell these correlations apart at p < 0.05 with `POWER`.
 
     None where no number of cases would: the correlations are equal, or the test has no value.
     """
@@ -199,7 +199,7 @@ def partial_correlation(xy: ArrayLike, xz: ArrayLike, yz: ArrayLike) -> NDArray[
     return np.clip(partial, -1.0, 1.0)
 
 
-def left_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
+def leave_one_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
     """Return the root mean square error of each y by the least-squares line on x through the others [unit of y].
 
     The residual over 1 less its leverage (Allen 1974, Technometrics 16:125). None where the others fix no line.

@@ -63,8 +63,8 @@ class ConstantStimuli:
 
 
 @dataclass(frozen=True, slots=True)
-class Normalised:
-    """Statistics of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
+class NormalisedScores:
+    """Statistics of scores that are standardised within each subject, to mean 0 and standard deviation 1."""
 
     means: Mapping[int, Average]  # by index
     mean_relation: Relation | None
@@ -102,7 +102,7 @@ class DescriptorFindings:
     rivals: tuple[Rival, ...]  # within subjects: the response, and what else follows a subject's scores
     rivals_of_means: tuple[Rival, ...]  # likewise of the means over subjects
     without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
-    normalised: Normalised
+    normalised: NormalisedScores
     differences: tuple[Difference, ...]
     estimates: Estimates | None
     exponent: Exponent | None  # of magnitude estimates by the µ that the model got; None where nobody gave any
@@ -121,8 +121,8 @@ class DescriptorFindings:
 
 
 @dataclass(frozen=True, slots=True)
-class Recovered:
-    """One planted effect beside what the study found."""
+class EffectRecovery:
+    """One planted effect beside the study's estimate of it."""
 
     descriptor: str
     effect: str
@@ -169,7 +169,7 @@ class StudyFindings:
     excluded: tuple[Exclusion, ...]
     reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
     descriptors: tuple[DescriptorFindings, ...]
-    effects: tuple[Recovered, ...]  # planted, where the study is synthetic
+    effects: tuple[EffectRecovery, ...]  # planted, where the study is synthetic
     friction: PlantedFriction | None
     flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
     synthetic: int | None = None  # the seed, where it is
@@ -227,7 +227,7 @@ class Spoilt:
     expected: str  # what the analysis should say
 
 
-class _Planted(msgspec.Struct):
+class _GroundTruth(msgspec.Struct):
     score: _Score
     people: _People
     strokes: list[_Stroke]
@@ -237,24 +237,26 @@ class _Planted(msgspec.Struct):
     seed: int | None = None
 
 
-def checked_planted(planted: object) -> dict[str, Any]:
-    """Return what was planted in a study, as its file holds it. Raises ValueError where it is nothing of the kind."""
-    msgspec.convert(planted, _Planted)
+def check_ground_truth(planted: object) -> dict[str, Any]:
+    """Return a study's ground truth as its file holds it. Raises ValueError where it has another form."""
+    msgspec.convert(planted, _GroundTruth)
     return cast("dict[str, Any]", planted)
 
 
-def planted_effects(descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
+def planted_effects(
+    descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]
+) -> tuple[EffectRecovery, ...]:
     """Return the planted effects on the score, and spreads, beside what the study finds of them.
 
     `planted["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
     """
-    rows: list[Recovered] = []
+    rows: list[EffectRecovery] = []
     for one in descriptors:
         rows += [*_slopes(one, planted["score"]), *_with_sed(one, planted), *_spreads(one, planted)]
     return tuple(rows)
 
 
-def _slopes(one: DescriptorFindings, score: Mapping[str, Any]) -> list[Recovered]:
+def _slopes(one: DescriptorFindings, score: Mapping[str, Any]) -> list[EffectRecovery]:
     slopes = {
         INDEX: score["gain"],
         FRICTION: score.get("friction", {}).get(one.descriptor, 0.0),
@@ -263,11 +265,13 @@ def _slopes(one: DescriptorFindings, score: Mapping[str, Any]) -> list[Recovered
     }
     terms = () if isinstance(one.on_friction, str) else one.on_friction.terms
     return [
-        Recovered(one.descriptor, t.name, slopes[t.name], t.estimate, t.low, t.high) for t in terms if t.name in slopes
+        EffectRecovery(one.descriptor, t.name, slopes[t.name], t.estimate, t.low, t.high)
+        for t in terms
+        if t.name in slopes
     ]
 
 
-def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
+def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[EffectRecovery]:
     people = planted.get("people")
     if not people:
         return []
@@ -282,18 +286,18 @@ def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recove
         (NOISE, people["judgement_noise"], left),
         (FINGERS, moisture, one.fingers),
     )
-    return [Recovered(one.descriptor, name, sd, s.sd, s.low, s.high) for name, sd, s in spreads if s is not None]
+    return [EffectRecovery(one.descriptor, name, sd, s.sd, s.low, s.high) for name, sd, s in spreads if s is not None]
 
 
-def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
+def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[EffectRecovery]:
     """Return how scores go with SEDs among people at large on these surfaces, beside the intervals for such people."""
     relation = planted.get("relation", {}).get(one.descriptor)
     if relation is None or one.repeated is None or one.repeated.people is None:
         return []
-    rows = [Recovered(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
+    rows = [EffectRecovery(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
     if not isinstance(one.on_response, str):
         term = one.on_response.term(SED_TERM)
-        rows.append(Recovered(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
+        rows.append(EffectRecovery(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
     return rows
 
 

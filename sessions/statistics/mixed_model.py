@@ -87,7 +87,7 @@ class _Sums:
         across = np.array([rows[:, :own].T @ rows for rows in each])
         return _Sums(len(y), all_of.T @ all_of, across[:, :, :own], across, offset)
 
-    def _reduced(self, at: Array) -> tuple[Array, Array, Array, float]:
+    def _reduce(self, at: Array) -> tuple[Array, Array, Array, float]:
         """Return the factor (q, q), columns weighted by the inverse covariance, and half the log of its determinant."""
         q = self.among.shape[1]
         factor = np.zeros((q, q))
@@ -100,7 +100,7 @@ class _Sums:
 
     def criterion(self, at: Array) -> tuple[float, Array]:
         """Return half the restricted deviance, and its gradient by the factor's lower triangle."""
-        factor, total, across, spread = self._reduced(at)
+        factor, total, across, spread = self._reduce(at)
         q, p = len(factor), len(self.offset)
         root: Array = linalg.cholesky(total[:p, :p], lower=True)
         beta: Array = linalg.cho_solve((root, True), total[:p, p])
@@ -116,7 +116,7 @@ class _Sums:
 
     def fit(self, at: Array) -> Fit:
         """Return what the factor says."""
-        factor, total, _, _ = self._reduced(at)
+        factor, total, _, _ = self._reduce(at)
         p = len(self.offset)
         inverse = np.linalg.inv(total[:p, :p])
         beta = inverse @ total[:p, p]

@@ -115,10 +115,10 @@ def trial_paths(
     for path in paths:
         if path.receptor == RECEPTORS[0]:
             kind = replace(steady, kinematics=path.kinematics)
-            scenes[path] = scenes_of(_varied(analyses, path, usual), recording.plan, kind)
+            scenes[path] = scenes_of(_analysis_of_path(analyses, path, usual), recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
     known = [row.prediction for row in prediction.trials if row.prediction is not None]
-    answers = _solved(tuple(wanted), known, quantity, progress)
+    answers = _solve_scenes(tuple(wanted), known, quantity, progress)
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
 
     def value(trial: int, path: Path) -> float | None:
@@ -141,7 +141,7 @@ def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysi
     return {case: analyse(recording, settings(*case)) for case in cases}
 
 
-def _varied(
+def _analysis_of_path(
     analyses: Mapping[tuple[str, str, AreaLaw], Analysis],
     path: Path,
     usual: Mapping[int | None, FrictionParameters],
@@ -160,7 +160,7 @@ def _varied(
     return replace(analysis, friction=tuple(friction))
 
 
-def _solved(
+def _solve_scenes(
     scenes: Sequence[Scene], known: Sequence[Prediction], quantity: Quantity, progress: Progress | None
 ) -> Mapping[Scene, Pair | None]:
     """Return a quantity over the ending and at its middle of each scene, None where it has no settled state.

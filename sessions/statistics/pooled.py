@@ -18,7 +18,7 @@ from sessions.statistics.findings import (
     ConstantStimuli,
     DescriptorFindings,
     Estimates,
-    Normalised,
+    NormalisedScores,
     StudyFindings,
     SurfaceMean,
     planted_effects,
@@ -52,7 +52,7 @@ from sessions.statistics.scores import (
     score_matrix,
     surface_means,
 )
-from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions, decided, scores_of
+from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions, exclusion_of, scores_of
 from sessions.statistics.within_subjects import (
     Table,
     agreement,
@@ -67,7 +67,7 @@ from sessions.statistics.within_subjects import (
 Trials = Sequence[tuple[Visit, TrialRow]]
 
 
-def pooled(
+def pool_visits(
     visits: Sequence[Visit],
     failed: Sequence[tuple[str, str]] = (),
     exclusions: tuple[Exclusion, ...] = (),
@@ -75,7 +75,7 @@ def pooled(
     options: VisitOptions | None = None,
     quantity: Quantity = SED,
 ) -> StudyFindings:
-    """Return what the visits say together; they count in the order of their names, whoever read them first.
+    """Return the findings of all visits together, which are taken in the order of their names.
 
     `options` is what was asked of each visit, `quantity` that response of the model which is held against scores.
     `planted` is what a synthetic study tells of itself: handed in, used for nothing but the comparison.
@@ -84,7 +84,7 @@ def pooled(
     same = by_key((visit.sha256, visit.session) for visit in ordered if visit.sha256)
     copies = {session: first for first, *more in same.values() for session in more}
     counted = [visit for visit in ordered if visit.session not in copies]
-    kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
+    kept = [(v, row) for v in counted for row in v.rows if exclusion_of(exclusions, v.subject, row.descriptor) is None]
     tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
     chosen = options or VisitOptions()
     descriptors = _with_holm(
@@ -141,13 +141,13 @@ def _descriptor(
         surfaces=tuple(_surface(i, quantity.name, [(v, r) for v, r in trials if r.index == i]) for i in indices),
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=plain,
-        mean_relation=_related(plain),
+        mean_relation=_relation(plain),
         repeated=repeated_correlation([p[0] for p in plain], [p[2] for p in plain], [p[3] for p in plain]),
         repeated_holm=None,
         rivals=rivals_within(competing, quantity.label),
         rivals_of_means=rivals_of_surfaces(competing, quantity.label),
         without_subject=_without_subject([(subject, x, score) for subject, _, x, score in plain]),
-        normalised=_normalised(z_scores(matrix), plain),
+        normalised=_normalise(z_scores(matrix), plain),
         differences=differences(matrix),
         estimates=estimates(trials, quantity.name),
         exponent=exponent(trials),
@@ -228,7 +228,7 @@ def _surface(index: int, quantity: str, trials: Trials) -> SurfaceMean:
     return SurfaceMean(index, 0 if response is None else response.n, mu, response, normal, model, depth)
 
 
-def _related(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
+def _relation(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
     """Return how mean scores go with mean responses, of points that have both: subject, index, response and score."""
     responses = surface_means([(subject, index, x) for subject, index, x, _ in points])
     scores = surface_means([(subject, index, score) for subject, index, _, score in points])
@@ -247,11 +247,11 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
     return tuple(rows)
 
 
-def _normalised(table: Table, points: Sequence[tuple[str, int, float, float]]) -> Normalised:
-    """Return what scores say that were standardised; `points` are subject, index, response to its own stroke, score."""
+def _normalise(table: Table, points: Sequence[tuple[str, int, float, float]]) -> NormalisedScores:
+    """Return statistics of standardised scores; `points` are subject, index, response to its own stroke, score."""
     pairs = [(subject, i, x, table[subject][i]) for subject, i, x, _ in points if i in table.get(subject, {})]
     within = repeated_correlation([p[0] for p in pairs], [p[2] for p in pairs], [p[3] for p in pairs])
-    return Normalised(_averages(table), _related(pairs), within)
+    return NormalisedScores(_averages(table), _relation(pairs), within)
 
 
 def _averages(table: Table) -> dict[int, Average]:

@@ -23,8 +23,8 @@ FRICTION = (0.24, 0.67)  # least and greatest µ of the published surfaces
 
 
 @dataclass(frozen=True, slots=True)
-class Planted:
-    """What is planted. Nobody measured the usual values: a pilot's mixed model gives a lab's own."""
+class PlantedEffects:
+    """Effect and spreads of simulated scores. The default values are not measured: a pilot's mixed model gives them."""
 
     effect: float = 20.0  # of the mean score, from the least to the greatest µ [0–100]
     noise: float = 12.0  # standard deviation of a score about its subject's line [0–100]
@@ -55,7 +55,7 @@ class Power:
 
 
 def power(
-    planted: Planted,
+    planted: PlantedEffects,
     subjects: Sequence[int],
     surfaces: Sequence[int],
     studies: int,
@@ -79,7 +79,9 @@ def power(
     return out
 
 
-def _study(planted: Planted, people: int, count: int, rng: np.random.Generator) -> tuple[list[str], Array, Array]:
+def _study(
+    planted: PlantedEffects, people: int, count: int, rng: np.random.Generator
+) -> tuple[list[str], Array, Array]:
     """Return subject, µ as measured and score of each trial."""
     mu = np.linspace(*FRICTION, count)
     own = mu * np.exp(rng.normal(0.0, planted.friction_sd, (people, count)))
@@ -138,7 +140,7 @@ def recovery(
     """Return how often studies of so many of the people in `strokes` prefer the planted quantity."""
     surfaces = strokes[planted].shape[1] // len(depths)
     weights = [study_weights(strokes, people, surfaces, planted, judgement, draw) for _ in range(studies)]
-    alike, first = twins(strokes, planted), preferred(weights)
+    alike, first = twins(strokes, planted), preferred_rivals(weights)
     shares = first.count(planted) / studies, sum(name in alike for name in first) / studies
     return Recovery(people, surfaces, depths, planted, tuple(sorted(alike - {planted})), *shares, studies)
 
@@ -175,7 +177,7 @@ def study_weights(
     return dict(zip(known_deviances, akaike_weights(list(known_deviances.values())), strict=True))
 
 
-def preferred(weights: Sequence[Mapping[str, float]]) -> list[str]:
+def preferred_rivals(weights: Sequence[Mapping[str, float]]) -> list[str]:
     """Return the rival of the greatest weight in each study."""
     return [max(one, key=one.__getitem__) for one in weights]
 

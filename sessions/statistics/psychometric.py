@@ -198,7 +198,7 @@ class _Task:
         low, high = np.array(bounds).T / self.scale
         begin = np.clip(start / self.scale, low, high)
 
-        def lost(scaled: Array) -> tuple[float, Array]:
+        def loss(scaled: Array) -> tuple[float, Array]:
             value, slope = self._log_likelihood(scaled * self.scale)
             theta = float(scaled[_SCATTER] * self.scale[_SCATTER])
             more, by_theta = self._adjustment(theta) if adjusted else (0.0, 0.0)
@@ -207,7 +207,7 @@ class _Task:
 
         ends = list(zip(low, high, strict=True))
         optimum = optimize.minimize(
-            lost, begin, jac=True, method="L-BFGS-B", bounds=ends, options={"ftol": precision, "gtol": 1e-9}
+            loss, begin, jac=True, method="L-BFGS-B", bounds=ends, options={"ftol": precision, "gtol": 1e-9}
         )
         return np.asarray(optimum.x, np.float64) * self.scale, -float(optimum.fun)
 

@@ -10,13 +10,13 @@ from sessions.prediction import BY_NAME, SED
 from sessions.statistics.correlations import (
     TAILS,
     Contrast,
-    cases_needed,
     contrast,
     fisher_interval,
-    left_out_error,
+    leave_one_out_error,
     partial_correlation,
     pearson,
     relation,
+    required_cases,
     spearman,
 )
 from sessions.statistics.mixed_model import Array, akaike_weights, crossed_deviance
@@ -84,7 +84,7 @@ def rivals_of_means(
     """
     if model not in series:
         return ()
-    return tuple(_of_means(name, model, scores, series) for name in _ordered(model) if name in series)
+    return tuple(_of_means(name, model, scores, series) for name in _model_first(model) if name in series)
 
 
 def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
@@ -107,7 +107,7 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Riv
     on these very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
     """
     counted = [trial for trial in trials if model in trial.values]
-    names = [name for name in _ordered(model) if any(name in trial.values for trial in counted)]
+    names = [name for name in _model_first(model) if any(name in trial.values for trial in counted)]
     if not counted:
         return ()
     deviances = {name: _deviance(name, counted) for name in names}
@@ -122,7 +122,7 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Riv
     )
 
 
-def _ordered(model: str) -> tuple[str, ...]:
+def _model_first(model: str) -> tuple[str, ...]:
     return (model, *(name for name in NAMES if name != model))
 
 
@@ -130,14 +130,14 @@ def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mappin
     used = [name, model, *([MODEL_MU] if MODEL_MU in series else [])]
     own = [index for index in scores if index in series[name]]
     x, y = [series[name][i] for i in own], [scores[i] for i in own]
-    related, error = relation(x, y, own), left_out_error(x, y)
+    related, error = relation(x, y, own), leave_one_out_error(x, y)
     rival = Rival(name, len(own), related.pearson, related.low, related.high, left_out_error=error)
     rival = _because(rival, r=related.reason, left_out_error=_NO_LINE if error is None else None)
     shared = [i for i in scores if all(i in series[one] for one in used)]
     score = [scores[i] for i in shared]
     values = {one: [series[one][i] for i in shared] for one in used}
     if name != model:
-        rival = _compared(rival, values[model], values[name], score)
+        rival = _compare(rival, values[model], values[name], score)
     if MODEL_MU not in used or name == MODEL_MU:
         return _because(rival, partial="µ itself is given")
     xy, xz, yz = pearson(values[name], score), pearson(values[name], values[MODEL_MU]), pearson(score, values[MODEL_MU])
@@ -148,7 +148,7 @@ def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mappin
     return replace(rival, partial=partial, partial_low=low, partial_high=high)
 
 
-def _compared(rival: Rival, model: Sequence[float], values: Sequence[float], score: Sequence[float]) -> Rival:
+def _compare(rival: Rival, model: Sequence[float], values: Sequence[float], score: Sequence[float]) -> Rival:
     """Return the rival with its difference from the model's quantity, over the surfaces that have both."""
     first, second, mutual = pearson(model, score), pearson(values, score), pearson(model, values)
     rho = spearman(model, values)
@@ -159,7 +159,7 @@ def _compared(rival: Rival, model: Sequence[float], values: Sequence[float], sco
         rival,
         contrast=contrast(first, second, mutual, len(score)),
         same_order=abs(rho) > 1 - 1e-12,
-        needed=cases_needed(abs(first), abs(second), turned * mutual),
+        needed=required_cases(abs(first), abs(second), turned * mutual),
     )
     return _because(rival, contrast=None if rival.contrast else "no test from these few surfaces, or of a perfect r")
 
@@ -168,7 +168,7 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     used = [*dict.fromkeys((name, model, MODEL_MU))]
     mine = [trial for trial in trials if name in trial.values]
     x, y = [trial.values[name] for trial in mine], [trial.score for trial in mine]
-    related, error = repeated_correlation([trial.subject for trial in mine], x, y), _left_out_surface(mine, name)
+    related, error = repeated_correlation([trial.subject for trial in mine], x, y), _leave_surface_out_error(mine, name)
     low, high = (related.people if related is not None else None) or (None, None)
     rival = Rival(name, len(mine), None if related is None else related.r, low, high, left_out_error=error)
     no_r = "too few trials within subjects, or no variation" if related is None else None
@@ -224,8 +224,8 @@ def _percentiles(values: Array) -> tuple[float, float]:
     return low, high
 
 
-def _left_out_surface(trials: Sequence[RivalTrial], name: str) -> float | None:
-    """Return the error of the scores of each surface by subjects' levels and one slope, both fitted to the others."""
+def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float | None:
+    """Return the error of each surface's scores by levels of subjects and one slope, fitted to the other surfaces."""
     subjects, whose = np.unique([trial.subject for trial in trials], return_inverse=True)
     surfaces = np.array([trial.index for trial in trials])
     x, y = np.array([trial.values[name] for trial in trials]), np.array([trial.score for trial in trials])

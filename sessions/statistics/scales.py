@@ -88,7 +88,7 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") ->
         return replace(none, reason="there are no two surfaces to compare")
     counts = _counts(choices, indices, subjects)
     whole = counts.sum(axis=0)
-    if unbounded := _unbounded(whole, indices):
+    if unbounded := _why_unbounded(whole, indices):
         return replace(none, reason=unbounded)
     fitted = _fit(whole, model)
     if fitted is None:
@@ -136,8 +136,8 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
     return out
 
 
-def _unbounded(counts: Array, indices: Sequence[int]) -> str:
-    """Return why the values would be without bound, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
+def _why_unbounded(counts: Array, indices: Sequence[int]) -> str:
+    """Return why the values have no bound, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
     met, chosen = counts
     beaten = chosen + (met - chosen).T  # [a, b]: how often a was chosen and b was not
     groups, label = csgraph.connected_components(beaten > 0, directed=True, connection="strong")
@@ -199,7 +199,7 @@ def _bootstrap(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
     drawn = np.random.default_rng(0).multinomial(subjects, np.full(subjects, 1.0 / subjects), RESAMPLES)
     totals = np.tensordot(drawn.astype(np.float64), counts, axes=1)
     indices = range(counts.shape[2])
-    fits = [None if _unbounded(total, indices) else _fit(total, model, begin) for total in totals]
+    fits = [None if _why_unbounded(total, indices) else _fit(total, model, begin) for total in totals]
     scales = [fit for fit in fits if fit is not None]
     lost = RESAMPLES - len(scales)
     if lost > MOST_LOST * RESAMPLES:
@@ -308,7 +308,7 @@ def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, Inte
     if len(whole) < LEAST_SUBJECTS or len(indices) < 2:
         return {}
     cells = np.array([[np.mean(cell) for cell in row] for row in whole])
-    answered = _Answered(
+    answered = _AnswerTable(
         cells - cells.mean(axis=1, keepdims=True),
         np.array([[float(len(cell)) for cell in row] for row in whole]),
         np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in whole]),
@@ -338,7 +338,7 @@ def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float])
     return out
 
 
-class _Answered(NamedTuple):
+class _AnswerTable(NamedTuple):
     """The answers of s subjects to k surfaces."""
 
     cells: Array  # (s, k) means of repeats, each subject's own mean taken away

@@ -110,11 +110,11 @@ def score_table(recording: "Recording") -> ScoreTable:
         for record in recording.trials
         if record.score is not None and record.trial.phase == "main"
     )
-    return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores, _left_out(recording))
+    return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores, _other_answers(recording))
 
 
-def _left_out(recording: "Recording") -> str:
-    """Say which answers of a session are no scores on the line."""
+def _other_answers(recording: "Recording") -> str:
+    """Return a sentence on the answers of a session that are no scores on the line; empty where there are none."""
     numbers = sum(record.number is not None for record in recording.trials)
     choices = sum(record.choice is not None for record in recording.trials)
     if not numbers and not choices:

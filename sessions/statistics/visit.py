@@ -56,8 +56,8 @@ def exclusions_in(folder: Path) -> tuple[Exclusion, ...]:
     return load_toml(path, Exclusions).exclude if path.is_file() else ()
 
 
-def decided(exclusions: tuple[Exclusion, ...], subject: str, descriptor: str) -> Exclusion | None:
-    """Return the decision that leaves a subject's trials on a descriptor out, None where there is none."""
+def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: str) -> Exclusion | None:
+    """Return the decision that excludes a subject's trials on a descriptor, None where there is none."""
     return next((e for e in exclusions if e.subject == subject and e.descriptor in ("", descriptor)), None)
 
 

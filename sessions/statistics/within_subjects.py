@@ -104,13 +104,13 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     t = r * math.sqrt(dof / (1.0 - r * r))
     p = 2.0 * float(special.stdtr(dof, -abs(t)))
     xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
-    people, people_p = _jackknifed(xy, xx, yy) or (None, None)
+    people, people_p = _jackknife(xy, xx, yy) or (None, None)
     half = t_quantile(math.inf) / math.sqrt(dof - 1)
     low, high = (math.tanh(math.atanh(r) + step) for step in (-half, half))
     return RepeatedCorrelation(r, low, high, p, dof, k, people, people_p)
 
 
-def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], float] | None:
+def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], float] | None:
     """Return the jackknife's interval of r, and its p, from each subject's sums (k).
 
     None of two subjects, or where r is ±1 without one of them.

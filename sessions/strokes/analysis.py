@@ -104,7 +104,7 @@ def analyse(
     analysis = _without_intervals(main if recording.plan.blocks else [(None, recording.readings())], context, losses)
     presses = _without_intervals(warm_up, context._replace(decisions=Decisions()), ()).presses + analysis.presses
     analysis = replace(analysis, simulated=recording.simulated, presses=presses)
-    return _with_intervals(replace(analysis, flaws=(*analysis.flaws, *_tilt_assumed(analysis))))
+    return _with_intervals(replace(analysis, flaws=(*analysis.flaws, *_assumed_tilt_flaw(analysis))))
 
 
 def analyse_blocks(
@@ -162,7 +162,7 @@ def _with_intervals(analysis: Analysis) -> Analysis:
     return replace(analysis, strokes=strokes, friction=friction, intervals=intervals)
 
 
-def _tilt_assumed(analysis: Analysis) -> Iterable[Flaw]:
+def _assumed_tilt_flaw(analysis: Analysis) -> Iterable[Flaw]:
     """Yield the note that too few presses measure the tilt, where friction depends on it."""
     count, fewest = len(analysis.presses), analysis.settings.press.press_fewest
     if count < fewest and any(stroke.mu_dynamic is not None for stroke in analysis.strokes):

@@ -229,7 +229,7 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     no force beside a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
     """
     inside = slice(contact.start, contact.stop)
-    force = np.maximum(_bridged(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
+    force = np.maximum(_bridge_gaps(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
     places, prominences = peaks(padded)
     standing = places[prominences >= (1.0 - settings.contact.valley) * padded[places]] - 1
@@ -244,7 +244,7 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     return tuple(_piece(contact, start, stop, time, normal, settings) for start, stop in pairwise(bounds))
 
 
-def _bridged(time: Array, force: Array, longest: float) -> Array:
+def _bridge_gaps(time: Array, force: Array, longest: float) -> Array:
     """Return forces (n,) [N] with straight lines in place of nan; 0 where a line would cross a gap of `longest` [s]."""
     finite = np.flatnonzero(np.isfinite(force))
     if not len(finite):

@@ -45,7 +45,7 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
         return slice(int(first[best]), int(last[best]))
     around = np.flatnonzero(steady & (first <= first[best]) & (last >= last[best]))
     best = around[np.lexsort((variance[around], -length[around]))[0]]
-    return _trimmed(ratio, slice(int(first[best]), int(last[best])), settings)
+    return _trim(ratio, slice(int(first[best]), int(last[best])), settings)
 
 
 def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Places, Places, Array, Mask]:
@@ -84,8 +84,8 @@ def _least(length: Places, variance: Array, steady: Mask, shortest: float, grid:
     return int(alike[np.argmin(variance[alike])])
 
 
-def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
-    """Return the window without ends that lie off its median: a quarter's mean hides the end of a ramp."""
+def _trim(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
+    """Return the window without those ends that lie off its median; a mean over a quarter hides the end of a ramp."""
     part = ratio[window]
     level = float(np.nanmedian(part))
     scatter = 1.4826 * float(np.nanmedian(np.abs(part - level)))
@@ -214,7 +214,7 @@ def _rest(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple
                 "torques and the face's height; nothing shows that the contact slides, so no friction is given."
             )
         if way > max(limits.shear, limits.shear_steps * step):
-            return _rolled(track, uncut, float(np.nanmean(track.ratio[window])))
+            return _roll_flaw(track, uncut, float(np.nanmean(track.ratio[window])))
     moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
@@ -222,8 +222,8 @@ def _rest(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple
     )
 
 
-def _rolled(track: Track, uncut: Track, level: float) -> tuple[FlawName, str] | None:
-    """Say that the centre of pressure moves no further than a finger rolls, or None where it does.
+def _roll_flaw(track: Track, uncut: Track, level: float) -> tuple[FlawName, str] | None:
+    """Return the flaw of a centre of pressure that moves no further than a finger rolls; None where it moves further.
 
     It counts over the `uncut` contact, turns included, and only where T/N lies about its `level` in the steady window:
     a contact slips nowhere below that.

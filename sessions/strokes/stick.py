@@ -111,7 +111,7 @@ class ClimbReadings:
             normal, right = slopes.T @ slopes, slopes.T @ (self.ratio - climb.at(self.time))
             numbers = np.array(climb)
             numbers[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
-            new = self._bounded(numbers)
+            new = self._feasible_climb(numbers)
             left = self.mean_square(new)
             if left < least:
                 gain, climb, least, damping = least - left, new, left, damping / 10.0
@@ -153,8 +153,8 @@ class ClimbReadings:
         heights = np.linalg.lstsq(columns, self.ratio, rcond=None)[0].tolist()
         return Climb(*kind[:4], *heights, *([] if fall > 0.0 else [0.0]))
 
-    def _bounded(self, numbers: Array) -> Climb:
-        """Return the climb of seven numbers, brought to where it can be fitted."""
+    def _feasible_climb(self, numbers: Array) -> Climb:
+        """Return the climb of seven numbers, clipped to the limits of the fit."""
         begins, meets, bend, fall, rest, rise, peak = numbers.tolist()
         few, t = self.settings.climb_fewest, self.time
         meets = float(np.clip(meets, t[few], t[-few - 1]))

@@ -191,7 +191,7 @@ class Findings:
         for number in withheld:
             self.reasons.setdefault(number, str(name))
 
-    def allowed(self, names: tuple[str, ...]) -> Mapping[str, Any]:
+    def numbers_or_none(self, names: tuple[str, ...]) -> Mapping[str, Any]:
         """Return the numbers under these names, None for those that are missing or forbidden."""
         return {name: None if name in self.reasons else self.numbers.get(name) for name in names}
 

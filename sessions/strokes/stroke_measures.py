@@ -63,9 +63,9 @@ def measure_stroke(
             _static_peak(findings, track, window, zero, turned=contact.start in contact.reversals)
             _break_away(findings, track, window)
             _judge_way(findings, track, window)
-        _take_decided(findings, track, decided)
+        _apply_decisions(findings, track, decided)
         _judge_drift(findings, zero, track.settings.zero)
-    numbers = dict(findings.allowed(EVERYTHING))
+    numbers = dict(findings.numbers_or_none(EVERYTHING))
     if trial is not None and numbers["direction"] not in (None, trial.direction):
         way = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
         sentence = f"The finger moved the other way than the trial asks ({way})."
@@ -311,8 +311,8 @@ def _break_away(findings: Findings, track: Track, window: slice) -> None:
         findings.reasons["break_away"] = _SLIDES_BEFORE
 
 
-def _take_decided(findings: Findings, track: Track, decided: StrokeDecisions) -> None:
-    """Give the stick phase and the direction that a person decided."""
+def _apply_decisions(findings: Findings, track: Track, decided: StrokeDecisions) -> None:
+    """Set the stick phase and the direction that a person decided."""
     stick = decided.value("stick")
     if stick is not None:
         inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]

@@ -13,10 +13,10 @@ from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
 from sessions.report import experiments, with_psychometric
 from sessions.report.tables.scales import (
-    compared_in_study,
-    compared_with_standard,
     psychometric_sentences,
     psychometric_table,
+    session_functions,
+    study_functions,
 )
 from sessions.statistics.pooled import constant_stimuli
 from sessions.statistics.psychometric import QUARTILE
@@ -56,10 +56,10 @@ def test_the_function_of_a_session_holds_what_was_planted_in_the_subject(recordi
         assert function.jnd.low < QUARTILE * planted.discrimination < (function.jnd.high or 9.0)
         assert function.lapse.low <= planted.lapse <= function.lapse.high
     report = SimpleNamespace(experiments=found)
-    shown = psychometric_table(compared_with_standard(report))
+    shown = psychometric_table(session_functions(report))
     assert [group.name for group in shown.groups] == ["friction, pushed", "friction, pulled"]
     assert shown.groups[0].rows[0][1].text == "40"
-    said = psychometric_sentences(compared_with_standard(report)[0])
+    said = psychometric_sentences(session_functions(report)[0])
     assert said[0].startswith("Friction, pushed: by 40 answers the surface felt equal to the standard has ")
 
 
@@ -69,8 +69,8 @@ def test_without_forces_a_study_has_no_function_and_says_why(recording):
     found = constant_stimuli([(visit, row) for row in visit.rows if row.descriptor == "stickiness"])
     assert "no friction was measured" in found.functions["S03"].reason
     study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=found)])
-    assert "no friction was measured" in psychometric_sentences(compared_in_study(study)[0])[0]
-    (row,) = psychometric_table(compared_in_study(study)).groups[0].rows
+    assert "no friction was measured" in psychometric_sentences(study_functions(study)[0])[0]
+    (row,) = psychometric_table(study_functions(study)).groups[0].rows
     assert [cell.text for cell in row[2:]] == ["–"] * 5
 
 
@@ -91,7 +91,7 @@ def test_a_study_has_the_geometric_means_of_its_subjects(recording, tmp_path):
     assert found.pse.n == 3
     assert found.pse.mean == pytest.approx(sum(one.pse.value for one in found.functions.values()) / 3)
     study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=found)])
-    shown = psychometric_table(compared_in_study(study))
+    shown = psychometric_table(study_functions(study))
     assert [row[0].text for row in shown.groups[0].rows] == ["S03", "S04", "S05", "geometric mean"]
-    (said,) = psychometric_sentences(compared_in_study(study)[0])
+    (said,) = psychometric_sentences(study_functions(study)[0])
     assert said.startswith("Stickiness: over 3 of 3 subjects the surface felt equal to the standard has ")

@@ -17,7 +17,7 @@ from sessions.exchange.session_tables import tables
 from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import reveal
-from sessions.statistics.findings import checked_planted, planted_effects, planted_flaws, planted_friction
+from sessions.statistics.findings import check_ground_truth, planted_effects, planted_flaws, planted_friction
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
 NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])
@@ -159,7 +159,7 @@ def pooled_study():
 def test_what_was_planted_is_refused_as_a_whole_or_held_against_what_was_found(pooled_study, data):
     planted = spoilt(data, PLANTED)
     try:
-        held = checked_planted(planted)
+        held = check_ground_truth(planted)
     except ValueError:
         return
     planted_effects(pooled_study.descriptors, held)

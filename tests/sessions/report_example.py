@@ -12,8 +12,8 @@ from sessions.report.contents import (
     Experiment,
     Fact,
     Field,
+    GroundTruth,
     History,
-    Planted,
     PredictionFinding,
     Report,
     StrokeFinding,
@@ -323,7 +323,7 @@ def _made():
         "predictions": tuple(prediction(k, *which) for k, which in enumerate(numbered, 1)),
         "fields": (finger_field("stickiness", 100), finger_field("slipperiness", 100)),
         "planted": tuple(
-            Planted(k, TABLES[d][i][0], TABLES[d][i][1], TABLES[d][i][2], DIRECTION[d])
+            GroundTruth(k, TABLES[d][i][0], TABLES[d][i][1], TABLES[d][i][2], DIRECTION[d])
             for k, (d, i) in enumerate(numbered, 1)
         ),
         "modelled": (Fact("plane strain", "unit thickness"),),

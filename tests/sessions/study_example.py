@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from sessions.statistics.multiverse import PATHS
-from sessions.statistics.pooled import pooled
+from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions
 
 INDICES = (0, 20, 50, 80, 100)
@@ -49,7 +49,7 @@ def study():
         "strokes": [{"subject": v.subject, "trial": row.trial, "mu": row.mu} for v in visits for row in v.rows],
     }
     out = (Exclusion("S03", "used the scale backwards, and said so afterwards", "E02"),)
-    return pooled(visits, [("S11", "session.sqlite is damaged")], out, planted, VisitOptions(paths="small"))
+    return pool_visits(visits, [("S11", "session.sqlite is damaged")], out, planted, VisitOptions(paths="small"))
 
 
 def _with_ends(**ends):

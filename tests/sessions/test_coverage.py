@@ -18,7 +18,7 @@ from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS
 from daq_app.simulation.wiring import planted_surface
 from sessions.plan.protocols import plan, protocol
 from sessions.statistics.findings import CARRY_OVER, DRIFT, SED_TERM
-from sessions.statistics.pooled import pooled
+from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import TrialRow, Visit
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
@@ -133,7 +133,7 @@ def people_held():
     for number in range(REPEATS):
         made = people(judged, number)
         strokes = [stroke for _, planted in made for stroke in planted]
-        found = pooled([one for one, _ in made], planted={**truth, "strokes": strokes})
+        found = pool_visits([one for one, _ in made], planted={**truth, "strokes": strokes})
         for one in found.effects:
             none = one.descriptor == "slipperiness" and one.effect == CARRY_OVER
             held[one.effect, "none" if none else "planted"].append(one.low <= 0.0 <= one.high if none else one.covered)
@@ -161,7 +161,7 @@ def followed_held():
     rho = SLOPE * SCATTER / math.hypot(SLOPE * SCATTER, math.hypot(NOISE, DRIFTING * math.sqrt(2.5)))
     held = defaultdict(list)
     for number in range(REPEATS):
-        (found,) = pooled(people(followed, 1000 + number)).descriptors
+        (found,) = pool_visits(people(followed, 1000 + number)).descriptors
         low, high = found.repeated.people
         held["correlation within subjects", "planted"].append(low <= rho <= high)
         for name, planted in ((SED_TERM, SLOPE), (DRIFT, DRIFTING), (CARRY_OVER, 0.0)):
@@ -184,7 +184,7 @@ def by_chance_held():
     rho = float(np.corrcoef(x, y)[0, 1])
     held = defaultdict(list)
     for number in range(REPEATS):
-        (found,) = pooled(people(met_by_chance, 2000 + number)).descriptors
+        (found,) = pool_visits(people(met_by_chance, 2000 + number)).descriptors
         of = found.repeated
         held["correlation within subjects of friction's own SED", "planted"].append(of.people[0] <= rho <= of.people[1])
         held["the same by Fisher's z", "planted"].append(of.low <= rho <= of.high)

@@ -4,7 +4,7 @@ import pytest
 from walks import CODES, FIRST, FORCES, NUMBERS, PAIRS, RESTFUL, SCORES, made_plan
 
 from sessions.plan.plan import Frame, Rests, SessionPlan
-from sessions.run.machine import advance, interrupted, start, trial_in_hand
+from sessions.run.machine import advance, resume_interrupted, start, trial_in_hand
 from sessions.run.states import Ended, Mounting, Resting, Scoring, Settling, Stroking, Taring
 from sessions.run.steps import (
     Abort,
@@ -349,7 +349,7 @@ def test_a_pause_or_a_crash_between_the_two_of_a_pair_presents_both_again():
     so_far = (Begin(), *stroked(PAIRS, 1), put_on(PAIRS, 2))
     commands = commands_after(PAIRS, *so_far, Pause(), Resume())
     assert commands == (DiscardTake(1, 1, "a pause parted the two stimuli"), AskMount(PAIRS.trials[0]))
-    _, commands = interrupted(after(PAIRS, *so_far)[0], "cut short")
+    _, commands = resume_interrupted(after(PAIRS, *so_far)[0], "cut short")
     assert commands[:2] == (DiscardTake(2, 1, "cut short"), DiscardTake(1, 1, "cut short"))
     assert commands[-1] == AskMount(PAIRS.trials[0])
 

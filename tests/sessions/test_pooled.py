@@ -11,12 +11,12 @@ from study_example import INDICES, study, visit
 
 from sessions.prediction import BY_NAME, PredictionOptions
 from sessions.report.pages import study_page, trials_csv
-from sessions.report.study_prose import command, excluded, remarks, summary
+from sessions.report.study_prose import command, exclusion_sentences, remarks, summary
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_scores
 from sessions.statistics.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED_TERM, WITHIN
 from sessions.statistics.multiverse import PATHS
-from sessions.statistics.pooled import pooled
+from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import Exclusion, Visit, VisitOptions, exclusions_in
 from sessions.strokes.stroke import HERTZ, AreaLaw
 from sessions.toml_file import SettingsError
@@ -25,7 +25,7 @@ VISITS = [visit(number) for number in range(1, 11)]
 
 
 def test_the_order_in_which_visits_come_changes_no_bit():
-    assert pooled(VISITS) == pooled(VISITS[::-1])
+    assert pool_visits(VISITS) == pool_visits(VISITS[::-1])
 
 
 def test_a_visit_survives_its_way_through_plain_data():
@@ -37,14 +37,14 @@ def test_a_study_says_what_to_type_for_its_numbers():
     asked = VisitOptions(model, AreaLaw("hertz", HERTZ, 1.234567891), "finite", 0.003)
     options = "--kinematics finite --tau as-printed --area hertz --area-force 1.234567891 --calibration-error 0.3"
     named = f"daq-app study 'my study' {options} --intervals --paths finite"
-    assert command(pooled(VISITS, options=asked), "my study") == named
+    assert command(pool_visits(VISITS, options=asked), "my study") == named
     planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "seed": 21}
-    assert command(pooled(VISITS, planted=planted), "syn") == "daq-app study --synthetic 21 --out syn"
+    assert command(pool_visits(VISITS, planted=planted), "syn") == "daq-app study --synthetic 21 --out syn"
 
 
 def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
     planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
-    found = {one.effect: one for one in pooled(VISITS, planted=planted).effects}
+    found = {one.effect: one for one in pool_visits(VISITS, planted=planted).effects}
     assert set(found) == {INDEX, FRICTION, DRIFT, CARRY_OVER}
     assert found[INDEX].estimate == pytest.approx(0.8, abs=0.05)
     assert found[INDEX].covered
@@ -53,7 +53,7 @@ def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
 def test_the_planted_relation_of_people_at_large_stands_beside_the_intervals_for_them():
     score = {"gain": 0.0, "drift": 0.0, "carry_over": 0.0}
     planted = {"score": score, "strokes": [], "relation": {"stickiness": {"r": 0.9, "slope": 60.0}}}
-    study = pooled(VISITS, planted=planted)
+    study = pool_visits(VISITS, planted=planted)
     found = {one.effect: one for one in study.effects}
     of = study.descriptors[0]
     assert (found[WITHIN].planted, found[WITHIN].low, found[WITHIN].high) == (0.9, *of.repeated.people)
@@ -62,7 +62,7 @@ def test_the_planted_relation_of_people_at_large_stands_beside_the_intervals_for
 
 def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
     out = (Exclusion("S03", "asked to", "the experimenter"),)
-    with_it, without = pooled(VISITS, exclusions=out), pooled([v for v in VISITS if v.subject != "S03"])
+    with_it, without = pool_visits(VISITS, exclusions=out), pool_visits([v for v in VISITS if v.subject != "S03"])
     assert with_it.descriptors == without.descriptors
     assert len(with_it.visits) == 10
     assert "asked to" in study_page(with_it, "x")
@@ -70,20 +70,20 @@ def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
 
 def test_the_same_recording_in_two_folders_counts_once_and_is_named():
     first, again = replace(VISITS[0], sha256="a" * 64), replace(VISITS[0], session="S01-backup", sha256="a" * 64)
-    found = pooled([*VISITS[1:], again, first])
-    assert found.descriptors == pooled([*VISITS[1:], first]).descriptors
+    found = pool_visits([*VISITS[1:], again, first])
+    assert found.descriptors == pool_visits([*VISITS[1:], first]).descriptors
     assert "Session S01-backup holds the same recording as S01" in study_page(found, "x")
     assert trials_csv(found).count("the same recording as S01") == 5
 
 
 def test_scores_that_fall_with_the_index_are_doubted_and_kept():
-    found = pooled([*VISITS[:9], visit(10, gain=-0.8)])
+    found = pool_visits([*VISITS[:9], visit(10, gain=-0.8)])
     assert [(subject, descriptor) for subject, descriptor, _ in found.reversed] == [("S10", "stickiness")]
     assert found.descriptors[0].scores[0].n == 10
 
 
 def test_visits_that_only_scored_give_means_and_no_relation():
-    found = pooled([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
+    found = pool_visits([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
     assert found.mean_relation is None
     assert found.repeated is None
     assert "three subjects with scores and strokes of their own" in found.on_response
@@ -93,7 +93,7 @@ def test_visits_that_only_scored_give_means_and_no_relation():
 def test_choices_of_one_of_two_stand_in_the_table_and_are_told_to_count_for_no_mean():
     compared = visit(2)
     rows = tuple(replace(row, outcome="chosen", score=None, choice="first") for row in compared.rows)
-    found = pooled([visit(1), replace(compared, rows=rows)])
+    found = pool_visits([visit(1), replace(compared, rows=rows)])
     assert [one for one in remarks(found) if "S02" in one and f"{len(rows)} choices of one of two" in one]
     table = list(csv.DictReader(io.StringIO(trials_csv(found))))
     assert {row["choice"] for row in table if row["session"] == "S02"} == {"first"}
@@ -104,25 +104,25 @@ def test_who_missed_a_surface_does_not_make_it_look_scored_low():
     made = [visit(number, gain=0.0, noise=0.0) for number in (1, 2, 3)]
     flat = [replace(one, rows=tuple(replace(row, score=level[one.subject]) for row in one.rows)) for one in made]
     flat[2] = replace(flat[2], rows=flat[2].rows[1:])
-    (found,) = pooled(flat).descriptors
+    (found,) = pool_visits(flat).descriptors
     assert found.mean_relation.pearson is None  # nothing within anybody varies
 
 
 def test_repeats_of_one_subject_are_averaged_and_make_no_subjects():
     again = replace(visit(1), session="S01-again")
-    assert all(mean.n == 1 for mean in pooled([visit(1), again]).descriptors[0].scores)
+    assert all(mean.n == 1 for mean in pool_visits([visit(1), again]).descriptors[0].scores)
 
 
 def test_the_table_has_one_line_of_heads_and_numbers_to_the_last_bit():
-    rows = list(csv.DictReader(io.StringIO(trials_csv(pooled(VISITS)))))
+    rows = list(csv.DictReader(io.StringIO(trials_csv(pool_visits(VISITS)))))
     assert len(rows) == 50
     assert float(rows[0]["sed_MPa"]) == VISITS[0].rows[0].sed
     assert rows[0]["speed_mm_per_s"] == ""
-    assert trials_csv(pooled([visit(1, simulated="SIMULATED: s")])).startswith("SIMULATED,")
+    assert trials_csv(pool_visits([visit(1, simulated="SIMULATED: s")])).startswith("SIMULATED,")
 
 
 def test_a_simulated_study_says_so_at_the_head_of_its_page():
-    page = study_page(pooled([*VISITS[:2], visit(3, simulated="SIMULATED: s")]), "x")
+    page = study_page(pool_visits([*VISITS[:2], visit(3, simulated="SIMULATED: s")]), "x")
     assert page.splitlines()[1].startswith("<!-- SIMULATED: 1 of the 3 sessions")
 
 
@@ -139,8 +139,8 @@ def test_decisions_are_read_from_their_file_and_a_wrong_one_is_named(tmp_path):
 
 def test_a_decision_that_fits_no_trial_is_told_as_such():
     out = (Exclusion("S99", "ill", "E1"), Exclusion("S01", "bad", "E1", "sticky"), Exclusion("S02", "ill", "E1"))
-    found = pooled(VISITS[:3], exclusions=out)
-    assert [sentence.split(":")[0] for sentence in excluded(found)] == ["Subject S02"]
+    found = pool_visits(VISITS[:3], exclusions=out)
+    assert [sentence.split(":")[0] for sentence in exclusion_sentences(found)] == ["Subject S02"]
     assert [sentence.split("(")[0] for sentence in remarks(found)] == [
         "A decision of E1 leaves out every trial of subject S99 ",
         "A decision of E1 leaves out trials on sticky of subject S01 ",
@@ -149,7 +149,7 @@ def test_a_decision_that_fits_no_trial_is_told_as_such():
 
 def test_scores_that_are_all_the_same_leave_a_reason_and_no_model():
     flat = [replace(v, rows=tuple(replace(row, score=50.0) for row in v.rows)) for v in VISITS]
-    found = pooled(flat)
+    found = pool_visits(flat)
     assert "nothing to tell an error from" in found.descriptors[0].on_index
     page = study_page(found, "x")
     assert "No mixed model of stickiness on SED, stickiness on index" in page
@@ -158,13 +158,13 @@ def test_scores_that_are_all_the_same_leave_a_reason_and_no_model():
 def test_means_that_are_related_are_those_of_subjects_with_both():
     # The one subject whose stroke gives no SED scores far off: it must not move the other half of the comparison.
     odd = replace(VISITS[0], rows=tuple(replace(row, sed=None, score=99.0 - 0.9 * row.index) for row in VISITS[0].rows))
-    related = pooled([odd, *VISITS[1:]]).descriptors[0].mean_relation
-    without = pooled(VISITS[1:]).descriptors[0].mean_relation
+    related = pool_visits([odd, *VISITS[1:]]).descriptors[0].mean_relation
+    without = pool_visits(VISITS[1:]).descriptors[0].mean_relation
     assert related.pearson == pytest.approx(without.pearson, rel=1e-12)
 
 
 def test_scores_stand_raw_and_standardised_side_by_side():
-    found = pooled([*VISITS[:9], visit(10, gain=0.2)]).descriptors[0]
+    found = pool_visits([*VISITS[:9], visit(10, gain=0.2)]).descriptors[0]
     # The tenth subject uses a quarter of the scale: standardised it agrees with the others.
     spread = [found.normalised.means[index].sd for index in (0, 100)]
     assert all(sd < 0.15 for sd in spread)
@@ -173,7 +173,7 @@ def test_scores_stand_raw_and_standardised_side_by_side():
 
 
 def test_leaving_out_the_one_subject_who_differs_raises_the_correlation_most():
-    found = pooled([*VISITS[:9], visit(10, gain=-0.8)]).descriptors[0]
+    found = pool_visits([*VISITS[:9], visit(10, gain=-0.8)]).descriptors[0]
     assert max(found.without_subject, key=lambda one: one[1])[0] == "S10"
     assert len(found.without_subject) == 10
 
@@ -184,14 +184,14 @@ def test_magnitude_estimates_of_any_modulus_come_to_the_same_means_at_one_modulu
         rows = [replace(row, score=None, estimate=modulus * 2.0 ** (row.index / 50)) for row in made.rows]
         return replace(made, rows=tuple(rows))
 
-    found = pooled([estimated(1, 1.0), estimated(2, 100.0), estimated(3, 10.0)]).descriptors[0]
+    found = pool_visits([estimated(1, 1.0), estimated(2, 100.0), estimated(3, 10.0)]).descriptors[0]
     means = found.estimates.equal_moduli
     assert [np.exp(means[i].mean) for i in (0, 50, 100)] == pytest.approx([10.0, 20.0, 40.0])
     assert all(mean.sd == pytest.approx(0.0, abs=1e-9) for mean in means.values())
     assert found.estimates.geometric[0].sd > 2.0  # of the logarithms, as they were given
     assert found.estimates.repeated.r > 0.9
     none = replace(VISITS[3], rows=tuple(replace(r, score=None, estimate=0.0) for r in VISITS[3].rows))
-    assert pooled([estimated(1, 1.0), none]).descriptors[0].estimates.left_out == ("S04",)
+    assert pool_visits([estimated(1, 1.0), none]).descriptors[0].estimates.left_out == ("S04",)
 
 
 def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
@@ -203,31 +203,31 @@ def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
     }
     planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": spoilt}
     made = [*VISITS[:2], visit(3, gain=-0.8)]
-    assert [flaw.detected for flaw in pooled(made, planted=planted).flaws] == [False, False, True, False]
+    assert [flaw.detected for flaw in pool_visits(made, planted=planted).flaws] == [False, False, True, False]
     lost = replace(
         made[0], rows=tuple(replace(r, flaws=("lost_readings",)) if r.trial == 2 else r for r in made[0].rows)
     )
-    found = pooled([lost, *made[1:]], [("S99", "damaged")], planted=planted).flaws
+    found = pool_visits([lost, *made[1:]], [("S99", "damaged")], planted=planted).flaws
     assert [flaw.detected for flaw in found] == [True, False, True, True]
 
 
 def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
     made = study()
-    told = " ".join(excluded(made))
+    told = " ".join(exclusion_sentences(made))
     assert "Subject S03: every trial left out by E02: used the scale backwards" in told
     kept = "Session S04: decision 1 by E02: stroke 1 of trial 2 is kept: it was good."
     assert kept in remarks(made)
     assert kept not in told
     rows = [replace(row, sed=None, why=f"No settled sliding at mu = 0.{row.trial}.") for row in VISITS[0].rows]
-    (one,) = excluded(pooled([replace(VISITS[0], rows=tuple(rows))]))
+    (one,) = exclusion_sentences(pool_visits([replace(VISITS[0], rows=tuple(rows))]))
     assert one.startswith("The model gives no SED for 5 trials (S01 trial 1, S01 trial 2,")
     assert one.endswith("of the first: No settled sliding at mu = 0.1.")
 
 
 def test_trials_that_the_session_did_not_come_to_are_not_done_and_nothing_was_excluded():
     rows = [replace(row, outcome="open", score=None, sed=None, why="The trial was not done.") for row in VISITS[0].rows]
-    found = pooled([replace(VISITS[0], rows=tuple(rows), complete=False), *VISITS[1:]])
-    assert excluded(found) == []
+    found = pool_visits([replace(VISITS[0], rows=tuple(rows), complete=False), *VISITS[1:]])
+    assert exclusion_sentences(found) == []
     told = remarks(found)
     assert "Session S01 ended before its last trial; what it holds counts." in told
     assert any(sentence.startswith("Not done: S01 trial 1, S01 trial 2") for sentence in told)
@@ -237,7 +237,7 @@ SENSE = {"small": 1.0, "finite": -1.0}  # of the SED along a path
 
 
 def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave():
-    plain = pooled(VISITS[:4])
+    plain = pool_visits(VISITS[:4])
     untried = summary(plain)[1]
     assert "at small strain go together by r = " in untried
     assert untried.endswith("at finite strain, which was not tried here, the sign may differ.")
@@ -251,18 +251,18 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
         )
         for v in VISITS[:4]
     ]
-    tried = summary(pooled(turned))[1]
+    tried = summary(pool_visits(turned))[1]
     assert f"at finite strain r = −{plain.descriptors[0].repeated.r:.2f}" in tried
     assert "of the 20 trials that have one there" in tried
 
 
 def test_a_study_of_one_subject_says_why_tables_are_missing():
-    order, within, differences = missing_scores(pooled(VISITS[:1]))
+    order, within, differences = missing_scores(pool_visits(VISITS[:1]))
     assert order.startswith("No agreement on the order: it takes two subjects")
     assert order.endswith("stickiness has 1 such subject and 5 surfaces.")
     assert within.startswith("No intervals within subjects: they take two subjects")
     assert differences.startswith("No differences of surfaces of stickiness: they take three subjects")
-    assert missing_scores(pooled(VISITS[:3])) == []
+    assert missing_scores(pool_visits(VISITS[:3])) == []
 
 
 def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that_a_study_finds():
@@ -272,7 +272,7 @@ def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that
         return row if row.sed is None else replace(row, responses={"shear_along_skin": 10.0 * row.sed - 0.02})
 
     visits = [replace(visit, rows=tuple(map(with_shear, visit.rows))) for visit in VISITS]
-    by_sed, by_shear = pooled(visits), pooled(visits, quantity=BY_NAME["shear_along_skin"])
+    by_sed, by_shear = pool_visits(visits), pool_visits(visits, quantity=BY_NAME["shear_along_skin"])
     for one, other in zip(by_sed.descriptors, by_shear.descriptors, strict=True):
         assert other.repeated.r == pytest.approx(one.repeated.r)
         assert other.mean_relation.pearson == pytest.approx(one.mean_relation.pearson)
@@ -291,7 +291,7 @@ def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that
 
 
 def test_the_table_of_standardised_scores_has_the_scores_as_given_beside_them():
-    (shown,) = [one for one in study_tables(pooled(VISITS))["scores"] if one.name == "table-normalised"]
+    (shown,) = [one for one in study_tables(pool_visits(VISITS))["scores"] if one.name == "table-normalised"]
     scores = np.array([[{row.index: row.score for row in one.rows}[index] for index in INDICES] for one in VISITS])
     standardised = (scores - scores.mean(axis=1, keepdims=True)) / scores.std(axis=1, ddof=1, keepdims=True)
     cells = [[float(row[n].text.replace("−", "-")) for n in (2, 5)] for row in shown.groups[0].rows]

@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from daq_app.cli.main import run
-from sessions.statistics.power import FRICTION, Planted, power
+from sessions.statistics.power import FRICTION, PlantedEffects, power
 
-PLAIN = Planted(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
+PLAIN = PlantedEffects(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
 
 
 def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_test_of_their_slopes():
@@ -23,14 +23,14 @@ def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_te
 
 
 def test_where_nothing_is_planted_the_test_finds_something_in_about_five_of_a_hundred():
-    (found,) = power(Planted(effect=0.0), (10,), (5,), 600, 2)
+    (found,) = power(PlantedEffects(effect=0.0), (10,), (5,), 600, 2)
     assert 0.02 <= (found.detections + found.wrong) / found.studies <= 0.08
 
 
 def test_more_subjects_find_more_and_spread_people_less():
-    few, many = power(Planted(), (4, 12), (5,), 150, 3)
+    few, many = power(PlantedEffects(), (4, 12), (5,), 150, 3)
     assert few.share + few.half < many.share
-    (spread,) = power(Planted(slope_sd=2.0), (12,), (5,), 150, 3)
+    (spread,) = power(PlantedEffects(slope_sd=2.0), (12,), (5,), 150, 3)
     assert spread.share + spread.half < many.share
 
 

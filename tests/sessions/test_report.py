@@ -14,7 +14,7 @@ from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
 from sessions.recording import Recording, SessionWriter
 from sessions.report import Further, findings
-from sessions.report.contents import Planted
+from sessions.report.contents import GroundTruth
 from sessions.report.figures.relation import relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import summary
@@ -30,7 +30,7 @@ def session(tmp_path_factory):
     """A session on the simulated bench, its third trial stroked twice; recording, analysis, what was planted."""
     folder, planted = record(tmp_path_factory.mktemp("bench") / "P01", discard=3)
     recording = Recording.open(folder)
-    truth = [Planted(trial, p.mu, p.tau_max, p.speed, p.direction) for trial, p in planted]
+    truth = [GroundTruth(trial, p.mu, p.tau_max, p.speed, p.direction) for trial, p in planted]
     return recording, analyse(recording), truth
 
 

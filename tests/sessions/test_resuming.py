@@ -20,7 +20,7 @@ from sessions.run.resuming import (
     Seam,
     check_resumable,
     check_same_transducer,
-    continued,
+    continue_clock,
     resumption,
 )
 from sessions.run.states import Ended
@@ -183,7 +183,7 @@ def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forw
     Session(tmp_path / "s", link_lost_after=1000).run()
     recording = Recording.open(tmp_path / "s")
     earlier = datetime(2001, 1, 1, tzinfo=UTC)
-    clock, gap = continued(recording, recording.last_block(), SimulatedClock(7), earlier)
+    clock, gap = continue_clock(recording, recording.last_block(), SimulatedClock(7), earlier)
     assert gap.duration is None
     assert clock.now_ns() > recording.events[-1].time_ns
 
@@ -191,7 +191,7 @@ def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forw
 def test_the_seam_alters_nothing_the_device_said(tmp_path):
     Session(tmp_path / "s", link_lost_after=1000).run()
     block = Recording.open(tmp_path / "s").last_block()
-    joined = Seam(1000, 4.0).joined(block)
+    joined = Seam(1000, 4.0).join(block)
     assert joined.raw.tobytes() == block.raw.tobytes()
     assert joined.counter.tolist() == block.counter.tolist()
     assert joined.sequence.tolist() == [number + 1000 for number in block.sequence.tolist()]

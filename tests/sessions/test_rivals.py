@@ -15,10 +15,10 @@ from sessions.report.prose import distinctions
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.session import tables
 from sessions.statistics.correlations import (
-    cases_needed,
     contrast,
-    left_out_error,
+    leave_one_out_error,
     partial_correlation,
+    required_cases,
     steiger_z,
 )
 from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
@@ -47,7 +47,7 @@ def test_a_rival_with_the_other_sign_is_turned_round_before_it_is_compared():
 
 def test_steigers_test_at_the_number_of_cases_needed_has_eighty_per_cent_power():
     first, second, mutual = 0.75, 0.6, 0.5
-    n = cases_needed(first, second, mutual)
+    n = required_cases(first, second, mutual)
     draw = np.random.default_rng(5)
     among = np.array([[1.0, first, second], [first, 1.0, mutual], [second, mutual, 1.0]])
     told = 0
@@ -58,7 +58,7 @@ def test_steigers_test_at_the_number_of_cases_needed_has_eighty_per_cent_power()
 
 
 def test_equal_correlations_are_told_apart_by_no_number_of_cases():
-    assert cases_needed(0.9, 0.9, 0.5) is None
+    assert required_cases(0.9, 0.9, 0.5) is None
 
 
 def test_a_partial_correlation_is_that_of_what_the_third_variable_leaves():
@@ -72,8 +72,8 @@ def test_a_partial_correlation_is_that_of_what_the_third_variable_leaves():
 def test_the_left_out_error_is_that_of_lines_fitted_without_each_point():
     x, y = np.random.default_rng(3).normal(size=(2, 6))
     errors = [y[i] - np.polyval(np.polyfit(np.delete(x, i), np.delete(y, i), 1), x[i]) for i in range(len(x))]
-    assert left_out_error(x, y) == pytest.approx(math.sqrt(np.mean(np.square(errors))))
-    assert left_out_error([0.0, 0.0, 1.0], [1.0, 2.0, 3.0]) is None  # without the last nothing varies
+    assert leave_one_out_error(x, y) == pytest.approx(math.sqrt(np.mean(np.square(errors))))
+    assert leave_one_out_error([0.0, 0.0, 1.0], [1.0, 2.0, 3.0]) is None  # without the last nothing varies
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_su
     assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
     said = " ".join(distinctions(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
-    needed = cases_needed(*correlations_of(report.experiments[0]))
+    needed = required_cases(*correlations_of(report.experiments[0]))
     assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in said
 
 

@@ -6,8 +6,8 @@ from stand_ins import INFO, Hands, SimulatedClock, StandIn
 
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
-from sessions.run.resuming import check_resumable, continued, resumed_data, resumption
-from sessions.run.runner import Resumed, run_session
+from sessions.run.resuming import check_resumable, continue_clock, resumed_data, resumption
+from sessions.run.runner import Continuation, run_session
 
 PAPER = protocol("sensotact-friction")
 
@@ -43,11 +43,11 @@ def resume(folder, **transducer):
     check_resumable(recording)
     last = recording.last_block()
     now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
-    clock, gap = continued(recording, last, SimulatedClock(5_000), now.astimezone(UTC))
+    clock, gap = continue_clock(recording, last, SimulatedClock(5_000), now.astimezone(UTC))
     told = SimulatedClock(clock.now_ns())
     device = StandIn(told, **transducer)
     at = resumption(recording.plan, recording.events)
     writer = SessionWriter.open(folder, told)
-    resumed = Resumed(at, resumed_data(gap, device.info, {}), last)
+    resumed = Continuation(at, resumed_data(gap, device.info, {}), last)
     end = run_session(recording.plan, writer, Hands(told, device), device, resumed=resumed)
     return end, Recording.open(folder)

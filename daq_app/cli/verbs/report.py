@@ -66,7 +66,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from sessions.report import pages
 
     if options.out is not None:
-        pages.leave_others_alone(options.out)
+        pages.check_replaceable(options.out)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):

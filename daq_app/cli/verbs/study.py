@@ -40,9 +40,9 @@ from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.prediction.surface_series import StudyDesign, planted_strokes
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE
-from sessions.statistics.findings import UNITS, StudyFindings, checked_planted
-from sessions.statistics.pooled import pooled
-from sessions.statistics.power import TWIN, Judgement, Planted, Recovery, power, recovery
+from sessions.statistics.findings import UNITS, StudyFindings, check_ground_truth
+from sessions.statistics.pooled import pool_visits
+from sessions.statistics.power import TWIN, Judgement, PlantedEffects, Recovery, power, recovery
 from sessions.statistics.visit import VisitOptions, exclusions_in
 from sessions.strokes.stroke import FIXED
 
@@ -58,7 +58,7 @@ def add_power(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="NAME=VALUE",
         help="how many subjects and surfaces a study needs, by simulation; what is planted may be set: "
-        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(Planted))}",
+        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(PlantedEffects))}",
     )
     parser.add_argument(
         "--depths",
@@ -106,7 +106,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     return DONE
 
 
-def _recovery(options: argparse.Namespace, planted: Planted, console: Console) -> list[Recovery]:
+def _recovery(options: argparse.Namespace, planted: PlantedEffects, console: Console) -> list[Recovery]:
     """Return how often studies at the depths asked for tell the quantity from its rivals; [] where none are."""
     if not options.depths:
         return []
@@ -146,9 +146,9 @@ def _say_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, c
     )
 
 
-def _planted_values(texts: Sequence[str]) -> Planted:
+def _planted_values(texts: Sequence[str]) -> PlantedEffects:
     """Return what is planted, with the values that were set. Raises WrongValue."""
-    names = [field.name for field in fields(Planted)]
+    names = [field.name for field in fields(PlantedEffects)]
     changes = numbers_by_key(texts, "--power", "effect=20")
     for name, value in changes.items():
         if name not in names:
@@ -156,7 +156,7 @@ def _planted_values(texts: Sequence[str]) -> Planted:
         least = -100.0 if name == "effect" else 0.0
         if not least <= value <= 100.0:
             raise WrongValue(f"--power {name}={value:g} is not allowed: {least:g} to 100")
-    return Planted(**changes)
+    return PlantedEffects(**changes)
 
 
 EXAMPLE = "daq-app study recordings --out results"
@@ -211,7 +211,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         from daq_app.simulation.synthetic import planted_relations  # loaded only where it is needed
 
         truth["relation"] = planted_relations(truth["people"], visit_options.prediction, visit_options.area)
-    study = pooled(done, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
+    study = pool_visits(done, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
@@ -226,7 +226,7 @@ def _load_planted(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        settings = checked_planted(json.loads(read_within_limit(path)))
+        settings = check_ground_truth(json.loads(read_within_limit(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
     return settings
@@ -264,9 +264,11 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
 
 
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
-    from sessions.report.study_prose import distinctions, excluded, remarks, summary
+    from sessions.report.study_prose import distinctions, exclusion_sentences, remarks, summary
 
-    console.say(study.simulated or None, *summary(study), *distinctions(study), *excluded(study), *remarks(study))
+    console.say(
+        study.simulated or None, *summary(study), *distinctions(study), *exclusion_sentences(study), *remarks(study)
+    )
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(

@@ -47,7 +47,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
         axes.margins(y=0.08)
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time on the device's clock [s]")
-    for stroke, middle in _numbered(strokes, first, last):
+    for stroke, middle in _strokes_with_room(strokes, first, last):
         _mark(upper, str(stroke.number), (middle, 1.0), (0, 2), ha="center", va="bottom", color=INK, fontsize=7.5)
     name, title = "course", "Normal and tangential force over the whole recording"
     header = ("time [s]", "normal force [N]", "tangential force [N]")
@@ -60,8 +60,10 @@ def _mark(axes: Axes, text: str, at: tuple[float, float], off: tuple[float, floa
     axes.annotate(text, at, off, ("data", "axes fraction"), "offset points", **look)
 
 
-def _numbered(strokes: tuple[StrokeFinding, ...], first: float, last: float) -> list[tuple[StrokeFinding, float]]:
-    """Return the strokes whose number has room, each with its middle [s]."""
+def _strokes_with_room(
+    strokes: tuple[StrokeFinding, ...], first: float, last: float
+) -> list[tuple[StrokeFinding, float]]:
+    """Return the strokes whose number has room in the figure, each with its middle [s]."""
     room = 0.025 * (last - first)
     kept: list[tuple[StrokeFinding, float]] = []
     for stroke in strokes:

@@ -338,7 +338,7 @@ COLOURS = (PURPLE, GREEN, VERMILLION)
 Value = float | None
 
 
-def compared_panel(
+def comparison_panel(
     names: Sequence[str],
     sessions: tuple[str, str],
     rows: Sequence[tuple[str, Sequence[tuple[Value, Value]]]],

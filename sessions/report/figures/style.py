@@ -132,10 +132,10 @@ def shades(colour: str, n: int) -> tuple[str, ...]:
     """
     if n == 1:
         return (colour.lower(),)
-    return tuple(_mixed(colour, 0.3 - 1.0 * i / (n - 1)) for i in range(n))
+    return tuple(_shade(colour, 0.3 - 1.0 * i / (n - 1)) for i in range(n))
 
 
-def _mixed(colour: str, towards: float) -> str:
+def _shade(colour: str, towards: float) -> str:
     """Return the colour moved by `towards` (-1 to 1) of the way to black (below 0) or white (above)."""
     goal, share = (1.0, towards) if towards > 0 else (0.0, -towards)
     red, green, blue = (c + share * (goal - c) for c in to_rgb(colour))
@@ -173,11 +173,11 @@ def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
         pixels = io.BytesIO()
         drawn.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
         images[name] = pixels.getvalue()
-    return _finished(buffer.getvalue(), name, title, drawn.hover, simulated=simulated)
+    return _finish_svg(buffer.getvalue(), name, title, drawn.hover, simulated=simulated)
 
 
-def _finished(text: str, name: str, title: str, hover: Mapping[str, str], *, simulated: bool) -> str:
-    """Return the SVG with titles for hovering, fonts to fall back on, and ids nobody else on a page has."""
+def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str], *, simulated: bool) -> str:
+    """Return the SVG with titles for hovering, fallback fonts, and ids that are unique on a page."""
     text = text[text.index("<svg") :]
     name = identifier(name)
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)

@@ -101,7 +101,7 @@ class Notes:
         missing = low is None or high is None
         return self.number(None, shown, reason) if missing else range_cell(low, high, shown)
 
-    def listed(self) -> tuple[tuple[str, str], ...]:
+    def entries(self) -> tuple[tuple[str, str], ...]:
         """Return every note with its letter."""
         return tuple((mark, sentence) for sentence, mark in self.marks.items())
 
@@ -122,7 +122,7 @@ def table(name: str, caption: str, columns: str, groups: Iterable[Rows], notes: 
         short,
         tuple(Column(head, unit) for head, _, unit in heads),
         kept,
-        (*further, *(notes.listed() if notes else ())),
+        (*further, *(notes.entries() if notes else ())),
     )
 
 
@@ -161,7 +161,7 @@ def split_off_appendix(
     return kept, tuple(each for tables in sections.values() for each in tables if each.name not in body)
 
 
-def grouped(
+def group_by_experiment(
     report: Report, things: Sequence[Thing], experiment: Callable[[Thing], str], row: Callable[[Thing], Row]
 ) -> list[Rows]:
     """Return the rows of all things under the names of their experiments."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
-from sessions.report.tables import Cell, Notes, Row, Rows, Table, grouped, table
+from sessions.report.tables import Cell, Notes, Row, Rows, Table, group_by_experiment, table
 from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
 
 
@@ -30,7 +30,7 @@ def prediction_table(report: Report) -> Table | None:
             {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
             notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
             _depth(p, notes),
-            _stroked_sed(p, notes),
+            _stroke_sed(p, notes),
             notes.number(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
@@ -75,7 +75,7 @@ def _sed(notes: Notes, of: _Estimate, *, star: bool) -> Cell:
     return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
 
 
-def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
+def _stroke_sed(p: PredictionFinding, notes: Notes) -> Cell:
     ends, without, star = _of(p.interval)
     estimate = _Estimate(p.sed, p.error_estimate, p.reasons.get("sed"), ends, without, p.doubt)
     return _sed(notes, estimate, star=star)
@@ -105,7 +105,7 @@ def afferent_table(report: Report) -> Table | None:
         firing = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), _of(p.interval)[1] if published else _SED_ALONE
         rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in firing)
-        return (_stroked_sed(p, notes) if published else _responding(p, shown, notes), *rates)
+        return (_stroke_sed(p, notes) if published else _responding(p, shown, notes), *rates)
 
     below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
     caption = (
@@ -127,7 +127,7 @@ def _responding(p: PredictionFinding, shown: ShownResponse, notes: Notes) -> Cel
     return Cell(with_error(value, error, shown.places))
 
 
-def beside_table(report: Report) -> Table | None:
+def variants_table(report: Report) -> Table | None:
     """Return each trial's SED in every variant it was predicted in, side by side; strains one under another."""
     ways = _ways(report)
     if not ways:
@@ -148,7 +148,7 @@ def beside_table(report: Report) -> Table | None:
     return _table(report, "table-beside", caption, columns, _by_strain(report, cell), notes)
 
 
-def beside_forces_table(report: Report) -> Table | None:
+def variant_forces_table(report: Report) -> Table | None:
     """Return the normal force of each variant, or the depth that the measured force presses it to."""
     ways, notes = _ways(report), Notes()
     if not ways:
@@ -257,7 +257,7 @@ def direction_table(report: Report) -> Table | None:
         return (
             _depth(p, notes),
             direction(p.direction),
-            _stroked_sed(p, notes),
+            _stroke_sed(p, notes),
             _sed(notes, opposite, star=star),
             notes.estimate(ratio, places(3), why, None if doubt else ends, unknown),
         )
@@ -293,11 +293,11 @@ def _table(report: Report, name: str, caption: str, columns: str, groups: Iterab
 def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]:
     """Return the named rows of all trials by experiment; `row` gives the cells after the name."""
 
-    def named(p: PredictionFinding) -> Row:
+    def name_row(p: PredictionFinding) -> Row:
         name = (str(p.stroke),) if p.trial is None else (p.trial, str(p.index))
         return (*name, *row(p))
 
-    return grouped(report, report.predictions, lambda p: p.experiment, named)
+    return group_by_experiment(report, report.predictions, lambda p: p.experiment, name_row)
 
 
 def _depth(p: PredictionFinding, notes: Notes) -> Cell:

@@ -72,9 +72,9 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     if not alike:
         return []
     order, them = ("orders", "it") if len(alike) == 1 else ("order", "them")
-    names = _named([rival.name for rival in alike])
+    names = _rival_names([rival.name for rival in alike])
     needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
-    each = [f"{_rounded(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
+    each = [f"{_two_figures(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
     opening = (
         f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
         f"of scores can tell {them} apart from it; "
@@ -96,12 +96,14 @@ def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
             sides[side if contrast.differs(_ALPHA) else "neither"].append(rival.name)
     if not compared:
         return [f"Of {name} the surfaces are too few, or r too near 1, to compare the {model} with any rival."]
-    followed = [f"{_named(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]]
+    followed = [
+        f"{_rival_names(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]
+    ]
     sentence = f"the scores follow {' and '.join(followed)} (p < 0.05, not corrected)" if followed else ""
     if sides["neither"]:
         sentence += (
             "; they" if sentence else "the scores"
-        ) + f" tell no difference between the {model} and {_named(sides['neither'])}"
+        ) + f" tell no difference between the {model} and {_rival_names(sides['neither'])}"
     return [f"On {name}, {sentence}."]
 
 
@@ -132,29 +134,29 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     )
 
 
-def _named(names: Sequence[str]) -> str:
-    """Return a list of rivals, the model's other responses by their number where they are many.
+def _rival_names(names: Sequence[str]) -> str:
+    """Return the names of rivals in words; where they include many responses of the model, their number.
 
-    >>> _named(["pressure", "T"]), _named([*list(RESPONSES)[1:], "T"])
+    >>> _rival_names(["pressure", "T"]), _rival_names([*list(RESPONSES)[1:], "T"])
     ('pressure and T', 'all 9 other responses of the model and T')
     """
     responses = [name for name in names if name in RESPONSES]
     if len(responses) < MANY:
-        return _listed(names)
+        return _join_names(names)
     count = len(RESPONSES) - 1
     how = "all" if len(responses) == count else f"{len(responses)} of the"
     rest = [name for name in names if name not in RESPONSES]
-    return _listed([f"{how} {count} other responses of the model", *rest])
+    return _join_names([f"{how} {count} other responses of the model", *rest])
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return " and ".join(part for part in (", ".join(names[:-1]), names[-1] if names else "") if part)
 
 
-def _rounded(n: int) -> str:
+def _two_figures(n: int) -> str:
     """Return a count with two figures, for it rests on correlations that are themselves uncertain.
 
-    >>> _rounded(2347), _rounded(8), _rounded(2_600_000)
+    >>> _two_figures(2347), _two_figures(8), _two_figures(2_600_000)
     ('2300', '8', 'more than 10 000')
     """
     return f"more than {MANY_SURFACES // 1000} 000" if n > MANY_SURFACES else f"{float(f'{n:.2g}'):.0f}"

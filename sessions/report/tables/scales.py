@@ -129,8 +129,8 @@ def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
     return table("table-psychometric", caption, columns, groups, notes)
 
 
-def compared_with_standard(report: Report) -> list[Judged]:
-    """Return what the table of a session is made of: one subject's functions."""
+def session_functions(report: Report) -> list[Judged]:
+    """Return the psychometric functions of a session, which are one subject's."""
     return [
         (e.name, {"this session": e.psychometric}, (None, None))
         for e in report.experiments
@@ -138,8 +138,8 @@ def compared_with_standard(report: Report) -> list[Judged]:
     ]
 
 
-def compared_in_study(study: StudyFindings) -> list[Judged]:
-    """Return what the table of a study is made of: every subject's functions, and means over them."""
+def study_functions(study: StudyFindings) -> list[Judged]:
+    """Return the psychometric functions of a study: every subject's, and means over them."""
     pairs = ((one.descriptor, one.constant_stimuli) for one in study.descriptors)
     return [(name, one.functions, (one.pse, one.jnd)) for name, one in pairs if one is not None]
 

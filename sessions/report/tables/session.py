@@ -4,11 +4,23 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from sessions.prediction import BY_NAME
-from sessions.report.contents import Planted, Report, StrokeFinding
-from sessions.report.tables import Cell, Column, Group, Notes, Row, Rows, Table, grouped, range_cell, sections_of, table
+from sessions.report.contents import GroundTruth, Report, StrokeFinding
+from sessions.report.tables import (
+    Cell,
+    Column,
+    Group,
+    Notes,
+    Row,
+    Rows,
+    Table,
+    group_by_experiment,
+    range_cell,
+    sections_of,
+    table,
+)
 from sessions.report.tables import predictions as of_predictions
 from sessions.report.tables.rivals import responses_table, rivals_table
-from sessions.report.tables.scales import compared_with_standard, psychometric_table
+from sessions.report.tables.scales import psychometric_table, session_functions
 from sessions.report.wording import (
     NONE,
     capital,
@@ -17,9 +29,9 @@ from sessions.report.wording import (
     identifier,
     places,
     shown_response,
-    signed,
     significant,
     tau,
+    with_sign,
 )
 from sessions.statistics.correlations import Relation, slope_interval
 from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
@@ -106,12 +118,12 @@ def _table(
     """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
     planned = any(stroke.trial is not None for stroke in report.strokes)
 
-    def named(stroke: StrokeFinding) -> Row:
+    def name_row(stroke: StrokeFinding) -> Row:
         stimulus = (stroke.trial, stroke.index) if planned else ()
         where = (notes.number(v, places(0), "no trial asks for it") for v in stimulus)
         return (stroke.number, *where, *row(stroke))
 
-    groups = grouped(report, report.strokes, lambda s: s.experiment, named)
+    groups = group_by_experiment(report, report.strokes, lambda s: s.experiment, name_row)
     return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
@@ -123,7 +135,7 @@ def _estimate(notes: Notes, stroke: StrokeFinding, name: str, shown: Format, uni
 
 
 def planted_table(report: Report) -> Table | None:
-    """Return what the simulator planted beside what the analysis found."""
+    """Return the simulator's ground truth beside the numbers of the analysis."""
     notes = Notes()
     # Of several strokes in a trial the model gets the first.
     strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
@@ -133,7 +145,7 @@ def planted_table(report: Report) -> Table | None:
         "τ max found [kPa] | off by [%] | speed planted [mm/s] | speed found [mm/s] | off by [%] | direction"
     )
 
-    def row(p: Planted) -> Row:
+    def row(p: GroundTruth) -> Row:
         stroke = strokes_by_trial.get(p.trial)
         cells: list[Cell | str | int] = [p.trial, NONE if stroke is None or stroke.index is None else str(stroke.index)]
         prediction = predictions.get(p.trial)
@@ -148,13 +160,13 @@ def planted_table(report: Report) -> Table | None:
             ends = stroke.bootstrap.get(name) if stroke else None
             cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
             off = None if value is None else 100 * (value / truth - 1)
-            cells += [shown(truth), cell, notes.number(off, signed, reason)]
+            cells += [shown(truth), cell, notes.number(off, with_sign, reason)]
         right = stroke is not None and stroke.direction == p.direction
         cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
 
     names = {p.trial: s.experiment for p in report.planted if (s := strokes_by_trial.get(p.trial)) is not None}
-    groups = grouped(report, report.planted, lambda p: names.get(p.trial, ""), row)
+    groups = group_by_experiment(report, report.planted, lambda p: names.get(p.trial, ""), row)
     caption = (
         "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
         "analysis does not know what was planted. Under what was found: its 95 % bootstrap interval."
@@ -321,11 +333,11 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             of_predictions.prediction_table(report),
             of_predictions.force_table(report),
             of_predictions.direction_table(report),
-            of_predictions.beside_table(report),
-            of_predictions.beside_forces_table(report),
+            of_predictions.variants_table(report),
+            of_predictions.variant_forces_table(report),
         ),
         "rivals": (rivals_table(compared, quantity, report.model), responses_table(compared, quantity, report.model)),
-        "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
+        "scores": (score_table(report), *answer_tables(report), psychometric_table(session_functions(report))),
         "afferent": (of_predictions.afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from sessions.prediction import BY_NAME
 from sessions.report.tables import Cell, Notes, Row, Rows, Table, range_cell, sections_of, table
 from sessions.report.tables.rivals import responses_table, rivals_table
-from sessions.report.tables.scales import compared_in_study, latent_table, psychometric_table, scales_table
+from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table, study_model, trials_table
 from sessions.report.wording import (
@@ -32,13 +32,13 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "relation": (_relation(study),),
         "scores": (
             _scores(study),
-            _normalised(study),
+            _normalised_scores(study),
             _differences(study),
             _agreement(study),
             _estimates(study),
             scales_table(study.descriptors),
             latent_table(study.descriptors),
-            psychometric_table(compared_in_study(study)),
+            psychometric_table(study_functions(study)),
         ),
         "surfaces": (_surfaces(study), _forces(study)),
         "rivals": _rivals(study),
@@ -111,7 +111,7 @@ def _agreement(study: StudyFindings) -> Table | None:
     return table("table-agreement", caption, columns, [("", rows)])
 
 
-def _normalised(study: StudyFindings) -> Table | None:
+def _normalised_scores(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
@@ -146,7 +146,7 @@ def _differences(study: StudyFindings) -> Table | None:
 def _estimates(study: StudyFindings) -> Table | None:
     notes = Notes()
 
-    def shown(log: float) -> str:
+    def from_log(log: float) -> str:
         return three_figures(math.exp(log))
 
     def rows(one: DescriptorFindings) -> Iterable[Row]:
@@ -154,7 +154,7 @@ def _estimates(study: StudyFindings) -> Table | None:
             return
         for index, geometric in one.estimates.geometric.items():
             means = (geometric, one.estimates.equal_moduli[index])
-            yield (index, geometric.n, *(cell for mean in means for cell in _mean(mean, shown, notes)))
+            yield (index, geometric.n, *(cell for mean in means for cell in _mean(mean, from_log, notes)))
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]

@@ -10,7 +10,7 @@ from sessions.statistics.findings import INDEX, LEVELS, NOISE, UNITS, Descriptor
 from sessions.statistics.mixed_model import INTERCEPT, MixedModel, Spread, Term
 from sessions.statistics.pooled import response_term
 from sessions.statistics.scores import bounds, by_key
-from sessions.statistics.visit import TrialRow, Visit, decided
+from sessions.statistics.visit import TrialRow, Visit, exclusion_of
 
 
 def study_model(study: StudyFindings) -> str:
@@ -22,7 +22,7 @@ def models_table(study: StudyFindings) -> Table | None:
     """Return the mixed models of scores on the model's response and on index, with how far subjects differ."""
     quantity = BY_NAME[study.response]
     groups = [
-        (f"{one.descriptor}: score on {what}, {_fitted(model)}", _terms(model, quantity))
+        (f"{one.descriptor}: score on {what}, {_fit_text(model)}", _terms(model, quantity))
         for one in study.descriptors
         for what, model in _models(one, study)
         if not isinstance(model, str)
@@ -82,7 +82,7 @@ def missing_scores(study: StudyFindings) -> list[str]:
     return sentences
 
 
-def _fitted(model: MixedModel) -> str:
+def _fit_text(model: MixedModel) -> str:
     singular = ", singular fit" if model.singular else ""
     return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
 
@@ -107,7 +107,7 @@ def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
 
 
 def planted_table(study: StudyFindings) -> Table | None:
-    """Return what was planted in a simulated study beside what was found."""
+    """Return the planted effects of a simulated study beside their estimates."""
     rows = tuple(
         (
             one.descriptor,
@@ -154,7 +154,7 @@ def trials_table(study: StudyFindings) -> Table | None:
     )
     groups = [
         (
-            f"{visit.session}, {descriptor}{_left_out(study, visit, descriptor)}",
+            f"{visit.session}, {descriptor}{_exclusion_note(study, visit, descriptor)}",
             [_row(row, notes) for row in visit.rows if row.descriptor == descriptor],
         )
         for visit in study.visits
@@ -172,10 +172,12 @@ def trials_table(study: StudyFindings) -> Table | None:
     return table("table-trials", caption, columns, groups, notes)
 
 
-def _left_out(study: StudyFindings, visit: Visit, descriptor: str) -> str:
+def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     if visit.session in dict(study.copies):
         return " (a copy: counts nothing)"
-    return "" if decided(study.excluded, visit.subject, descriptor) is None else " (left out of every number above)"
+    return (
+        "" if exclusion_of(study.excluded, visit.subject, descriptor) is None else " (left out of every number above)"
+    )
 
 
 def _row(row: TrialRow, notes: Notes) -> Row:
