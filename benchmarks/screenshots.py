@@ -241,10 +241,10 @@ class _Places:
     """The window, brought to each of its places."""
 
     def __init__(self, camera: _Camera) -> None:
-        from daq_app.qt.start import opened
+        from daq_app.qt.start import open_window
 
         self.camera, self.recorder = camera, PlayedRecorder()
-        self.window = opened(camera.application, lambda: self.recorder, camera.theme)
+        self.window = open_window(camera.application, lambda: self.recorder, camera.theme)
         self.subject = self.window.subject
         self.window.side.show = self.subject.show
         for widget in (self.window, self.subject):

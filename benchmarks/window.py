@@ -24,9 +24,9 @@ import os, sys, time
 sys.argv = ["daq-app"]
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from PySide6.QtWidgets import QApplication
-from daq_app.qt.start import opened
+from daq_app.qt.start import open_window
 application = QApplication([])
-window = opened(application)
+window = open_window(application)
 window.show()
 application.processEvents()
 print(time.time(), sum(os.times()[:2]), flush=True)
@@ -76,7 +76,7 @@ def _session(options: argparse.Namespace) -> None:
     start.SIMULATED_BENCH = f"sim:?seed=7&rate={options.rate}"
     watched = _Watched()
     application = QApplication([])
-    window = start.opened(application)
+    window = start.open_window(application)
     window.resize(*map(int, options.size.split("x")))
     window.show()
     _until(lambda: window.bridge.state.bench.link == "open")

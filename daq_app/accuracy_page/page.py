@@ -64,14 +64,14 @@ def _cell(text: str) -> str:
     return " ".join(words if len(words) <= CELL_WORDS else [*words[: CELL_WORDS - 1], "…"])
 
 
-def _listed(
+def _table_maker(
     name: str,
     kind: type[R],
     caption: str,
     columns: Mapping[str, Callable[[R], str]],
     order: Callable[[R], tuple[bool, int]] = lambda _: (False, 0),
 ) -> Callable[[RunResults], Table]:
-    """Return what makes a table with a line for each row of a kind, each cell made by its column."""
+    """Return the function that makes a table with a line for each row of a kind, each cell made by its column."""
 
     def table(measured: RunResults) -> Table:
         rows = sorted(measured.of(kind), key=order)
@@ -144,7 +144,7 @@ def _value(row: Truth, at: int) -> str:
 
 TABLES: tuple[Callable[[RunResults], Table], ...] = (
     _machine,
-    _listed(
+    _table_maker(
         "targets", Target,
         "Targets of speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
         "and solve of the same system in the same run. Mesh and tables are set-up and not included unless said.",
@@ -156,7 +156,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "verdict": lambda row: row.verdict, "how": lambda row: row.how,
         },
     ),
-    _listed(
+    _table_maker(
         "truths", Truth,
         "The reference cases and their truth: mean of three overkill solves on meshes that differ, made "
         "in this run. Doubt: how far they lie from it at most.",
@@ -169,7 +169,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
                 lambda row: " / ".join(f"{n:,}" for n in row.dofs) if row.numbers else row.refused,
         },
     ),
-    _listed(
+    _table_maker(
         "speeds", Speed,
         "Time against true error, mesh by mesh of Q2/P-1 elements, eliminated by nested dissection. Floor: one "
         "assembly, factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these "
@@ -184,7 +184,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
         order=lambda row: (row.kinematics == "finite", row.dofs),
     ),
     _estimates,
-    _listed(
+    _table_maker(
         "warm", Warm, "The warm stepper, fed reading by reading; p99 of each reading's median over five passes.",
         {
             "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
@@ -193,7 +193,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "largest error, by peak": lambda row: percent(row.worst_error),
         },
     ),
-    _listed(
+    _table_maker(
         "histories", March, "A course of 200 substeps against the state found directly.",
         {
             "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
@@ -203,7 +203,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "difference of the SED": lambda row: f"{abs(row.difference):.0e}",
         },
     ),
-    _listed(
+    _table_maker(
         "costs", Cost,
         "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
         "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a "
@@ -216,7 +216,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "by part": lambda row: ", ".join(f"{name} {100 * part:.0f} %" for name, part in row.parts.items()),
         },
     ),
-    _listed(
+    _table_maker(
         "starts", Cold,
         "Start-up: processes from start to end, medians. What Python and the solver take to load is in the last ones.",
         {
@@ -224,7 +224,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "processor time [ms]": lambda row: _ms(row.took_s), "time that passed [ms]": lambda row: _ms(row.passed_s),
         },
     ),
-    _listed(
+    _table_maker(
         "orders", Order, "Observed orders of convergence. Time: of a solve on each mesh, the mesh included.",
         {
             "problem": lambda row: row.problem, "quantity": lambda row: row.quantity,
@@ -234,7 +234,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "order": lambda row: f"{row.order:.2f}", "at least": lambda row: f"{row.least:g}",
         },
     ),
-    _listed(
+    _table_maker(
         "problems", Problem, "Published problems, run through the same code as the finger.",
         {
             "problem": lambda row: row.problem, "source": lambda row: row.source,

@@ -5,7 +5,7 @@ from collections import defaultdict
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FieldChoice, Finger, Frame, Range, automatic_range
 from daq_app.analyst.session_words import greatest_errors, sed_words
-from daq_app.analyst.state import AnalystState, chosen
+from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
@@ -17,7 +17,7 @@ PHASES = {
 }  # fmt: skip
 
 
-def compared(first: Report, second: Report) -> Compared:
+def compare_reports(first: Report, second: Report) -> Compared:
     """Return every stimulus of either session, experiments in their order, and both sessions' means of each of `NAMES`.
 
     mu is the one that the model got; None where a session has no number.
@@ -54,7 +54,7 @@ def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
 
 def shown_film(state: AnalystState) -> m.Filmed | None:
     """Return the history that was asked for, where it is that of the chosen trial."""
-    row = chosen(state)
+    row = selected_row(state)
     return state.film if row is not None and state.film is not None and state.film.key == row.key else None
 
 
@@ -65,7 +65,7 @@ def was_tried(said: PredictionFinding) -> bool:
 
 def finger_words(state: AnalystState | None) -> str:
     """Return what is said of the settled finger, or why there is none."""
-    row = None if state is None else chosen(state)
+    row = None if state is None else selected_row(state)
     if state is None or row is None:
         return ""
     said = row.prediction
@@ -87,7 +87,7 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
 
     Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
     """
-    other, row = (None, None) if state is None else (state.compared, chosen(state))
+    other, row = (None, None) if state is None else (state.compared, selected_row(state))
     if state is None or other is None or state.report is None or row is None or row.prediction is None:
         return None, ""
     mine, theirs = (_of_stimulus(report, row.prediction) for report in (state.report, other.report))
@@ -127,7 +127,7 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
     )  # fmt: skip
 
 
-def named_errors(report: Report) -> str:
+def name_and_errors(report: Report) -> str:
     """Return the name of a session, and the errors that hold for all of its SEDs."""
     return " · ".join(filter(None, (report.session, greatest_errors(report))))
 

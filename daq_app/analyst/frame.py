@@ -120,11 +120,11 @@ def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
     return triangles[inside]
 
 
-def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, Indices]:
-    """Return each triangle (t, 3) as four, cut at the middles of its sides, where the SED is the mean of its ends.
+def halve_triangles(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, Indices]:
+    """Cut each triangle (t, 3) into four at the middles of its sides, where the SED is the mean of its ends.
 
     >>> corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
-    >>> _, sed, four = halved(corners, np.array([0.0, 2.0, 4.0]), np.array([[0, 1, 2]]))
+    >>> _, sed, four = halve_triangles(corners, np.array([0.0, 2.0, 4.0]), np.array([[0, 1, 2]]))
     >>> sed[four].mean(axis=1).tolist()
     [1.0, 2.0, 3.0, 2.0]
     """
@@ -147,13 +147,13 @@ class View:
     per_mm: float  # [pixel/mm]
 
     @staticmethod
-    def fitted(box: Box, left: float, top: float, width: float, height: float) -> "View":
+    def fit(box: Box, left: float, top: float, width: float, height: float) -> "View":
         """Return the view that shows all of `box` at the foot of a rectangle of the screen [pixel]."""
         x0, x1, y0, y1 = box
         per_mm = min(width / (x1 - x0), height / (y1 - y0))
         return View((x0 + x1) / 2.0, y0, left + width / 2.0, top + height, per_mm)
 
-    def placed(self, points: Array) -> Array:
+    def to_screen(self, points: Array) -> Array:
         """Return where points (n, 2) [mm] lie on the screen (n, 2) [pixel]."""
         return np.array([self.across, self.down]) + (points - [self.x, self.y]) * [self.per_mm, -self.per_mm]
 

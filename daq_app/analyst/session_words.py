@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from daq_app.analyst.state import AnalystState, Row, Step, chosen, rows
+from daq_app.analyst.state import AnalystState, Row, Step, rows, selected_row
 from daq_app.wording import errors_words, quantity, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
@@ -38,11 +38,11 @@ def words_of(row: Row) -> str:
     """Return a line of the list of trials; `marks_of` explains its marks."""
     if row.stroke is None:
         assert row.prediction is not None  # a row has at least one of them
-        return _named(row.prediction) + tr("  no stroke")
+        return _name_of(row.prediction) + tr("  no stroke")
     mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
-    return f"{_named(row.stroke)}  {mu}{mark}{failed}"
+    return f"{_name_of(row.stroke)}  {mu}{mark}{failed}"
 
 
 def marks_of(row: Row) -> str:
@@ -55,7 +55,7 @@ def marks_of(row: Row) -> str:
 
 def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
     """Return names and values of the chosen line."""
-    row = chosen(state)
+    row = selected_row(state)
     if row is None:
         return ()
     lines: list[tuple[str, str]] = []
@@ -154,7 +154,7 @@ def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
 
 def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     """Return what the model holds of the chosen trial, and of all: name, value, remark."""
-    row = chosen(state)
+    row = selected_row(state)
     said = None if row is None else row.prediction
     facts: list[tuple[str, str, str]] = []
     if said is not None:
@@ -214,7 +214,7 @@ def progress_words(step: Step | None) -> str:
     return f"{tr(step.words)}  {done}{left}"
 
 
-def _named(of: StrokeFinding | PredictionFinding) -> str:
+def _name_of(of: StrokeFinding | PredictionFinding) -> str:
     if of.trial is None:
         return tr("stroke {number}", number=of.number) if isinstance(of, StrokeFinding) else tr("stroke –")
     return f"{of.trial}  {of.experiment} {of.code if of.index is None else of.index}"
@@ -255,7 +255,7 @@ class Link:
 
 def lineage(state: AnalystState) -> tuple[Link, ...]:
     """Return the way from the chosen trial's SED, or its friction where it has none, to its readings."""
-    row = chosen(state)
+    row = selected_row(state)
     if row is None:
         return ()
     links = [Link(state.folder.name, "session", str(state.folder))]

@@ -215,7 +215,7 @@ def fold(state: AnalystState, message: Message) -> AnalystState:
         case ReportReady():
             return _on_report(state, message)
         case Answered():
-            return _answered(state, message)
+            return _fold_answer(state, message)
         case Drawn():
             return replace(state, drawn={**state.drawn, message.name: message})
         case Filmed():
@@ -227,12 +227,12 @@ def fold(state: AnalystState, message: Message) -> AnalystState:
         case Compared():
             return replace(state, compared=message, outcome="")
         case Step() | Idle() | Done() | Problem() | Cancelled():
-            return _gone_on(state, message)
+            return _fold_progress(state, message)
         case _:
             return _on_request(state, message)
 
 
-def _gone_on(state: AnalystState, said: Step | Idle | Done | Problem | Cancelled) -> AnalystState:
+def _fold_progress(state: AnalystState, said: Step | Idle | Done | Problem | Cancelled) -> AnalystState:
     match said:
         case Step():
             return replace(state, step=said)
@@ -275,8 +275,8 @@ def rows(state: AnalystState) -> tuple[Row, ...]:
     return (*listed, *without)
 
 
-def chosen(state: AnalystState) -> Row | None:
-    """Return the chosen line; None where there is none."""
+def selected_row(state: AnalystState) -> Row | None:
+    """Return the selected row; None where there is none."""
     listed = rows(state)
     return listed[state.row] if state.row < len(listed) else None
 
@@ -286,7 +286,7 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
     report, before = message.report, state.report
     fingers = state.fingers
     if message.stage == "analysed" and before is not None:
-        same = {_measured(stroke) for stroke in report.strokes} & {_measured(stroke) for stroke in before.strokes}
+        same = {_model_input(stroke) for stroke in report.strokes} & {_model_input(stroke) for stroke in before.strokes}
         numbers = {number for number, _ in same}
         kept = tuple(p for p in before.predictions if p.stroke in numbers)
         report = replace(report, predictions=kept)
@@ -298,13 +298,13 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
     return replace(after, row=max(0, min(state.row, len(rows(after)) - 1)))
 
 
-def _measured(stroke: StrokeFinding) -> tuple[int, object]:
-    """Return what the model is given of a stroke, and which it is."""
+def _model_input(stroke: StrokeFinding) -> tuple[int, object]:
+    """Return the number of a stroke, and its trial and friction, which are what the model gets of it."""
     friction = (stroke.mu_dynamic, stroke.mu_max, stroke.tau_max, stroke.speed, stroke.direction, stroke.normal_force)
     return stroke.number, (stroke.trial, friction)
 
 
-def _answered(state: AnalystState, answered: Answered) -> AnalystState:
+def _fold_answer(state: AnalystState, answered: Answered) -> AnalystState:
     report, finding = state.report, answered.finding
     if report is None:
         return state

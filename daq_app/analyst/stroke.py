@@ -117,8 +117,8 @@ class History(Struct, frozen=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
-    """One edge."""
+class PlacedEdge:
+    """One edge of a stroke and where it lies."""
 
     edge: Edge
     time: float  # [s, device time]
@@ -126,7 +126,7 @@ class Placed:
     decided: str  # who decided it and why; "" where the analysis found it
 
 
-def edges_of(stroke: StrokeFinding) -> tuple[Placed, ...]:
+def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
     """Return the edges in order of time; of a stroke without a steady window where one could lie."""
     trace = stroke.trace
     if stroke.onset is None and trace is None:
@@ -136,7 +136,7 @@ def edges_of(stroke: StrokeFinding) -> tuple[Placed, ...]:
     steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
     times = dict(zip(EDGES, (begin, *steady, end), strict=True))
     there = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
-    return tuple(Placed(e, times[e], there[WHAT[e]], stroke.decided.get(WHAT[e], "")) for e in EDGES)
+    return tuple(PlacedEdge(e, times[e], there[WHAT[e]], stroke.decided.get(WHAT[e], "")) for e in EDGES)
 
 
 def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:

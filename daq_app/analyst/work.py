@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import NAMES, compared, film_words, named_errors
+from daq_app.analyst.finger_words import NAMES, compare_reports, film_words, name_and_errors
 from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Parts
 from daq_app.analyst.session_words import picture_errors, sed_words
 from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history, reversal
@@ -54,7 +54,7 @@ class Work:
         """Open and analyse it, and say what is found."""
         self._say, self._urgent = say, urgent
         say(m.Step(0.0, tr("opening")))
-        self._recording = _opened(folder)
+        self._recording = _open_recording(folder)
         self._raw = RawFile(self._recording)
         self._chosen = 0
         self._ways: dict[m.Key, tuple[TrialPrediction, Way | None]] = {}  # no way at finite strain
@@ -70,10 +70,15 @@ class Work:
 
     def go_on(self) -> None:
         """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
-        progress = self.timed(tr("predicting"))
+        progress = self.progress_listener(tr("predicting"))
         options = _options(self._recording)
         self._prediction = predict(
-            self._analysis, self._recording.plan, options, progress=progress, watch=self._answered, first=self._first()
+            self._analysis,
+            self._recording.plan,
+            options,
+            progress=progress,
+            watch=self._take_answer,
+            first=self._first(),
         )
         self._report = findings(self._recording, self._analysis, self._prediction)
         self._say(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
@@ -100,8 +105,8 @@ class Work:
             case _:
                 pass
 
-    def timed(self, words: str, load_steps: int = 0) -> Callable[[float], bool]:
-        """Return a listener to progress that says part done and time left, and stops for what is urgent."""
+    def progress_listener(self, words: str, load_steps: int = 0) -> Callable[[float], bool]:
+        """Return a listener to progress that reports the part done and the time left, and stops for urgent requests."""
         began = said = time.monotonic()
 
         def report_part(part: float) -> bool:
@@ -149,7 +154,7 @@ class Work:
         main = [trial.number for block in plan.blocks if block.phase == "main" for trial in block.trials]
         return main.index(chosen.trial) if chosen.trial in main else None
 
-    def _answered(self, _number: int, row: TrialPrediction, way: Way | None) -> None:
+    def _take_answer(self, _number: int, row: TrialPrediction, way: Way | None) -> None:
         finding = finding_of(row)
         self._ways[finding.trial, finding.stroke] = row, way
         self._say(m.Answered(finding, self._finger(row.prediction)))
@@ -183,7 +188,7 @@ class Work:
                         levels = common_levels(tuple(every.values()) or (field,))
                         panel = finger_panels(field, levels, simulated=report.simulated)[what == "contact"]
             elif what == "compared":
-                panel = self._compared_panel()
+                panel = self._comparison_panel()
             elif what == "stroke":
                 only = tuple(s for s in report.strokes if s.number == int(of))
                 panel = picture(replace(report, strokes=only), "friction")
@@ -201,7 +206,7 @@ class Work:
             words = film_words(self._filmed, int(step)) if step else next(settled, "")
             return f"{words}. {tr(FIELD_ERRORS)}"
         if what == "compared":
-            return "\n".join(named_errors(one) for one in (self._report, self._other) if one is not None)
+            return "\n".join(name_and_errors(one) for one in (self._report, self._other) if one is not None)
         return picture_errors(self._report, name)
 
     def _field(self, of: str, every: Mapping[int, Field]) -> Field | None:
@@ -217,7 +222,7 @@ class Work:
             return None
         return field_at(finding.experiment, finding.index, film.film, int(step))
 
-    def _compared_panel(self) -> "Panel | None":
+    def _comparison_panel(self) -> "Panel | None":
         from sessions.report.figures.relation import comparison_panel
         from sessions.report.figures.style import look
 
@@ -225,7 +230,7 @@ class Work:
             return None
         names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
         with look():
-            return comparison_panel(NAMES, names, compared(self._report, other), simulated=simulated)
+            return comparison_panel(NAMES, names, compare_reports(self._report, other), simulated=simulated)
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
@@ -242,7 +247,7 @@ class Work:
         if way.march is None and (prediction.prediction is not None or way.scene.materials.relax):
             raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
         sketch, why = self._sketch(way.finger.geometry.mesh, way.scene), ""
-        progress = self.timed(tr("drawing the history"), len(way.march or ()))
+        progress = self.progress_listener(tr("drawing the history"), len(way.march or ()))
         if way.march is not None:
             film = film_of(way, way.march, sketch, progress)
         else:
@@ -254,17 +259,17 @@ class Work:
 
     def _compare(self, folder: Path) -> None:
         self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))
-        recording = _opened(folder)
+        recording = _open_recording(folder)
         analysis = analyse(recording, stored_settings(recording))
-        progress = self.timed(tr("predicting {name}", name=folder.name))
+        progress = self.progress_listener(tr("predicting {name}", name=folder.name))
         fingers: dict[m.Key, Finger] = {}
 
-        def answered(_number: int, row: TrialPrediction, _way: Way | None) -> None:
+        def take_answer(_number: int, row: TrialPrediction, _way: Way | None) -> None:
             if (finger := self._finger(row.prediction)) is not None:
                 finding = finding_of(row)
                 fingers[finding.trial, finding.stroke] = finger
 
-        prediction = predict(analysis, recording.plan, _options(recording), progress=progress, watch=answered)
+        prediction = predict(analysis, recording.plan, _options(recording), progress=progress, watch=take_answer)
         self._other = findings(recording, analysis, prediction)
         self._say(m.Compared(str(folder), self._other, fingers))
 
@@ -280,7 +285,7 @@ class Work:
         if request.what == "report":
             from sessions.report import pages
 
-            progress = self.timed(tr("carrying the uncertainty of friction through"))
+            progress = self.progress_listener(tr("carrying the uncertainty of friction through"))
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
             self._prediction = with_intervals(self._analysis, with_them, progress=progress)
             pages.write_report(findings(self._recording, self._analysis, self._prediction), path)
@@ -288,13 +293,13 @@ class Work:
         made_by = {"made_by": software_versions()}
         documents = made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
         source = ExportSource(self._recording, *documents)
-        progress = self.timed(tr("writing {what}", what=request.what))
+        progress = self.progress_listener(tr("writing {what}", what=request.what))
 
-        def shown(part: float) -> None:
+        def report_part(part: float) -> None:
             if not progress(part):
                 raise Cancelled
 
-        return str(export(source, request.what, path, shown))
+        return str(export(source, request.what, path, report_part))
 
     def _write_picture(self, name: str, path: Path) -> str:
         from sessions.file_access import write_whole
@@ -317,7 +322,7 @@ class NothingToShow(Exception):
     """What was asked for is not there; one sentence says why."""
 
 
-def _opened(folder: Path) -> Recording:
+def _open_recording(folder: Path) -> Recording:
     recording = reveal(Recording.open(folder))
     if recording.plan.blinded:
         raise Blinded(f"{folder} is blinded: its results are told by index; 'daq-app unblind' opens the key")

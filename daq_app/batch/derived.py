@@ -53,7 +53,7 @@ def analyse_session(
     says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
     somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
-    before = _stored(recording, ANALYSIS)
+    before = _read_or_empty(recording, ANALYSIS)
     if gain_error is None:
         gain_error = gain_error_set(recording.folder)
     else:
@@ -72,12 +72,12 @@ def analyse_session(
 
 def stored_settings(recording: Recording) -> AnalysisSettings:
     """Return the settings that were asked for a session before. Raises RecordingError where the last is damaged."""
-    return replace(settings_of(_stored(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
+    return replace(settings_of(_read_or_empty(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
 
 
 def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | None:
     """Say that the kept prediction has another law of the area, calibration error or seed; None where it has not."""
-    before = _stored(recording, PREDICTION)
+    before = _read_or_empty(recording, PREDICTION)
     if not before:
         return None
     stood = settings_of(before)
@@ -91,13 +91,13 @@ def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | No
 
 def stored_options(recording: Recording) -> PredictionOptions | None:
     """Return the options of the prediction that was kept before; None where there is none that can be read."""
-    before = _stored(recording, PREDICTION)
+    before = _read_or_empty(recording, PREDICTION)
     return from_table(before["options"], PredictionOptions, PREDICTION) if "options" in before else None
 
 
 def stored_afferent(recording: Recording) -> AfferentSettings | None:
     """Return the parameters of the afferent kept with the prediction before; None where none was kept."""
-    return _afferent_of(_stored(recording, PREDICTION))
+    return _afferent_of(_read_or_empty(recording, PREDICTION))
 
 
 def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
@@ -128,8 +128,8 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
     return document
 
 
-def _stored(recording: Recording, name: str) -> Mapping[str, Any]:
-    """Return a document as it was kept before; empty where there is none, or one that is damaged and made anew."""
+def _read_or_empty(recording: Recording, name: str) -> Mapping[str, Any]:
+    """Return a stored document; empty where there is none, or a damaged one, which is then made anew."""
     try:
         return stored_document(recording.folder, name) or {}
     except RecordingError:
@@ -149,7 +149,7 @@ def predict_session(
     What else was kept before and is not asked for again is named. Raises as `predict` does.
     """
     prediction = _predict(analysis, recording.plan, options, console.reporter("predicting"))
-    before = _stored(recording, PREDICTION)
+    before = _read_or_empty(recording, PREDICTION)
     document = _with_firing(prediction, afferent or _afferent_of(before))
     lost = _no_longer(before, prediction.options)
     if lost:

@@ -214,8 +214,8 @@ class Shelf:
             digest.update(f"\0{name}\0{len(content)}\0".encode() + content)
         return digest.hexdigest()
 
-    def stored(self, key: str) -> Visit | None:
-        """Return what was kept under a key; None where nothing was, or it is not what was written."""
+    def load(self, key: str) -> Visit | None:
+        """Return the visit stored under a key; None where there is none, or where the file has changed."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             kept = json.loads(self.file(key).read_bytes())
             if kept["sha256"] == _digest(kept["visit"]):
@@ -256,7 +256,7 @@ def visits(
     RecordingError where the shelf cannot be written.
     """
     keys = {folder: shelf.key(folder) for folder in folders}
-    kept = {folder: shelf.stored(key) for folder, key in keys.items()}
+    kept = {folder: shelf.load(key) for folder, key in keys.items()}
     done = [visit for visit in kept.values() if visit is not None]
     missing = [folder for folder, visit in kept.items() if visit is None]
     for folder in missing:

@@ -66,14 +66,14 @@ class Trial:
 Answer = Mapping[str, list[list[list[float | None]]]]
 
 
-def published(kinematics: Kinematics = "small") -> Scene:
+def published_finger(kinematics: Kinematics = "small") -> Scene:
     """Return the published finger."""
     return Scene(friction=Friction(0.0), loading=Loading(1.0), solve=Solve(kinematics))
 
 
 def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
     """Return fingers that differ from the published one in one thing, by what that is."""
-    base = published(kinematics)
+    base = published_finger(kinematics)
     other: Kinematics = "finite" if kinematics == "small" else "small"
 
     def finger(**changes: float) -> Trial:
@@ -81,7 +81,7 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
 
     return {
         "as published": Trial(base),
-        f"{other} strain": Trial(published(other)),
+        f"{other} strain": Trial(published_finger(other)),
         f"pressed by {FORCE:g} N/mm": Trial(base, Press(force=FORCE)),
         "receptor 1 mm proximal": Trial(base, arcs=(-1.0,)),
         "receptor 0.25 mm proximal": Trial(base, arcs=(-0.25,)),
@@ -98,14 +98,14 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
 
 def map_trials(kinematics: Kinematics) -> Mapping[float, Trial]:
     """Return the published finger with other tip radii [mm], asked at every place of the map."""
-    base = published(kinematics)
+    base = published_finger(kinematics)
     fingers = {radius: replace(base, finger=replace(base.finger, tip_radius=radius)) for radius in RADII}
     return {radius: Trial(finger, arcs=PLACES) for radius, finger in fingers.items()}
 
 
 def drawn_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
     """Return the fingers at points (n, numbers) of the design."""
-    return [_finger(dict(zip(DESIGN, point, strict=True)), published(kinematics)) for point in points.tolist()]
+    return [_finger(dict(zip(DESIGN, point, strict=True)), published_finger(kinematics)) for point in points.tolist()]
 
 
 def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:

@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 from daq_app.analyst import state as m
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_words, words_of
-from daq_app.analyst.state import AnalystState, chosen, fold, rows
+from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Panel, Wrapped, button, choice, hbox, label, scrolled, vbox
+from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, scroll_area, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
@@ -87,9 +87,9 @@ class AnalystWindow(QMainWindow):
         self.trials = TrialsColumn(tokens)
         self.stroke = StrokeColumn(tokens)
         self.stroke.replayed.connect(self._replay_next)
-        self._words = Wrapped("quiet", keeps_room=True)
+        self._words = WrappedLabel("quiet", keeps_room=True)
         self.model = ModelColumn(tokens, type_scale())
-        self.model.other_wanted.connect(self._choose_other)
+        self.model.other_wanted.connect(self._choose_comparison)
         self.model.said.connect(self._words.show_text)
         for column in (self.trials, self.stroke, self.model):
             column.requested.connect(self.ask)
@@ -103,7 +103,7 @@ class AnalystWindow(QMainWindow):
         self.format = choice(tr("format of the export"), sorted(FORMATS))
         self.export = button(tr("Export…"), tr("write an export"), self.write_export)
         self._columns = {tr("Trials"): self.trials, tr("Stroke"): self.stroke, tr("Model"): self.model}
-        self._areas = [scrolled(column) for column in self._columns.values()]  # one that is too high is never cut
+        self._areas = [scroll_area(column) for column in self._columns.values()]  # one that is too high is never cut
         self._panels = [Panel(name.lower()) for name in self._columns]
         for panel, area in zip(self._panels, self._areas, strict=True):
             vbox(area, on=panel, margins=GRID)
@@ -112,7 +112,7 @@ class AnalystWindow(QMainWindow):
         self._panes = QWidget()
         self._row = hbox(on=self._panes, spacing=GRID)
         self._narrow: bool | None = None
-        self.setCentralWidget(self._placed())
+        self.setCentralWidget(self._lay_out())
         self._place_columns()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look)
@@ -188,7 +188,7 @@ class AnalystWindow(QMainWindow):
         if name:
             self.ask(m.Write(what, name))
 
-    def _choose_other(self) -> None:
+    def _choose_comparison(self) -> None:
         name = QFileDialog.getExistingDirectory(self, tr("Session to compare with"), str(self.state.folder.parent))
         if name:
             self.ask(m.Compare(name))
@@ -252,7 +252,7 @@ class AnalystWindow(QMainWindow):
         if narrow and self.state.compared is not None:  # what has just come stays in sight
             self._pages.setCurrentIndex(2)
 
-    def _placed(self) -> QWidget:
+    def _lay_out(self) -> QWidget:
         self.progress.setFixedWidth(round(140 * type_scale()))
         self.format.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.format.setFixedWidth(round(90 * type_scale()))
@@ -277,12 +277,12 @@ class TrialsColumn(QWidget):
         self._listed: tuple[str, ...] = ()
         self.list = QListWidget()
         self.list.setAccessibleName(tr("trials"))
-        self.list.currentRowChanged.connect(self._chosen)
+        self.list.currentRowChanged.connect(self._choose)
         self.responses = choice(tr("quantity that is held against the score"))
         for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
             self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
         self.responses.activated.connect(lambda: self.responded.emit(m.Respond(self.responses.currentData())))
-        self.errors = Wrapped("quiet")
+        self.errors = WrappedLabel("quiet")
         self.relation = ZoomedPlot(tokens)
         self.relation.setAccessibleName(tr("prediction against score: a point chooses its trial"))
         self.relation.setLabel("bottom", tr("mean score"))
@@ -307,7 +307,7 @@ class TrialsColumn(QWidget):
             marks = marks_of(row)
             item.setToolTip(marks)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {marks}".rstrip())
-        self.list.setCurrentRow(state.row if chosen(state) is not None else -1)
+        self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)
         self.list.blockSignals(False)
         self.errors.show_text(greatest_errors(state.report, state.response))
         marks = {True: {"size": 18, "symbol": "s"}, False: {"size": 11, "symbol": "o"}}
@@ -315,7 +315,7 @@ class TrialsColumn(QWidget):
         shown = ({"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state))
         self.points.setData([spot | alike for spot in shown])
 
-    def _chosen(self, row: int) -> None:
+    def _choose(self, row: int) -> None:
         if row >= 0:
             self.requested.emit(m.Choose(row))
 

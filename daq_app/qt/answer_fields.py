@@ -64,7 +64,7 @@ class ScoreLine(QAbstractSlider):
         self.setRange(0, 100)
         self._words: Translate = str
         self._name()
-        self.valueChanged.connect(self._moved)
+        self.valueChanged.connect(self._move)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -106,7 +106,7 @@ class ScoreLine(QAbstractSlider):
     def event(self, event: QEvent) -> bool:
         """Take touches; Qt makes mouse events only of those that nobody takes."""
         if isinstance(event, QTouchEvent) and event.points():
-            self._touched(event, event.points()[0].position())
+            self._touch(event, event.points()[0].position())
             event.accept()
             return True
         return super().event(event)
@@ -155,7 +155,7 @@ class ScoreLine(QAbstractSlider):
             painter.setPen(QPen(QColor(t.act), max(1.0 * mm, 3.0), Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
             painter.drawLine(at - QPointF(0, MARK / 2 * mm), at + QPointF(0, MARK / 2 * mm))
 
-    def _touched(self, event: QTouchEvent, at: QPointF) -> None:
+    def _touch(self, event: QTouchEvent, at: QPointF) -> None:
         now, place = self._now(), self._position(at)
         match event.type():
             case QEvent.Type.TouchBegin:
@@ -165,7 +165,7 @@ class ScoreLine(QAbstractSlider):
             case _:
                 self._take(self.answer.released())
 
-    def _moved(self, value: int) -> None:
+    def _move(self, value: int) -> None:
         """Take a value that assistive technology sets."""
         if value != round(self.answer.score or 0.0):
             self._take(self.answer.pressed(self._now(), float(value), "keyboard").released())
@@ -239,7 +239,7 @@ class NumberField(_Field):
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.field.setStyleSheet(f"font-size: {round(LARGE * scale)}px;")
         self.field.setValidator(QRegularExpressionValidator(NUMBER, self.field))
-        self.field.textEdited.connect(self._typed)
+        self.field.textEdited.connect(self._type)
         fill(QHBoxLayout(self), 1, self.field, 1)
         self.setFocusProxy(self.field)
 
@@ -248,7 +248,7 @@ class NumberField(_Field):
         self.field.clear()
         self.changed.emit()
 
-    def _typed(self, text: str) -> None:
+    def _type(self, text: str) -> None:
         try:
             number = float(text.strip().translate(dict.fromkeys(map(ord, POINTS), ".")))
         except ValueError:

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QComboBox, QPushButton, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp
-from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, named, regrade, say, scrolled, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, label_grid, regrade, say, scroll_area, vbox
 from daq_app.qt.tokens import GRID, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS
@@ -51,7 +51,7 @@ class BenchPanel(Panel):
         name = tr("acknowledge overloads: begin to watch anew")
         self.acknowledge = button(tr("Acknowledge A"), name, lambda: send(AcknowledgeOverloads()))
         self._search_words = label("", "quiet", wrap=True)
-        vbox(self._built(), on=self, margins=2)
+        vbox(self._build(), on=self, margins=2)
 
     def show_view(self, view: BenchView) -> None:
         before, self._view = self._view, view
@@ -87,7 +87,7 @@ class BenchPanel(Panel):
         view = self._view
         if view is not None and view.connect is not None:
             self._send(view.connect)
-        elif uri := self._chosen():
+        elif uri := self._chosen_uri():
             self._send(Connect(uri))
             self._show_begin()
 
@@ -96,13 +96,13 @@ class BenchPanel(Panel):
             self.connect_chosen()
         self.window().setFocus()
 
-    def _chosen(self) -> str:
+    def _chosen_uri(self) -> str:
         text = self._choice.currentText().strip()
         at = self._choice.findText(text)
         return text if at < 0 else str(self._choice.itemData(at))
 
     def _show_devices(self, view: BenchView) -> None:
-        typed = self._chosen()
+        typed = self._chosen_uri()
         self._choice.clear()
         for device in view.devices:
             self._choice.addItem(f"{device.name} · {device.detail}", device.uri)
@@ -117,7 +117,7 @@ class BenchPanel(Panel):
         if (typed_in := self._choice.lineEdit()) is not None:
             typed_in.setCursorPosition(0)  # of an address that is too long the kind of transducer is seen
 
-    def _built(self) -> QWidget:
+    def _build(self) -> QWidget:
         inside, fields = QWidget(), self._fields
         vbox(
             self._name,
@@ -125,22 +125,22 @@ class BenchPanel(Panel):
             self._choice,
             hbox((self.connect_button, 1), (self.search, 1)),
             self._search_words,
-            named((tr(name), fields[name]) for name in ("serial", "calibration", "rate")),
+            label_grid((tr(name), fields[name]) for name in ("serial", "calibration", "rate")),
             label(tr("Load: share of the rated range, most since acknowledged, noise"), "section", wrap=True),
             vbox(*self._bars.values(), spacing=0),
             hbox((self.tare, 2), (self.acknowledge, 3)),
             label(tr("Readings since the stream began"), "section", wrap=True),
-            named(((tr(name), value) for name, value in self._counters.items()), 2),
+            label_grid(((tr(name), value) for name, value in self._counters.items()), 2),
             label(tr("Zero"), "section"),
-            named(((tr("mean"), fields["tare"]), (tr("drift"), fields["drift"]))),
+            label_grid(((tr("mean"), fields["tare"]), (tr("drift"), fields["drift"]))),
             label(tr("This serial number, over its life here"), "section", wrap=True),
-            named((tr(name), value) for name, value in self._life.items()),
+            label_grid((tr(name), value) for name, value in self._life.items()),
             1,
             on=inside,
             margins=(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID),
             spacing=GRID,
         )
-        return scrolled(inside)
+        return scroll_area(inside)
 
 
 def show_connecting(push: QPushButton, view: BenchView) -> None:

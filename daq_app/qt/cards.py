@@ -66,7 +66,7 @@ class CutShort(Panel):
         self._shown: tuple[Unfinished, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
-        self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resumed)
+        self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
         fill(QVBoxLayout(self), label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on)
         self._listed.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
         self.show_sessions(())
@@ -91,7 +91,7 @@ class CutShort(Panel):
                 self._sessions.setItemData(at, str(session.folder), Qt.ItemDataRole.ToolTipRole)
         self.setVisible(bool(sessions))
 
-    def _resumed(self) -> None:
+    def _resume(self) -> None:
         if folder := self._sessions.currentData():
             self._send(ResumeSession(str(folder)))
 

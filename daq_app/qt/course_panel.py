@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
-from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, say, stacked, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, say, stack_pages, vbox
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.state import Message
@@ -47,7 +47,7 @@ class CoursePanel(Panel):
         for at, widget in enumerate(self.buttons.values()):
             grid.addWidget(widget, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
-        self._bottom = stacked(acts, self._entry_row(scale))
+        self._bottom = stack_pages(acts, self._entry_row(scale))
         self._timer = label("", "quiet")
         self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
@@ -66,14 +66,14 @@ class CoursePanel(Panel):
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
         for name, widget in self.buttons.items():
-            shown = _shown(view, name)
-            if before is None or shown != _shown(before, name):
+            shown = _button_of(view, name)
+            if before is None or shown != _button_of(before, name):
                 widget.setText(f"{shown.label} {tr(shown.key)}".strip())
                 widget.setEnabled(shown.enabled)
 
     def ask(self, what: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
-        if self._view is None or not (shown := _shown(self._view, what)).enabled:
+        if self._view is None or not (shown := _button_of(self._view, what)).enabled:
             return
         if shown.sends is not None:
             self._send(shown.sends)
@@ -131,6 +131,6 @@ class CoursePanel(Panel):
         self.mirror.open.set_room(self.height() >= self._roomy)
 
 
-def _shown(view: CourseView, name: str) -> Button:
+def _button_of(view: CourseView, name: str) -> Button:
     button: Button = getattr(view, name.replace(" ", "_"))
     return button

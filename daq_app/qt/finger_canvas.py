@@ -114,7 +114,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def view(self) -> View:
         """Return where places of the finger lie on the canvas."""
-        part, here = self._box.viewRect(), self._here()
+        part, here = self._box.viewRect(), self._plot_rect()
         middle, per_mm = part.center(), here.width() / part.width()
         return View(middle.x(), middle.y(), here.center().x(), here.center().y(), per_mm)
 
@@ -139,7 +139,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         if self.frame is not None:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setFont(self._font)
-            picture = FingerPainter(painter, self._tokens, self.view(), self._here(), self.frame, self._parts)
+            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame, self._parts)
             picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
@@ -203,7 +203,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def _probe(self) -> None:
         at = self._pointer
-        inside = at is not None and self.frame is not None and self._here().contains(at)
+        inside = at is not None and self.frame is not None and self._plot_rect().contains(at)
         self.sight.pointed.emit(self.view().place(at.x(), at.y()) if inside and at is not None else None)
 
     def _place(self) -> None:
@@ -221,7 +221,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             left, below = boxes.min(axis=0)[[0, 2]].tolist()
             right, high = boxes.max(axis=0)[[1, 3]].tolist()
             room = max(here.height() - line - 2.0, 1.0)  # over a line of words under the tractions
-            shown = View.fitted((left, right, below, high), 0.0, 0.0, here.width(), room)
+            shown = View.fit((left, right, below, high), 0.0, 0.0, here.width(), room)
             x0, x1, y0, y1 = shown.visible(0.0, 0.0, here.width(), here.height())
             part = QRectF(x0, y0, x1 - x0, y1 - y0)
         if part is not None:
@@ -230,7 +230,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._item.update()
         self.viewport().update()
 
-    def _here(self) -> QRectF:
+    def _plot_rect(self) -> QRectF:
         return QRectF(self._box.mapRectToScene(self._box.rect()))
 
     def _above(self) -> float:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
-from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, View, halved, visible
-from daq_app.qt.painting import faces, paint_lost, sheer
+from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, View, halve_triangles, visible
+from daq_app.qt.painting import faces, paint_failed_solve, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 
@@ -59,7 +59,7 @@ class FingerPainter:
 
     def paint(self, look: Look, shades: list[QColor], line: Line | None) -> None:
         painter, ink, box = self.painter, QColor(self.tokens.text), self.box
-        ground = self._placed(np.array([[0.0, 0.0]]))[0].y()
+        ground = self._to_screen(np.array([[0.0, 0.0]]))[0].y()
         painter.save()
         painter.setClipRect(box)
         below = QRectF(box.left(), max(ground, box.top()), box.width(), box.bottom() - max(ground, box.top()))
@@ -72,13 +72,13 @@ class FingerPainter:
         painter.drawLine(QPointF(box.left(), ground), QPointF(box.right(), ground))
         self._paint_contact(ground)
         if look.lost is not None:
-            paint_lost(painter, self._placed(np.array([look.lost]))[0], self.tokens)
+            paint_failed_solve(painter, self._to_screen(np.array([look.lost]))[0], self.tokens)
         if line is not None:
             self._paint_line(line)
         painter.restore()
 
-    def _placed(self, points: Array) -> list[QPointF]:
-        rows: list[list[float]] = self.view.placed(points).tolist()
+    def _to_screen(self, points: Array) -> list[QPointF]:
+        rows: list[list[float]] = self.view.to_screen(points).tolist()
         return [QPointF(x, y) for x, y in rows]
 
     def _paint_tissue(self, look: Look, shades: list[QColor]) -> None:
@@ -87,12 +87,12 @@ class FingerPainter:
         nodes, values = frame.nodes, look.field.of(frame)
         triangles = visible(nodes, self.parts.triangles, shown)
         if len(triangles) and box.width() * box.height() / len(triangles) > COARSE:
-            nodes, values, triangles = halved(nodes, values, triangles)
+            nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
         part = (values[triangles].mean(axis=1) - low) / (high - low)
         wanted = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
         self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        for number, path in faces(self.view.placed(nodes)[triangles], wanted):
+        for number, path in faces(self.view.to_screen(nodes)[triangles], wanted):
             self.painter.setPen(QPen(shades[number], 0))
             self.painter.setBrush(shades[number])
             self.painter.drawPath(path)
@@ -101,7 +101,7 @@ class FingerPainter:
 
     def _paint_mesh(self) -> None:
         self.painter.setPen(QPen(sheer("black", 110), 0.6))
-        points = self._placed(self.frame.nodes)
+        points = self._to_screen(self.frame.nodes)
         around: list[list[int]] = self.parts.elements.tolist()
         for element in around:
             if any(self.box.contains(points[node]) for node in element):
@@ -114,13 +114,13 @@ class FingerPainter:
             painter.setPen(QPen(ink if name in ("skin", "bone") else QColor("black"), 1.4 if name == "skin" else 0.7))
             if name == "bone":
                 painter.setBrush(QColor(self.tokens.surface))
-                bone = QPolygonF(self._placed(outline))
+                bone = QPolygonF(self._to_screen(outline))
                 painter.drawPolygon(bone)
                 painter.setBrush(Qt.BrushStyle.NoBrush)
-                self._name_bone(bone, self._placed(outline.mean(axis=0)[None])[0])
+                self._name_bone(bone, self._to_screen(outline.mean(axis=0)[None])[0])
             else:
-                painter.drawPolyline(QPolygonF(self._placed(outline)))
-        self._in_two(QPolygonF(self._placed(self.frame.patch)))
+                painter.drawPolyline(QPolygonF(self._to_screen(outline)))
+        self._in_two(QPolygonF(self._to_screen(self.frame.patch)))
 
     def _name_bone(self, bone: QPolygonF, middle: QPointF) -> None:
         """Write the bone's name where all of it lies on the bone: on the colours around it could not be read."""
@@ -131,7 +131,7 @@ class FingerPainter:
             self.painter.drawText(words, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, tr("bone"))
 
     def _paint_line(self, line: Line) -> None:
-        ends = self._placed(np.array(line))
+        ends = self._to_screen(np.array(line))
         self._in_two(QPolygonF(ends))
         for name, end in zip("AB", ends, strict=True):
             self.painter.setBrush(QColor("white"))
@@ -151,7 +151,7 @@ class FingerPainter:
         touching = [i for i, state in enumerate(contact.state) if state != "open"]
         if not touching:
             return
-        places: list[float] = self.view.placed(np.column_stack([contact.x, np.zeros(len(contact.x))]))[:, 0].tolist()
+        places: list[float] = self.view.to_screen(np.column_stack([contact.x, np.zeros(len(contact.x))]))[:, 0].tolist()
         strongest = float(np.hypot(contact.pressure, contact.traction)[touching].max())
         painter.setPen(QPen(ink, 1.0))
         for i in touching[:: max(1, -(-len(touching) // ARROWS))] if strongest > 0.0 else ():

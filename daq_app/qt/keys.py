@@ -7,7 +7,7 @@ from PySide6.QtCore import QElapsedTimer, QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
-from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, named, scrolled, vbox
+from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, label_grid, scroll_area, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.window.subject import owner
@@ -109,10 +109,10 @@ class KeysPage(Panel):
     def _fill(self) -> None:
         head = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
         rows, pairs = QWidget(), ((tr(known.key), label(tr(known.words), wrap=True)) for known in self._keys)
-        grid = named(pairs, role="value")
+        grid = label_grid(pairs, role="value")
         grid.setHorizontalSpacing(3 * GRID)
         vbox(grid, on=rows, margins=(0, 0, GRID, 0))
-        area = scrolled(rows)
+        area = scroll_area(rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
         vbox(head, (area, 1), on=self, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)), spacing=GRID)
 
@@ -151,8 +151,8 @@ class Keyboard(QObject):
         application.focusChanged.connect(self._focus_changed)
         application.applicationStateChanged.connect(self._state_changed)
 
-    def typed_in(self) -> QWidget | None:
-        """Return the text that the experimenter types in; None where there is none."""
+    def focused_field(self) -> QWidget | None:
+        """Return the text field that the experimenter types in; None where there is none."""
         field: QWidget | None = QApplication.focusWidget()
         if field is None or field.window() is self._subject:
             field = self._window.focusWidget()
@@ -160,7 +160,7 @@ class Keyboard(QObject):
 
     def press(self, event: QKeyEvent) -> bool:
         """Take a key that no field took; return whether it meant anything."""
-        match owner(name_of(event), self._subject.asks, typing=self.typed_in() is not None):
+        match owner(name_of(event), self._subject.asks, typing=self.focused_field() is not None):
             case "answer":
                 self._subject.take_key(event)
                 return True
@@ -177,7 +177,7 @@ class Keyboard(QObject):
         """Give the keys of the plan and of the subject's window to whom they are meant for."""
         if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent) or self._subject.measuring:
             return False
-        field, key = self.typed_in(), name_of(event)
+        field, key = self.focused_field(), name_of(event)
         whose = owner(key, self._subject.asks, typing=field is not None, from_subject=watched is not self._plan)
         if watched is self._plan:  # a list would search for letters
             return (whose == "answer" or act_of(event) is not None) and self.press(event)
@@ -193,9 +193,9 @@ class Keyboard(QObject):
         return soon and event.key() == self._subject.given_with
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
-        if new is not None and new.window() is self._window and is_text_field(old) and self.typed_in() is None:
+        if new is not None and new.window() is self._window and is_text_field(old) and self.focused_field() is None:
             self.free.emit()
 
     def _state_changed(self, state: Qt.ApplicationState) -> None:
-        if state == Qt.ApplicationState.ApplicationActive and self.typed_in() is None:
+        if state == Qt.ApplicationState.ApplicationActive and self.focused_field() is None:
             self.free.emit()

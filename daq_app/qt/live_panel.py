@@ -105,8 +105,8 @@ class LiveBar(QWidget):
             self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
         self.show_words()
-        set_horizontal(self._rows, not self._forces_shown or self._needed(TITLE) + self._acts <= self.width())
-        size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
+        set_horizontal(self._rows, not self._forces_shown or self._needed_width(TITLE) + self._acts <= self.width())
+        size, role = next((pair for pair in SIZES if self._needed_width(pair[0]) <= self.width()), SIZES[-1])
         room = self.width()
         for channel, value in self.values.items():
             caption = self._captions[channel]
@@ -121,8 +121,8 @@ class LiveBar(QWidget):
         self.finite.setText("M" if self._short else tr("Finite  M"))
         self.hold.setText("H" if self._short else tr("Held  H") if self.hold.isChecked() else tr("Hold  H"))
 
-    def _needed(self, size: int) -> int:
-        """Return the width of all numbers in a type [px]."""
+    def _needed_width(self, size: int) -> int:
+        """Return the width that all numbers need in a font size [px]."""
         captions = sum(caption.sizeHint().width() + 2 * GRID for caption in self._captions.values())
         return captions + sum(self._widest(channel, size) for channel in self.values)
 
@@ -178,7 +178,7 @@ class LivePanel(Panel):
         self.finger = FingerView(scale)
         self.map = ContactMap(scale)
         self.bar = LiveBar(scale, self.show_seconds, self._hold, self._finite)
-        self.drawer = Drawer(*self._placed())
+        self.drawer = Drawer(*self._lay_out())
         self.tab = button("", tr("drawer"), self.toggle_drawer, "handle")
         self.tab.setFixedWidth(round(TAB * scale))
         self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
@@ -302,7 +302,7 @@ class LivePanel(Panel):
             plot.show_axis(times=not below)  # one axis for all of them
         self.finger.setVisible(model)
 
-    def _placed(self) -> tuple[QWidget, QWidget]:
+    def _lay_out(self) -> tuple[QWidget, QWidget]:
         stroke, drawer = QWidget(), QWidget()
         vbox(*zip(self._column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
         vbox((self.finger, 7), (self.map, 3), *((plot, 2) for plot in self.plots[3:]), on=drawer, spacing=4)

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QP
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.analyst.frame import View
-from daq_app.qt.painting import PaintedWidget, blank, draw_line, faces, fine, lines, paint_arrow, paint_lost
+from daq_app.qt.painting import PaintedWidget, blank, draw_line, faces, fine, lines, paint_arrow, paint_failed_solve
 from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
 from daq_app.window.live_model import ModelWords, Picture
 from daq_app.window.live_trace import PlotScale
@@ -182,22 +182,22 @@ class FingerView(QWidget):
             self._paint_row(painter, QRectF(0, top + room - row, self.width(), row))
 
     def _paint_finger(self, painter: QPainter, box: QRectF) -> None:
-        t, view = theme_of(self), View.fitted(SHOWN, box.left(), box.top(), box.width(), box.height())
+        t, view = theme_of(self), View.fit(SHOWN, box.left(), box.top(), box.width(), box.height())
         if view.per_mm < 1.0:
             return
         painter.save()
         painter.setClipRect(box)
         painter.setPen(QPen(QColor(t.quiet), 2))
-        ground = view.placed(np.zeros((1, 2)))[0, 1]
+        ground = view.to_screen(np.zeros((1, 2)))[0, 1]
         painter.drawLine(QPointF(box.left(), ground), QPointF(box.right(), ground))
         picture = self._picture
         if picture is not None:
-            self._paint_faces(painter, picture, view.placed(picture.nodes))
+            self._paint_faces(painter, picture, view.to_screen(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
             painter.setPen(fine(t.text, style))
-            draw_line(painter, *view.placed(picture.outline).T)
+            draw_line(painter, *view.to_screen(picture.outline).T)
             if picture.lost is not None:
-                paint_lost(painter, QPointF(*view.placed(np.array([picture.lost]))[0].tolist()), t)
+                paint_failed_solve(painter, QPointF(*view.to_screen(np.array([picture.lost]))[0].tolist()), t)
         painter.restore()
         painter.setPen(QColor(t.quiet))
         painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, tr("0 to {high:g} kPa", high=self._colours.high))

@@ -17,7 +17,7 @@ from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import fill, hbox, scrolled, stacked, vbox
+from daq_app.qt.parts import fill, hbox, scroll_area, stack_pages, vbox
 from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, millimetres, restore_place, save_place
 from daq_app.qt.rooms import ROOMS, Menus, Rail, Room, Rooms
 from daq_app.qt.subject_picture import open_preview
@@ -76,13 +76,13 @@ class MainWindow(QMainWindow):
         self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act))
         self.keys = KeysPage(self, scale)
         self._acts = self._table()
-        self._left = stacked(self.page, self.course)
-        self.setCentralWidget(self._placed())
+        self._left = stack_pages(self.page, self.course)
+        self.setCentralWidget(self._lay_out())
         self.page.changed.connect(self._form_changed)
         bridge.changed.connect(self.show_view)
         bridge.frame.connect(self._draw)
         self.show_view(bridge.view)
-        self.page.look_for_unfinished()
+        self.page.look_for_unfinished_sessions()
         restore_place(self)
         for widget in self.findChildren(QAbstractButton):
             widget.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
@@ -260,7 +260,7 @@ class MainWindow(QMainWindow):
                 self.side.begin()
             else:
                 self.page.subject.clear()  # the next session is not begun by whoever was there last
-                self.page.look_for_unfinished()
+                self.page.look_for_unfinished_sessions()
 
     def _line_changed(self) -> None:
         if self.tablet is None:
@@ -310,7 +310,7 @@ class MainWindow(QMainWindow):
         self.notice.show_folding(height < LOW)
         self.keys.fit()
 
-    def _placed(self) -> QWidget:
+    def _lay_out(self) -> QWidget:
         window = QWidget()
         window.setObjectName("window")
         panels = QWidget()
@@ -320,7 +320,7 @@ class MainWindow(QMainWindow):
         body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(GRID)
         here = QWidget()
-        below = scrolled(panels)
+        below = scroll_area(panels)
         below.setMinimumHeight(1)  # what to do now is whole, however low the window is
         vbox(self.notice, self.to_do, (below, 1), on=here, spacing=GRID)
         self.rooms.addWidget(here)

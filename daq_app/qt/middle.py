@@ -10,7 +10,19 @@ from PySide6.QtWidgets import QPushButton, QScrollArea, QWidget
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, spoken
 from daq_app.qt.live_plot import LivePlot
-from daq_app.qt.parts import Panel, Wrapped, button, hbox, label, named, regrade, say, scrolled, stacked, vbox
+from daq_app.qt.parts import (
+    Panel,
+    WrappedLabel,
+    button,
+    hbox,
+    label,
+    label_grid,
+    regrade,
+    say,
+    scroll_area,
+    stack_pages,
+    vbox,
+)
 from daq_app.qt.tokens import GRID, SMALL, TARGET
 from daq_app.window.course_state import PICTURE, Mark
 from daq_app.window.live_trace import Columns
@@ -35,7 +47,7 @@ class TrialStrip(QScrollArea):
         self.tiles: list[QPushButton] = []
         inside = QWidget()
         self._row = hbox(1, on=inside, spacing=GRID // 2)
-        scrolled(inside, self)
+        scroll_area(inside, self)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setAccessibleName(tr("trials of the session"))
         self.setFixedHeight(max(round((2 * SMALL + 2 * GRID) * scale), TARGET) + 12 + GRID // 2)  # with the scroll bar
@@ -59,8 +71,8 @@ class TrialStrip(QScrollArea):
         self._shown = tiles
         self._keep_in_sight()
 
-    def show_inspected(self, number: int | None) -> None:
-        """Show which trial is inspected; None: none is."""
+    def show_inspected_trial(self, number: int | None) -> None:
+        """Mark the tile of the inspected trial; None marks none."""
         for tile_button, tile in zip(self.tiles, self._shown, strict=True):
             tile_button.setChecked(tile.number == number)
 
@@ -92,7 +104,7 @@ class InspectedTrial(QWidget):
             plot.show_axis(times=plot is self._plots[-1], end=tr("end"))
         head = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
         # Two means in a row find room at every size of type.
-        cells = named(((short_name(name), cell) for name, cell in self.cells.items()), 2)
+        cells = label_grid(((short_name(name), cell) for name, cell in self.cells.items()), 2)
         plots = zip(self._plots, (3, 2, 2), strict=True)
         vbox(head, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
 
@@ -137,13 +149,13 @@ class Middle(QWidget):
         self.strip = TrialStrip(scale, self.inspect)
         self.live = LivePanel(bridge.feed, bridge.model, scale)
         self.trial = InspectedTrial(scale, self.leave)
-        self.stroke = Wrapped("value")
+        self.stroke = WrappedLabel("value")
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
         self.undo.hide()
         frame = Panel(tr("inspected trial"))
-        vbox(scrolled(self.trial), on=frame, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)))
-        self._pages = stacked(self.live, frame)
+        vbox(scroll_area(self.trial), on=frame, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)))
+        self._pages = stack_pages(self.live, frame)
         vbox(self.strip, (self._pages, 1), hbox((self.stroke, 1), self.undo, self.redo), on=self, spacing=GRID)
 
     def show_view(self, course: CourseView | None) -> None:
@@ -173,12 +185,12 @@ class Middle(QWidget):
         if begun or phase == "stroking":
             self.leave()
         self._phase = phase
-        self._show_inspected()
+        self._show_inspection()
 
     def inspect(self, number: int) -> None:
         """Show a trial; the one that is shown already gives way to the signals."""
         self.inspected = None if number == self.inspected else number
-        self._show_inspected()
+        self._show_inspection()
 
     def toggle_inspection(self) -> None:
         """Inspect the trial whose stroke was looked at last, or else the one in hand; or go back."""
@@ -200,10 +212,10 @@ class Middle(QWidget):
         else:
             self.live.toggle_drawer()
 
-    def _show_inspected(self) -> None:
+    def _show_inspection(self) -> None:
         session, number = self._bridge.state.session, self.inspected
         shown = None if session is None or number is None else inspection(session, number)
         if shown is not None:
             self.trial.show_trial(shown)
         self._pages.setCurrentIndex(0 if shown is None else 1)
-        self.strip.show_inspected(None if shown is None else shown.number)
+        self.strip.show_inspected_trial(None if shown is None else shown.number)

@@ -9,20 +9,20 @@ from PySide6.QtWidgets import QFileDialog, QTabWidget, QWidget
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import (
     common_range,
-    compared,
+    compare_reports,
     film_words,
     finger_words,
-    named_errors,
+    name_and_errors,
     other_finger,
     shown_film,
     was_tried,
 )
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
 from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
-from daq_app.analyst.state import AnalystState, Row, chosen
+from daq_app.analyst.state import AnalystState, Row, selected_row
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
-from daq_app.qt.parts import Wrapped, button, choice, hbox, vbox
+from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
 from daq_app.qt.pictures import (
     FILM_SUFFIXES,
     PICTURE,
@@ -62,7 +62,7 @@ class ModelColumn(QWidget):
         self.other = FingerCanvas(tokens, scale, self.finger.sight)  # of the session that is compared
         self.other.hide()
         self.fields, self.plot = FieldBar(), FieldPlot(tokens)
-        self.probe, self.errors = Wrapped("quiet", keeps_room=True), Wrapped("quiet")
+        self.probe, self.errors = WrappedLabel("quiet", keeps_room=True), WrappedLabel("quiet")
         self.fields.changed.connect(self._paint)
         self.plot.changed.connect(self._paint)
         self.plot.draw.toggled.connect(self._draw_line)
@@ -84,11 +84,11 @@ class ModelColumn(QWidget):
         self.save = SaveButtons(tr("the finger"), self._save_finger)
         self.player = TransportBar(tr("the history"), tells_time=False)
         self.player.moved.connect(self._show_step)
-        self.why = Wrapped("value", "look")
+        self.why = WrappedLabel("value", "look")
         self.errors.show_text(tr(FIELD_ERRORS))
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
         self.which.activated.connect(lambda: self._show_session())
-        self.session_errors = Wrapped("quiet")
+        self.session_errors = WrappedLabel("quiet")
         self.compared = ComparedView(self.other_wanted.emit, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
@@ -110,7 +110,7 @@ class ModelColumn(QWidget):
             self._at = None if film is None else len(film.film.instants) - 1
             count = 0 if film is None else len(film.film.instants)
             self.player.set_times([number / STEPS_A_SECOND for number in range(count)], max(count - 1, 0))
-        row = chosen(state)
+        row = selected_row(state)
         said, stroke = (None, None) if row is None else (row.prediction, row.stroke)
         self.history.setEnabled(film is None and said is not None and said.mu is not None)
         self.why.show_text(film_words(film))
@@ -128,12 +128,12 @@ class ModelColumn(QWidget):
                 self.which.addItems(names)
         self._show_session()
         if state.compared is not None and (before is None or before.compared is not state.compared):
-            self._show_compared(state, state.compared)
+            self._show_comparison(state, state.compared)
 
-    def _show_compared(self, state: AnalystState, other: m.Compared) -> None:
+    def _show_comparison(self, state: AnalystState, other: m.Compared) -> None:
         assert state.report is not None  # nothing is compared before this session is open
-        names = (named_errors(state.report), named_errors(other.report))
-        self.compared.show_rows(compared(state.report, other.report), names)
+        names = (name_and_errors(state.report), name_and_errors(other.report))
+        self.compared.show_rows(compare_reports(state.report, other.report), names)
         self.together.setChecked(True)
         self._paint()
         self.tabs.setCurrentIndex(COMPARISON)
@@ -166,7 +166,7 @@ class ModelColumn(QWidget):
 
     def _paint(self) -> None:
         state = self._state
-        row = None if state is None else chosen(state)
+        row = None if state is None else selected_row(state)
         film, at = self._film, self._at
         if film is not None and at is not None:
             finger, words = Finger(film.film.parts, film.film.frames[at], film.film.arcs), film_words(film, at)
@@ -215,7 +215,7 @@ class ModelColumn(QWidget):
         self._paint()
 
     def _ask_history(self) -> None:
-        row = None if self._state is None else chosen(self._state)
+        row = None if self._state is None else selected_row(self._state)
         if row is not None:
             self.requested.emit(m.ShowHistory(row.key))
             self.player.slider.setFocus()
@@ -263,12 +263,12 @@ class ModelColumn(QWidget):
         before, self._filming = self._at, True
         writer = FilmWriter(self.finger, self._head(), self._show_step, len(self._film.film.frames))
 
-        def ended(sentence: str) -> None:
+        def end(sentence: str) -> None:
             self._filming, self._at = False, before
             self._paint()
             self.said.emit(sentence)
 
-        writer.ended.connect(ended)
+        writer.ended.connect(end)
         writer.write(path)
         return writer
 

@@ -18,7 +18,7 @@ from daq_app.qt.parts import (
     hbox,
     label,
     say,
-    scrolled,
+    scroll_area,
     set_horizontal,
     tick,
     vbox,
@@ -81,7 +81,7 @@ class NewSessionPage(Panel):
         self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
         words = tr("preview every page that the subject will see")
         self._preview = button(tr("Preview  F7"), words, lambda: act("preview"))
-        self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrolled)
+        self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrol_subject)
         self.cut_short = CutShort(send)
         self._height, self._area = QWidget(), QWidget()
         self._lines = {
@@ -188,7 +188,7 @@ class NewSessionPage(Panel):
         if first is not None:
             first.setFocus()
 
-    def look_for_unfinished(self) -> None:
+    def look_for_unfinished_sessions(self) -> None:
         """Look for sessions that were cut short, without holding up the window."""
         self.cut_short.look_in(Path(self.form().folder or "."))
 
@@ -208,7 +208,7 @@ class NewSessionPage(Panel):
         """Let the subject's page speak the chosen language before there is a session."""
         self._send(LanguageChosen(self.screen_fields.language.currentData() or ENGLISH))
 
-    def _enrolled(self) -> None:
+    def _enrol_subject(self) -> None:
         refused = enrolled(self.form())
         self._show_study()
         self._checked = None  # the study has changed, not the form
@@ -290,7 +290,7 @@ class NewSessionPage(Panel):
         self._columns = vbox((left, 1), (right, 1))
         inside = QWidget()
         vbox(label(tr("New session"), "title"), self.cut_short, self._columns, 1, on=inside, margins=GRID, spacing=GRID)
-        vbox(scrolled(inside), on=self, margins=2)
+        vbox(scroll_area(inside), on=self, margins=2)
         self._two = round(TWO * scale)
         self.setMinimumWidth(round(280 * min(scale, 1.25)))
 

@@ -175,7 +175,7 @@ def paint_arrow(painter: QPainter, x: float, tail: float, tip: float, wing: QPoi
         painter.drawLine(QPointF(x, tip), QPointF(x + side, tip + back))
 
 
-def paint_lost(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
+def paint_failed_solve(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
     """Mark the place of a failed solve, on any ground: a ring with a cross."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for colour, width in ((tokens.surface, 5.0), (tokens.wrong, 2.5)):

@@ -55,7 +55,7 @@ class Panel(QFrame):
         self.setAccessibleName(name)
 
 
-class Wrapped(QLabel):
+class WrappedLabel(QLabel):
     """A label of as many lines as its text needs at the width it has, a long path too.
 
     What it stands in is not asked for a height by its width: where that is scrolled it would be made as high as it
@@ -208,16 +208,16 @@ def set_horizontal(layout: QBoxLayout, horizontal: bool) -> None:
     layout.setDirection(QBoxLayout.Direction.LeftToRight if horizontal else QBoxLayout.Direction.TopToBottom)
 
 
-def stacked(*pages: QWidget) -> QStackedWidget:
-    """Return pages of which one is shown, the first to begin with."""
+def stack_pages(*pages: QWidget) -> QStackedWidget:
+    """Return a stack of pages of which one is shown, the first at the beginning."""
     stack = QStackedWidget()
     for page in pages:
         stack.addWidget(page)
     return stack
 
 
-def named(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str = "quiet") -> QGridLayout:
-    """Return widgets behind their names in a type of the style sheet, so many pairs in a row."""
+def label_grid(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str = "quiet") -> QGridLayout:
+    """Return a grid of widgets behind their labels, `across` pairs in a row, labels in a role of the style sheet."""
     grid = QGridLayout()
     grid.setHorizontalSpacing(GRID)
     grid.setVerticalSpacing(2)
@@ -230,7 +230,7 @@ def named(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str = "q
     return grid
 
 
-def scrolled(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
+def scroll_area(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
     """Return a frameless area, a new one unless given, in which `inside` moves where it is greater than its room."""
     area = area or QScrollArea()
     area.setWidget(inside)

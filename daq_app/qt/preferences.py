@@ -130,21 +130,21 @@ def millimetres(screen: QScreen) -> Millimetres:
     try:
         factor = float(str(settings().value(_key(screen))))
     except ValueError:
-        return Millimetres(_said(screen), checked=False)
-    return Millimetres(_said(screen) * factor, checked=True)
+        return Millimetres(_pixels_per_mm(screen), checked=False)
+    return Millimetres(_pixels_per_mm(screen) * factor, checked=True)
 
 
-def checked(screen: QScreen, measured: float) -> Millimetres | None:
-    """Keep what a line that should be 100 mm long measured on the screen [mm]; None where no screen can be so."""
+def store_ruler_length(screen: QScreen, measured: float) -> Millimetres | None:
+    """Store how long a line of nominally 100 mm is on the screen [mm]; None where no screen can show it so."""
     if not LEAST <= measured <= MOST:
         return None
     pixels = millimetres(screen).pixels * 100.0 / measured
-    settings().setValue(_key(screen), repr(pixels / _said(screen)))
+    settings().setValue(_key(screen), repr(pixels / _pixels_per_mm(screen)))
     return Millimetres(pixels, checked=True)
 
 
-def _said(screen: QScreen) -> float:
-    """Return device-independent pixels in a millimetre as the screen tells, or the usual where it cannot be true."""
+def _pixels_per_mm(screen: QScreen) -> float:
+    """Return the screen's own device-independent pixels per millimetre, the usual number where it is not plausible."""
     dots = screen.physicalDotsPerInch() * screen.devicePixelRatio()
     return (screen.physicalDotsPerInch() if PLAUSIBLE[0] <= dots <= PLAUSIBLE[1] else USUAL_DPI) / 25.4
 

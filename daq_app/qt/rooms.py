@@ -280,15 +280,15 @@ class Rooms(QStackedWidget):
         elif session is not None and session.over:
             self.open(Path(session.folder))
         else:
-            self._entered().enter()
+            self._enter_review().enter()
         self.show_state()
 
     def choose(self) -> None:
-        self._entered().choose()
+        self._enter_review().choose()
         self.show_state()
 
     def open(self, folder: Path) -> None:
-        self._entered().open(folder)
+        self._enter_review().open(folder)
         self.show_state()
 
     def show_state(self) -> None:
@@ -301,7 +301,7 @@ class Rooms(QStackedWidget):
         self._rail.show_room(self.room, in_hand=in_hand, over=self.over)
         self._menus.show_state(in_hand=in_hand, over=self.over, opened=self.analyst is not None)
 
-    def _entered(self) -> ReviewRoom:
+    def _enter_review(self) -> ReviewRoom:
         if self.count() == 1:
             self.addWidget(self.review)
         self.setCurrentIndex(1)

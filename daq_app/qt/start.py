@@ -47,11 +47,13 @@ def window(arguments: list[str]) -> int:
     folder: Path | None = options.session
     web = options.subject_screen == "web"
     if folder is None:
-        return _shown(lambda application: opened(application, tablet=_tablet(options.subject_address) if web else None))
+        return _show_window(
+            lambda application: open_window(application, tablet=_tablet(options.subject_address) if web else None)
+        )
     if web:
         parser.error("a session that is reviewed has no subject: leave out SESSION or --subject-screen")
     if not folder.is_dir():
-        return _said(f"{folder} is no folder: give a session's folder")
+        return _fail(f"{folder} is no folder: give a session's folder")
 
     def analyst(application: "QApplication") -> "AnalystWindow":
         from daq_app.qt import preferences
@@ -62,7 +64,7 @@ def window(arguments: list[str]) -> int:
         preferences.remember_session(folder)
         return AnalystWindow(folder, tokens)
 
-    return _shown(analyst)
+    return _show_window(analyst)
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -84,8 +86,8 @@ def command_line() -> argparse.ArgumentParser:
 
 
 @contextmanager
-def _kept() -> Generator[None]:
-    """Look for no garbage: what is made now stays, and looking through it again and again would hold the window up."""
+def _without_garbage_collection() -> Generator[None]:
+    """Collect no garbage inside, and never what was made inside: it stays, and searching it would delay the window."""
     gc.disable()
     try:
         yield
@@ -94,8 +96,8 @@ def _kept() -> Generator[None]:
         gc.enable()
 
 
-@_kept()
-def opened(
+@_without_garbage_collection()
+def open_window(
     application: "QApplication",
     start: "Callable[[], Client] | None" = None,
     theme: "Tokens | None" = None,
@@ -122,19 +124,19 @@ def opened(
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, scale, tablet)
 
-    def theme_changed() -> None:
+    def follow_theme() -> None:
         _dress(application, preferences.chosen_tokens(), scale)
 
-    window.theme_chosen.connect(theme_changed)
+    window.theme_chosen.connect(follow_theme)
     if theme is None:
-        application.styleHints().colorSchemeChanged.connect(theme_changed)
+        application.styleHints().colorSchemeChanged.connect(follow_theme)
 
-    def slipped(_kind: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
+    def show_error(_kind: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
         """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""
         if isinstance(error, Exception):
             bridge.drawing_failed(error)
 
-    sys.excepthook = slipped
+    sys.excepthook = show_error
     bridge.begin()
     return window
 
@@ -146,14 +148,14 @@ def _tablet(address: str | None) -> "TabletScreen":
     return TabletScreen(address, PORT)
 
 
-def _shown(build: "Callable[[QApplication], QWidget]") -> int:
+def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     """Show the window that is made until it is closed; return the exit code, or say what is missing."""
     if missing := what_is_missing():
-        return _said(missing)
+        return _fail(missing)
     try:
         from PySide6.QtWidgets import QApplication
     except ImportError as error:
-        return _said(missing_library(error))
+        return _fail(missing_library(error))
     from daq_app.tablet.server import NoTabletServer
 
     application = QApplication(sys.argv[:1])
@@ -161,7 +163,7 @@ def _shown(build: "Callable[[QApplication], QWidget]") -> int:
     try:
         window = build(application)
     except NoTabletServer as error:
-        return _said(str(error))
+        return _fail(str(error))
     window.show()
     return application.exec()
 
@@ -196,7 +198,7 @@ def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     application.setStyleSheet(style_sheet(tokens, scale))
 
 
-def _said(sentence: str) -> int:
+def _fail(sentence: str) -> int:
     sys.stderr.write(f"daq-app: {sentence}\n")
     return FAILED
 
@@ -210,7 +212,7 @@ def what_is_missing() -> str | None:
     if not os.environ.get("DISPLAY"):
         return NO_SCREEN
     for library, package in LIBRARIES.items():
-        if _loaded(library) is None:
+        if _load(library) is None:
             return f"the window needs {library}, which is not on this computer: install the system package {package}"
     return None if _answers() else f"the display {os.environ['DISPLAY']} does not answer: {NO_SCREEN}"
 
@@ -223,7 +225,7 @@ def missing_library(error: ImportError) -> str:
     return f"the window needs PySide6, which cannot be loaded ({error}): install it with 'make setup'"
 
 
-def _loaded(library: str) -> ctypes.CDLL | None:
+def _load(library: str) -> ctypes.CDLL | None:
     try:
         return ctypes.CDLL(library)
     except OSError:
@@ -232,7 +234,7 @@ def _loaded(library: str) -> ctypes.CDLL | None:
 
 def _answers() -> bool:
     """Say whether an X server answers at DISPLAY."""
-    xcb = _loaded("libxcb.so.1")
+    xcb = _load("libxcb.so.1")
     if xcb is None:
         return True  # Qt brings its own
     xcb.xcb_connect.restype = ctypes.c_void_p

@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
 from daq_app.analyst import state as m
 from daq_app.analyst.session_words import FRICTION_HEAD, friction_table, numbers
-from daq_app.analyst.state import AnalystState, chosen
+from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.analyst.stroke import Edge, History
-from daq_app.qt.parts import Wrapped, button, hbox, label, scrolled, vbox
+from daq_app.qt.parts import WrappedLabel, button, hbox, label, scroll_area, vbox
 from daq_app.qt.pictures import SaveButtons
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.stroke_view import StrokeView
@@ -40,9 +40,9 @@ class StrokeColumn(QWidget):
         self._read: m.Read | None = None
         self._wanted: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
         self.stroke = StrokeView(tokens)
-        self.stroke.moved.connect(self._dragged)
+        self.stroke.moved.connect(self._drag)
         self.player = TransportBar(tr("the recorded readings"))
-        self.player.moved.connect(self._moved)
+        self.player.moved.connect(self._move)
         self.player.ended.connect(self.replayed.emit)
         self.decisions = DecisionsBar()
         self.decisions.requested.connect(self.requested.emit)
@@ -57,7 +57,7 @@ class StrokeColumn(QWidget):
         self._numbers = QFormLayout(inside)
         self._numbers.setContentsMargins(0, 0, 0, 0)
         self._numbers.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
-        self._scroll = scrolled(inside)  # where there is little room the numbers are scrolled, never cut
+        self._scroll = scroll_area(inside)  # where there is little room the numbers are scrolled, never cut
         self._scroll.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._scroll.setAccessibleName(tr("numbers of the stroke and its prediction"))
         self.tabs.addTab(self._scroll, tr("Numbers"))
@@ -70,7 +70,7 @@ class StrokeColumn(QWidget):
         vbox((self.stroke, 4), row, self.decisions, (self.tabs, 3), on=self, spacing=GRID // 2)
 
     def show_state(self, state: AnalystState) -> None:
-        row = chosen(state)
+        row = selected_row(state)
         stroke = None if row is None else row.stroke
         if stroke is not self._stroke:
             self._stroke = stroke
@@ -133,13 +133,13 @@ class StrokeColumn(QWidget):
             self._play_next = False
             self.player.toggle()
 
-    def _dragged(self, edge: Edge, time: float) -> None:
+    def _drag(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:
             self._moving = True
             by, why = self.decisions.who(), self.decisions.reason()
             self.requested.emit(m.Move(self._stroke.number, edge, time, by, why))
 
-    def _moved(self, at: int) -> None:
+    def _move(self, at: int) -> None:
         self.stroke.show_moment(at)
         if not self.player.playing:
             self.readings.go_to(at)
@@ -197,7 +197,7 @@ class DecisionsBar(QWidget):
         self.undo = button(tr("Undo"), "", self.stack.undo, "small")
         self.redo = button(tr("Redo"), "", self.stack.redo, "small")
         self._show_next()
-        self.sentences_label = Wrapped("value", "look")
+        self.sentences_label = WrappedLabel("value", "look")
         by, why = label(tr("by"), "quiet"), label(tr("why"), "quiet")
         row = hbox(by, self.by, why, (self.why, 1), self.undo, self.redo, spacing=GRID // 2)
         vbox(row, self.sentences_label, on=self, spacing=GRID // 2)

@@ -8,7 +8,7 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.frame import read_out
-from daq_app.analyst.stroke import EDGES, LEAP, STEP, Edge, Placed, RawReadings, edges_of, within
+from daq_app.analyst.stroke import EDGES, LEAP, STEP, Edge, PlacedEdge, RawReadings, edges_of, within
 from daq_app.qt.painting import sheer
 from daq_app.qt.parts import hbox, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
@@ -29,14 +29,14 @@ class EdgeHandle(QPushButton):
     def __init__(self, edge: Edge) -> None:
         super().__init__()
         self.edge: Edge = edge
-        self._placed: Placed | None = None
+        self._placed: PlacedEdge | None = None
         self._time, self._origin = 0.0, 0.0
         self.setAutoDefault(False)
         self.setProperty("role", "handle")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.show_edge(None, 0.0)
 
-    def show_edge(self, placed: Placed | None, origin: float) -> None:
+    def show_edge(self, placed: PlacedEdge | None, origin: float) -> None:
         """Show an edge, its time counted from `origin` [s]."""
         self._placed, self._origin = placed, origin
         self._time = 0.0 if placed is None else placed.time

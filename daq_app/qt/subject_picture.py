@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
-from daq_app.qt.parts import Openness, Wrapped, button, hbox, label, vbox
+from daq_app.qt.parts import Openness, WrappedLabel, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, missing_glyphs
 from daq_app.window.new_session import Refused, SessionForm
@@ -163,7 +163,7 @@ class SubjectPreview(QDialog):
         self.list.setFixedWidth(round(LIST * min(scale, 1.5)))
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.lost = Wrapped("value", "look")
+        self.lost = WrappedLabel("value", "look")
         self.back = button(tr("◂ Back"), tr("the page before"), lambda: self._turn(-1))
         self.on = button(tr("On ▸"), tr("the next page"), lambda: self._turn(1))
         self._count = label("", "quiet")

@@ -123,7 +123,7 @@ class SubjectSide(QObject):
         self._subject, self._tablet = subject, tablet
         self.keyboard = Keyboard(window, course.plan, subject, act)
         self.keyboard.free.connect(self._bring)
-        subject.answered.connect(self._answered)
+        subject.answered.connect(self._send_answer)
         subject.screen_changed.connect(self.line_changed)
         if tablet is not None:
             tablet.answered.connect(bridge.send)
@@ -131,7 +131,7 @@ class SubjectSide(QObject):
 
     def show(self) -> None:
         """Show the subject's window, and let the keyboard go to it from whatever is being typed."""
-        if self.keyboard.typed_in() is not None:
+        if self.keyboard.focused_field() is not None:
             self._window.setFocus()
         self._place(activating=True)
         self.show_view(self._bridge.view)  # which a window that is hidden need not have
@@ -194,7 +194,7 @@ class SubjectSide(QObject):
         if not self._subject.scoring or not self._with_people():
             return
         active = QGuiApplication.applicationState() == Qt.ApplicationState.ApplicationActive
-        if active and self.keyboard.typed_in() is None:
+        if active and self.keyboard.focused_field() is None:
             self.show()
         else:
             self._place(activating=False)
@@ -203,8 +203,8 @@ class SubjectSide(QObject):
         session = self._bridge.state.session
         return session is not None and session.people != "simulated people"
 
-    def _answered(self, event: Message) -> None:
+    def _send_answer(self, event: Message) -> None:
         self._bridge.send(event)
-        field = self.keyboard.typed_in()
+        field = self.keyboard.focused_field()
         if field is None or field.window() is self._window:
             self.come_back()

@@ -7,8 +7,8 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEv
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
-from daq_app.qt.parts import button, fill, hbox, label, say, stacked, vbox
-from daq_app.qt.preferences import LEAST, MOST, checked, direction, millimetres
+from daq_app.qt.parts import button, fill, hbox, label, say, stack_pages, vbox
+from daq_app.qt.preferences import LEAST, MOST, direction, millimetres, store_ruler_length
 from daq_app.qt.tokens import GRID, font
 from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
@@ -50,13 +50,13 @@ class SubjectWindow(QWidget):
         self._scale = _Scale(self.line)
         self.number = NumberField(scale, now)
         self.choice = ChoiceOfTwo(scale, now)
-        self._ways = stacked(self._scale, self.number, self.choice)
+        self._ways = stack_pages(self._scale, self.number, self.choice)
         self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
         self.ruler = RulerCheck(scale)
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
         self.ruler.done.connect(self._ruler_done)
-        self._pages = stacked(self._message_page(), self._scale_page(), self.ruler)
+        self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
         for way in (self.line, self.number, self.choice):
             way.changed.connect(self._answer_changed)
@@ -334,7 +334,7 @@ class RulerCheck(QWidget):
             value = float(text)
         except ValueError:
             value = float("nan")
-        if self._screen is None or checked(self._screen, value) is None:
+        if self._screen is None or store_ruler_length(self._screen, value) is None:
             words = tr(
                 "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
                 least=LEAST, most=MOST, it=text,

@@ -17,7 +17,7 @@ from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShow
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from daq_app.analyst.stroke import RawReadings
-from daq_app.qt.parts import Wrapped, vbox
+from daq_app.qt.parts import WrappedLabel, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 
@@ -26,7 +26,7 @@ Index = QModelIndex | QPersistentModelIndex
 HEAD = tr_noop(("window", "sequence", "counter", "status", "time [s]", "received [ns]"))
 
 
-class CopiedTable(QTableView):
+class CopyableTable(QTableView):
     """A table that is read; Ctrl+C copies the selected range as tab-separated values."""
 
     def __init__(self, name: str) -> None:
@@ -62,7 +62,7 @@ class _ByNumber(QSortFilterProxyModel):
         return sort_key(str(left.data())) < sort_key(str(right.data()))
 
 
-class TextTable(CopiedTable):
+class TextTable(CopyableTable):
     """A table of texts: a click on a column's head sorts by it, and `chosen` says which line is current."""
 
     chosen = Signal(int)  # its number before any sorting
@@ -113,8 +113,8 @@ class ReadingsTable(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.place = Wrapped("quiet")
-        self.table = CopiedTable(tr("raw readings"))  # in the order in which they came
+        self.place = WrappedLabel("quiet")
+        self.table = CopyableTable(tr("raw readings"))  # in the order in which they came
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()

@@ -25,7 +25,7 @@ def answer():
 def main():
     from PySide6.QtCore import QSocketNotifier
 
-    built = start.opened
+    built = start.open_window
 
     def opened(*given, **named):
         window = built(*given, **named)
@@ -33,7 +33,7 @@ def main():
         window.asked.activated.connect(answer)
         return window
 
-    start.opened = opened
+    start.open_window = opened
     sys.exit(start.window([]))
 
 

@@ -15,11 +15,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import compared, finger_words
+from daq_app.analyst.finger_words import compare_reports, finger_words
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_words, session_pictures, words_of
-from daq_app.analyst.state import AnalystState, chosen, fold, rows
+from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.analyst.stroke import APART, EDGES, decision_of, edges_of, history, reversal, within
 from daq_app.analyst.work import Work
 from sessions.recording.derived import set_gain_error
@@ -61,7 +61,7 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_everywhere(state)
     assert found
     for point in found:
         after = fold(state, m.Choose(point.row))
-        said = chosen(after).prediction
+        said = selected_row(after).prediction
         assert (said.experiment, said.index) == (point.experiment, point.index)
         assert 1000.0 * said.sed == pytest.approx(point.response)
 
@@ -104,7 +104,7 @@ def test_what_was_found_stays_whatever_comes_after(state, message, going_on, tol
 def test_nothing_is_shown_of_a_session_before_it_is_open():
     empty = AnalystState(Path("x"))
     assert (rows(empty), numbers(empty), points(empty), session_pictures(empty.report)) == ((), (), (), ())
-    assert chosen(fold(empty, m.Choose(2))) is None
+    assert selected_row(fold(empty, m.Choose(2))) is None
     assert progress_words(empty.step) == "opening  0 %"
 
 
@@ -212,7 +212,7 @@ def test_two_sessions_are_held_against_each_other_stimulus_by_stimulus(state):
     first = report.predictions[0]
     higher = replace(first, mu=first.mu + 0.1, sed=first.sed + 0.001)
     other = replace(report, predictions=(higher, *report.predictions[1:]))
-    found = dict(compared(report, other))
+    found = dict(compare_reports(report, other))
     assert len(found) == len({(p.experiment, p.index) for p in report.predictions})
     for key, (mu, sed, score) in found.items():
         same = key != f"{first.experiment} {first.index}"
@@ -225,7 +225,7 @@ def test_a_stimulus_that_one_session_lacks_has_no_number_of_it(state):
     report = state.report
     rest = replace(report, predictions=report.predictions[1:])
     gone = report.predictions[0]
-    first, second = dict(compared(report, rest))[f"{gone.experiment} {gone.index}"][0]
+    first, second = dict(compare_reports(report, rest))[f"{gone.experiment} {gone.index}"][0]
     assert first is not None
     assert second is None
 

@@ -32,13 +32,13 @@ def test_the_selftest_fails_where_anything_acknowledged_is_missing(tmp_path, wha
     recording = Recording.open(ended(tmp_path / "s"))
     events = list(recording.events)
     watched = SimpleNamespace(events=events, safe=300)
-    selftest._check_kept(recording, watched, 1)
+    selftest._check_recording(recording, watched, 1)
     if what == "readings":
         watched.safe = 301
     if what == "event":
         watched.events = [*events, LoggedEvent(len(events) + 1, 0, "scored", 1, 300, {"score": 1.0})]
     with pytest.raises(selftest.SelfTestFailed):
-        selftest._check_kept(recording, watched, 2 if what == "trial" else 1)
+        selftest._check_recording(recording, watched, 2 if what == "trial" else 1)
 
 
 def test_a_certificate_of_other_versions_says_so_and_a_damaged_one_counts_for_nothing(tmp_path):

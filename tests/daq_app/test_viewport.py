@@ -33,11 +33,11 @@ def frame(**values):
 
 
 def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back_to_its_place():
-    view = View.fitted(BOX, 10.0, 20.0, 100.0, 200.0)
+    view = View.fit(BOX, 10.0, 20.0, 100.0, 200.0)
     assert view.per_mm == 10.0
     assert view.visible(10.0, 20.0, 100.0, 200.0) == pytest.approx((-2.0, 8.0, -1.0, 19.0))
     points = np.array([[0.0, 0.0], [3.0, 2.5]])
-    places = [view.place(*pixel) for pixel in view.placed(points).tolist()]
+    places = [view.place(*pixel) for pixel in view.to_screen(points).tolist()]
     np.testing.assert_allclose(places, points, atol=1e-12)
 
 

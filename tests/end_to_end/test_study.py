@@ -112,7 +112,7 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
     with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): make room"):
         shelf.keep("key", {})
     assert list(tmp_path.iterdir()) == []
-    assert shelf.stored("key") is None
+    assert shelf.load("key") is None
 
 
 def test_another_recording_or_other_options_are_another_key(study):

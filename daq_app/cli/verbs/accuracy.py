@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
-    measured = _measured(options, console)
+    measured = _measure_or_restore(options, console)
     if measured.stopped:
         console.note("stopped; drawing what was measured until now")
     console.progress(0.99, "drawing")
@@ -50,8 +50,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return STOPPED if measured.stopped else DONE
 
 
-def _measured(options: argparse.Namespace, console: Console) -> "RunResults":
-    """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
+def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunResults":
+    """Measure, or return the results of an earlier run. Raises WrongValue for a file that holds none."""
     from sessions.file_access import read_within_limit
     from sessions.recording.head import software_versions
     from solver.verification.measuring import measure, restore

@@ -131,7 +131,7 @@ def selftest(room: Path, progress: Progress, seed: int | None = None) -> dict[st
     }
 
 
-class _Watched:
+class _WatchedRecorder:
     """A recorder on the simulated bench, and what it sent."""
 
     def __init__(self) -> None:
@@ -194,12 +194,12 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[K
     folder = room / "killed-0"
     for number in range(KILLS):
         progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
-        watched = _Watched()
+        watched = _WatchedRecorder()
         trial = _begin_or_resume(watched, folder)
         watched.hear(chance.uniform(*RUNNING))
         watched.kill()
         recording = Recording.open(folder)
-        _check_kept(recording, watched, trial)
+        _check_recording(recording, watched, trial)
         block = recording.last_block()
         if len(block):
             most_lost = max(most_lost, (watched.shown_ns - int(block.received_ns[-1])) * 1e-9)
@@ -211,7 +211,7 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[K
     return Kills(KILLS, readings, events, max(most_lost, 0.0)), copies
 
 
-def _begin_or_resume(watched: _Watched, folder: Path) -> int | None:
+def _begin_or_resume(watched: _WatchedRecorder, folder: Path) -> int | None:
     """Have a session running, and return the trial at which it was resumed."""
     if not folder.exists():
         watched.recorder.send(m.Connect("sim:?seed=1"))
@@ -224,7 +224,7 @@ def _begin_or_resume(watched: _Watched, folder: Path) -> int | None:
     return watched.until(Status).trial
 
 
-def _check_kept(recording: Recording, watched: _Watched, trial: int | None) -> None:
+def _check_recording(recording: Recording, watched: _WatchedRecorder, trial: int | None) -> None:
     """Raise SelfTestFailed unless all that was acknowledged is in the file, and the session went on where it was."""
     rows = {event.number: event_row(event) for event in recording.events}
     if any(rows.get(event.number) != event_row(event) for event in watched.events):
@@ -242,7 +242,7 @@ def _try_stops(room: Path) -> float:
     """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
     took: list[float] = []
     for number in range(STOPS):
-        watched = _Watched()
+        watched = _WatchedRecorder()
         with watched.recorder:
             _begin_or_resume(watched, room / str(number))
             watched.hear(0.3)

@@ -77,10 +77,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
         design, origin = check_design(tables_in(text_of(options.design), where), scene, where), "set"
     count = samples * (len(design) + 2)
 
-    def shown(part: float) -> None:
+    def show_progress(part: float) -> None:
         console.progress(part, f"{round(part * count)} of {count} scenes")
 
-    indices, seds = sensitivity(scene, design, samples, options.seed, shown)
+    indices, seds = sensitivity(scene, design, samples, options.seed, show_progress)
     low, high = float(seds.min()), float(seds.max())
     doubtful = doubts(indices, samples)
     constant = constant_numbers(scene, design)

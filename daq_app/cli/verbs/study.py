@@ -203,7 +203,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options), along)
     exclusions, truth = (
         exclusions_in(folder),
-        _load_planted(folder),
+        _load_ground_truth(folder),
     )  # what is wrong with them is said before hours of work
     shelf = Shelf(out / "results", visit_options)
     done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
@@ -220,8 +220,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return FLAWED if failed or flawed else DONE
 
 
-def _load_planted(folder: Path) -> dict[str, Any] | None:
-    """Return what was planted in a synthetic study, None in any other. Raises RecordingError where that is damaged."""
+def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
+    """Return the ground truth of a synthetic study, None of any other. Raises RecordingError where it is damaged."""
     path = folder / PLANTED
     if not path.is_file():
         return None

@@ -12,7 +12,7 @@ from PySide6.QtCore import QEvent, QSettings
 from PySide6.QtWidgets import QApplication
 
 from daq_app.qt.preferences import settings
-from daq_app.qt.start import opened
+from daq_app.qt.start import open_window
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
@@ -100,7 +100,7 @@ def one_window(application, request):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LiveModel, "prepare", lambda _: None)
         patch.setattr("daq_app.qt.start.SIMULATED_BENCH", "sim:?rate=100")  # half the readings to take and draw
-        window = opened(application, lambda: Recorder.start(pace=getattr(request.module, "PACE", PACE)))
+        window = open_window(application, lambda: Recorder.start(pace=getattr(request.module, "PACE", PACE)))
     window.resize(1440, 900)
     window.show()
     yield window

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES
-from daq_app.analyst.state import chosen
+from daq_app.analyst.state import selected_row
 from daq_app.qt import preferences, tokens
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.finger_canvas import FingerCanvas
@@ -297,7 +297,7 @@ def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, sc
     window.resize(*size)
     window.show()
     window.take(m.ReportReady("predicted", example()))
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     window.take(m.Compared("other", example()))
     about = about_box(window)
     about.show()

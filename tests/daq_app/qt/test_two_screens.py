@@ -25,8 +25,8 @@ application = QApplication([])
 from daq_app.qt import preferences
 from daq_app.qt.subject_window import SubjectWindow
 desk, tablet = application.screens()
-preferences.checked(desk, 80.0)     # a line meant to be 100 mm long measured 80 there
-preferences.checked(tablet, 125.0)  # and 125 here
+preferences.store_ruler_length(desk, 80.0)     # a line meant to be 100 mm long measured 80 there
+preferences.store_ruler_length(tablet, 125.0)  # and 125 here
 subject = SubjectWindow(1.0, lambda: 0.0)
 subject.show()
 told = []

@@ -284,12 +284,12 @@ def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     subject = driver.window.subject
     screen = subject.screen()
     before = fitted(subject).pixels
-    assert preferences.checked(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
+    assert preferences.store_ruler_length(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
     assert fitted(subject).pixels == pytest.approx(before * 100 / 80)
     assert fitted(subject).checked
     length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
     assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
-    assert preferences.checked(screen, 3.0) is None
+    assert preferences.store_ruler_length(screen, 3.0) is None
     preferences.settings().clear()
     assert fitted(subject).pixels == pytest.approx(before)
 

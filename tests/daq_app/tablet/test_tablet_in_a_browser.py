@@ -7,7 +7,7 @@ from browser import CHROMIUM
 from PySide6.QtWidgets import QLabel
 from tablet_browser import Browser
 
-from daq_app.qt.start import opened
+from daq_app.qt.start import open_window
 from daq_app.qt.subject_side import TabletScreen
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.qt, pytest.mark.skipif(CHROMIUM is None, reason="there
 @pytest.fixture
 def desk(application, tmp_path, monkeypatch):  # noqa: F811  the fixture
     monkeypatch.setattr(LiveModel, "prepare", lambda _: None)
-    window = opened(application, Recorder.start, tablet=TabletScreen("127.0.0.1", 0))
+    window = open_window(application, Recorder.start, tablet=TabletScreen("127.0.0.1", 0))
     driver = Driver(application, window)
     window.show()
     page = window.page

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, Q
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import finger_words
 from daq_app.analyst.session_words import condition, lineage, numbers, points
-from daq_app.analyst.state import chosen, rows
+from daq_app.analyst.state import rows, selected_row
 from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
@@ -36,7 +36,7 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(w
     spot = next(s for s in window.trials.points.points() if s.data() == point.row)
     window.trials._point_clicked(None, [spot])
     assert window.trials.list.currentRow() == point.row
-    assert window.stroke.stroke.accessibleName().endswith(f"stroke {chosen(window.state).stroke.number}")
+    assert window.stroke.stroke.accessibleName().endswith(f"stroke {selected_row(window.state).stroke.number}")
     assert m.Choose(point.row) in window._work.asked
 
 
@@ -71,7 +71,7 @@ def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_m
     assert len(texts(table)) == len(window.state.report.strokes)
     table.go_to(3)
     assert window.state.row == 3
-    said = chosen(window.state).prediction
+    said = selected_row(window.state).prediction
     cells = {name: value for name, value, _ in texts(window.model.scene)}
     assert cells["µ of this trial"] == f"{said.mu:.4f}"
     assert cells["indentation"] == f"{said.indentation:.3g} mm"
@@ -84,7 +84,7 @@ def test_a_click_on_the_head_sorts_by_value_and_a_line_still_chooses_its_trial(w
     assert shown == sorted(shown)
     least = min(window.state.report.strokes, key=lambda stroke: stroke.mu_dynamic)
     table.setCurrentIndex(table.model().index(0, 0))
-    assert chosen(window.state).stroke.number == least.number
+    assert selected_row(window.state).stroke.number == least.number
     table.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
     assert [line[0] for line in texts(table)] == [str(s.trial) for s in window.state.report.strokes]
 
@@ -146,7 +146,7 @@ def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
 
 
 def test_an_edge_is_moved_by_keys_and_recorded_with_enter(window):
-    stroke = chosen(window.state).stroke
+    stroke = selected_row(window.state).stroke
     handle = window.stroke.stroke.handles["steady begin"]
     window.stroke.decisions.by.setText("E02")
     window.stroke.decisions.why.setText("a ramp")
@@ -164,7 +164,7 @@ def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes
     application, window, monkeypatch
 ):
     monkeypatch.setitem(pyqtgraph.CONFIG_OPTIONS, "mouseRateLimit", 0)  # this mouse is quicker than any hand
-    stroke = chosen(window.state).stroke
+    stroke = selected_row(window.state).stroke
     view = window.stroke.stroke
     for _ in range(3):  # axes take their width when they are painted
         window.grab()
@@ -219,7 +219,7 @@ def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, w
     plot = view._plots[0]
     view.show_all()
     application.processEvents()
-    trace = chosen(window.state).stroke.trace
+    trace = selected_row(window.state).stroke.trace
     i = len(trace.time) // 2
     at = plot.getPlotItem().getViewBox().mapViewToScene(QPointF(trace.time[i], trace.normal[i]))
     QTest.mouseMove(plot.viewport(), plot.mapFromScene(at))
@@ -235,7 +235,7 @@ def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, w
 
 
 def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
-    stroke = chosen(window.state).stroke
+    stroke = selected_row(window.state).stroke
     window.take(m.Read(stroke.number, raw(stroke)))
     player, view = window.stroke.player, window.stroke.stroke
     player.seek(20)
@@ -268,7 +268,7 @@ def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
 
 
 def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window):
-    stroke = chosen(window.state).stroke
+    stroke = selected_row(window.state).stroke
     window.take(m.Read(stroke.number, raw(stroke)))
     window._follow("readings")
     table = window.stroke.readings.table
@@ -286,7 +286,7 @@ def test_a_second_session_is_shown_beside_the_first(window):
 
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     found = [w for kind in CONTROLS for w in window.findChildren(kind)]
     controls = [w for w in found if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
     ours = [w for w in controls if w.parent().metaObject().className() != "QTabBar"]

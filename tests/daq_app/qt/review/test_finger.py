@@ -15,14 +15,14 @@ from qt_events import wheel
 
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
-from daq_app.analyst.state import chosen, rows
+from daq_app.analyst.state import rows, selected_row
 from daq_app.qt.plots import ALL_TRIALS, FIXED
 from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame, until
 from tests.sessions.report_example import example
 
 
 def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
-    key = chosen(window.state).key
+    key = selected_row(window.state).key
     window.model.history.click()
     assert window._work.asked[-1] == m.ShowHistory(key)
     window.take(m.Filmed(key, film()))
@@ -42,14 +42,14 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
 
 def small_finger(application, window):
     """Return the canvas with the triangle of `film`, its settled state, and where it paints a place [mm]."""
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     application.processEvents()
     canvas = window.model.finger
     canvas.sight.look_at(None)
     canvas.sight.set_line(None)
 
     def pixel(x, y):
-        return QPointF(*canvas.view().placed(np.array([[x, y]]))[0]).toPoint()
+        return QPointF(*canvas.view().to_screen(np.array([[x, y]]))[0]).toPoint()
 
     return canvas, pixel
 
@@ -147,7 +147,7 @@ def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees
 
 
 def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
-    key = chosen(window.state).key
+    key = selected_row(window.state).key
     window.take(m.Filmed(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
     words = window.model.why.text()
     assert "is step 4: at 0.300 s" in words
@@ -182,7 +182,7 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
 
 
 def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simulated(window, monkeypatch, tmp_path):
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
     field, canvas = FIELD_CHOICES[-1], window.model.finger
     monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
@@ -210,7 +210,7 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
 
 
 def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     for _ in range(5):  # the columns have found their widths
         application.processEvents()
     ranges, show = set(), window.model._show_step
@@ -226,7 +226,7 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
 
 
 def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, window, tmp_path):
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
     until(application, lambda: "Saved" in window._words.accessibleName())
     width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._head()).toTuple())
@@ -249,14 +249,14 @@ def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, wind
 
 def test_a_film_as_mp4_without_its_encoder_is_one_sentence(application, window, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
     until(application, lambda: "daq-app[film]" in window._words.accessibleName())
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_film_that_is_cancelled_leaves_no_file(application, window, tmp_path):
-    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Filmed(selected_row(window.state).key, film()))
     writer = window.model.write_film(tmp_path / "film.gif")
     writer._dialog.cancel()
     until(application, lambda: "The film was cancelled" in window._words.accessibleName())
@@ -265,7 +265,7 @@ def test_a_film_that_is_cancelled_leaves_no_file(application, window, tmp_path):
 
 def two_fingers(application, window, factor=1.5):
     """Show the settled finger of the chosen trial beside one of another session with `factor` times its SED."""
-    row = chosen(window.state)
+    row = selected_row(window.state)
     window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
     other = Finger(PARTS, frame(0.002 * factor), ARCS)
     window.take(m.Compared("other", replace(example(), session="later"), {row.key: other}))
@@ -294,7 +294,7 @@ def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(a
 
 def test_the_pointer_over_one_finger_reads_both(application, window):
     first, _ = two_fingers(application, window)
-    inside = QPointF(*first.view().placed(np.array([[0.2, 0.2]]))[0]).toPoint()
+    inside = QPointF(*first.view().to_screen(np.array([[0.2, 0.2]]))[0]).toPoint()
     QTest.mouseMove(first.viewport(), inside)
     application.processEvents()
     said = window.model.probe.accessibleName().split("  |  ")
@@ -311,7 +311,7 @@ def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
 
 
 def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
-    row = chosen(window.state)
+    row = selected_row(window.state)
     window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
     gone = row.prediction.experiment, row.prediction.index
     rest = tuple(p for p in example().predictions if (p.experiment, p.index) != gone)
