@@ -279,7 +279,7 @@ class _Places:
         self.picture("08-scoring")
         self.picture("09-subject-line-empty", self.subject)
         line = self.subject.line
-        line._take(line.answer.pressed(1.0, 63.0, "mouse").released())
+        line._take(line.answer.press(1.0, 63.0, "mouse").release())
         self.picture("10-subject-line-answered", self.subject)
         self.play(*scored(1, 63.0), steps.AskMount(second), until=9.0)
         self.window.act("skip")

@@ -92,7 +92,7 @@ class ScoreLine(QAbstractSlider):
         self._take(Answer())
 
     def answer_event(self, hand: Hand | None) -> Scored:
-        return self.answer.released().scored(hand)
+        return self.answer.release().judgement(hand)
 
     def place_of(self, position: float) -> QPointF:
         """Return where a position from 0 to 100 lies in the widget."""
@@ -113,13 +113,13 @@ class ScoreLine(QAbstractSlider):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self._take(self.answer.pressed(self._now(), self._position(event.position()), _device(event)))
+            self._take(self.answer.press(self._now(), self._position(event.position()), _device(event)))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        self._take(self.answer.dragged(self._now(), self._position(event.position()), _device(event)))
+        self._take(self.answer.drag(self._now(), self._position(event.position()), _device(event)))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self._take(self.answer.released())
+        self._take(self.answer.release())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = KEYS.get(Qt.Key(event.key()))
@@ -128,7 +128,7 @@ class ScoreLine(QAbstractSlider):
             return
         if self._mirrored and event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
             step = -step
-        self._take(self.answer.stepped(self._now(), step))
+        self._take(self.answer.step(self._now(), step))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Move nothing: a wheel is turned by mistake."""
@@ -159,16 +159,16 @@ class ScoreLine(QAbstractSlider):
         now, place = self._now(), self._position(at)
         match event.type():
             case QEvent.Type.TouchBegin:
-                self._take(self.answer.pressed(now, place, "touch"))
+                self._take(self.answer.press(now, place, "touch"))
             case QEvent.Type.TouchUpdate:
-                self._take(self.answer.dragged(now, place, "touch"))
+                self._take(self.answer.drag(now, place, "touch"))
             case _:
-                self._take(self.answer.released())
+                self._take(self.answer.release())
 
     def _move(self, value: int) -> None:
         """Take a value that assistive technology sets."""
         if value != round(self.answer.score or 0.0):
-            self._take(self.answer.pressed(self._now(), float(value), "keyboard").released())
+            self._take(self.answer.press(self._now(), float(value), "keyboard").release())
 
     def _take(self, answer: Answer) -> None:
         if answer is self.answer:
@@ -253,7 +253,7 @@ class NumberField(_Field):
             number = float(text.strip().translate(dict.fromkeys(map(ord, POINTS), ".")))
         except ValueError:
             number = None
-        self.answer = self.answer.typed(self.now(), number)
+        self.answer = self.answer.type_number(self.now(), number)
         self.changed.emit()
 
 
@@ -285,12 +285,12 @@ class ChoiceOfTwo(_Field):
             back, on = on, back
         keys: dict[int, Which] = {Qt.Key.Key_1: "first", back: "first", Qt.Key.Key_2: "second", on: "second"}
         if event.key() in keys:
-            self._take(self.answer.chosen(self.now(), keys[event.key()], "keyboard"))
+            self._take(self.answer.choose(self.now(), keys[event.key()], "keyboard"))
         else:
             super().keyPressEvent(event)
 
     def _button(self, words: str, which: Which, scale: float) -> QPushButton:
-        choice = button(words, words, lambda: self._take(self.answer.chosen(self.now(), which, "mouse")))
+        choice = button(words, words, lambda: self._take(self.answer.choose(self.now(), which, "mouse")))
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.

@@ -162,7 +162,7 @@ class Bridge(QObject):
     def _take(self, report: Report) -> None:
         match report:
             case m.Live():
-                self._load = self._load.latched(self.feed.add(report, self._frame()))
+                self._load = self._load.latch(self.feed.add(report, self._frame()))
                 self._judge.look(self.feed, self.state)
                 self.model.add(report, self._frame())
                 return

@@ -16,7 +16,7 @@ from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import Card
-from daq_app.window.new_session import SessionForm, Unfinished, subject_texts, unfinished
+from daq_app.window.new_session import SessionForm, UnfinishedSession, subject_texts, unfinished_sessions
 from daq_app.window.state import Message
 from daq_app.window.subject import LENGTH, SubjectText, translator
 from daq_app.window.view import BenchView, bench_summary
@@ -63,7 +63,7 @@ class CutShort(Panel):
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
         self._send = send
-        self._shown: tuple[Unfinished, ...] = ()
+        self._shown: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
@@ -75,13 +75,13 @@ class CutShort(Panel):
         """Look for such sessions in a folder, without holding up the window."""
 
         def look() -> None:
-            sessions = unfinished(folder)
+            sessions = unfinished_sessions(folder)
             with suppress(RuntimeError):  # the page is gone by now
                 self._listed.emit(sessions)
 
         threading.Thread(target=look, daemon=True).start()
 
-    def show_sessions(self, sessions: tuple[Unfinished, ...]) -> None:
+    def show_sessions(self, sessions: tuple[UnfinishedSession, ...]) -> None:
         if sessions != self._shown:
             self._shown = sessions
             self._sessions.clear()

@@ -271,7 +271,7 @@ class LivePanel(Panel):
     def model_says(self) -> None:
         """Take what the model said since the last call."""
         for said in self._model.poll():
-            self._model_trace.predicted(said)
+            self._model_trace.add_prediction(said)
 
     def _columns(self) -> int:
         """Return how many columns a curve has: two pixels each, as its line is wide."""

@@ -26,7 +26,7 @@ from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline
-from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
+from daq_app.window.new_session import Bench, Refusal, SessionForm, bench_of, check_form, pilot_form
 from daq_app.window.state import NewSession
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
@@ -229,8 +229,8 @@ class MainWindow(QMainWindow):
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
-        session = checked(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
-        if isinstance(session, Refused):
+        session = check_form(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
+        if isinstance(session, Refusal):
             self.notice.warn(" ".join(session.sentences.values()))
             return
         if session.people.kind == "simulated people":

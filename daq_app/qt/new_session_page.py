@@ -26,7 +26,7 @@ from daq_app.qt.parts import (
 from daq_app.qt.preferences import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
-from daq_app.window.new_session import AXES, Bench, SessionForm, enrolled, enrolment, offered, place_of
+from daq_app.window.new_session import AXES, Bench, SessionForm, enrol_subject, enrolment, optional_phases, place_of
 from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
@@ -194,7 +194,7 @@ class NewSessionPage(Panel):
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
-        known, before = enrolment(self.form()), offered(self.form())
+        known, before = enrolment(self.form()), optional_phases(self.form())
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
         self._enrol.setVisible(known is not None and known.may_enrol)
@@ -209,7 +209,7 @@ class NewSessionPage(Panel):
         self._send(LanguageChosen(self.screen_fields.language.currentData() or ENGLISH))
 
     def _enrol_subject(self) -> None:
-        refused = enrolled(self.form())
+        refused = enrol_subject(self.form())
         self._show_study()
         self._checked = None  # the study has changed, not the form
         self.changed.emit()

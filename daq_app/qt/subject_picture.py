@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 from daq_app.qt.parts import Openness, WrappedLabel, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, missing_glyphs
-from daq_app.window.new_session import Refused, SessionForm
+from daq_app.window.new_session import Refusal, SessionForm
 from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, preview, translator
 from daq_app.wording import tr
 from sessions.plan.protocols.languages import ENGLISH
@@ -93,8 +93,8 @@ class Thumbnail(SubjectPicture):
             return
         self._drawn = drawn
         pages = preview(form, translator(form.language or ENGLISH))
-        self.setVisible(not isinstance(pages, Refused))
-        if not isinstance(pages, Refused):
+        self.setVisible(not isinstance(pages, Refusal))
+        if not isinstance(pages, Refusal):
             self.show_page(next((page.view for page in pages if page.view.asks), pages[0].view), size)
 
 
@@ -139,7 +139,7 @@ class Mirror(QWidget):
 def open_preview(form: SessionForm, size: QSize, scale: float, parent: QWidget) -> str:
     """Show the pages of a form's protocol as they look in a window of a size; return why not, empty where they are."""
     pages = preview(form, translator(form.language or ENGLISH))
-    if isinstance(pages, Refused):
+    if isinstance(pages, Refusal):
         return " ".join(pages.sentences.values())
     shown = SubjectPreview(pages, size, scale, parent)
     shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -13,7 +13,7 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.display import Display
 from daq_app.recorder.pipes import Inbox, Outbox
-from daq_app.recorder.session import Prepared, begin, resume, run
+from daq_app.recorder.session import SessionSetup, begin, resume, run
 from drivers.clock import LONGEST_STEP, Clock, clock_at
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from sessions.recording import RecordingError
@@ -77,7 +77,7 @@ class Recorder:
             case _:
                 raise NotNow("no session is running")
 
-    def _session(self, prepare: Callable[[], Prepared]) -> None:
+    def _session(self, prepare: Callable[[], SessionSetup]) -> None:
         """Run a session; afterwards the transducer is shown as before."""
         try:
             run(prepare(), self._bench, self._display, self._inbox, self._send)

@@ -10,7 +10,7 @@ import numpy as np
 from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display, six
 from daq_app.recorder.messages import Device, Failed, LinkBack, LinkDown, NoDevice, Report, Tared
-from daq_app.simulation.wiring import Connected, connected
+from daq_app.simulation.wiring import Connection, connect
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transducer, TransducerInfo, WrappedTransducer
@@ -66,7 +66,7 @@ class Bench:
         self._display = display
         self._send = send
         self._stack = ExitStack()
-        self.connected: Connected | None = None  # what is open
+        self.connected: Connection | None = None  # what is open
         self.uri: str | None = None  # of the transducer, as asked for
         self._before: TransducerInfo | None = None  # who it was when it was lost
         self._again = 0.0  # when to try once more [real s]
@@ -156,7 +156,7 @@ class Bench:
         if self._tare is not None and self._tare.feed(block):
             tare, self._tare = self._tare, None
             tared = tare.result(self.connected.transducer.info)
-            self._display.zeroed(tared.mean)
+            self._display.set_zero(tared.mean)
             remember_zero(self.connected.transducer.info, tared.mean, tared.spread)
             self._send(tared)
 
@@ -169,7 +169,7 @@ class Bench:
 
     def _open(self, uri: str, clock: Clock) -> None:
         with ExitStack() as stack:
-            opened = stack.enter_context(connected(uri, clock))
+            opened = stack.enter_context(connect(uri, clock))
             self._stack = stack.pop_all()
         self.connected, self.uri = opened, uri
         self._display.device(opened.transducer.info)

@@ -103,7 +103,7 @@ class Recorder:
     def send(self, request: Request) -> None:
         """Ask for something, or tell what was done. To a recorder that is gone it is sent in vain: `Gone` says so."""
         self._asked_to_end |= isinstance(request, Shutdown)
-        self._to_send.put(self._requests.packed(request))
+        self._to_send.put(self._requests.encode(request))
 
     def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
         """Return all reports since the last call, in order, waiting up to `timeout` [s] for the first."""
@@ -149,15 +149,15 @@ class Recorder:
                 said = f"; it said {error}"
             except OSError:
                 pass
-        self._arrive(self._gone(said))
+        self._arrive(self._end_message(said))
 
     def _arrive(self, report: Report) -> None:
         self._arrived.append(report)
         self._news.set()
         self._wake()
 
-    def _gone(self, said: str) -> Gone:
-        """Return how the recorder ended."""
+    def _end_message(self, said: str) -> Gone:
+        """Return the message that says how the recorder ended."""
         if self._asked_to_end:
             return Gone(True, "the recorder has ended")
         try:

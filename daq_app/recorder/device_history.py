@@ -80,11 +80,11 @@ def _lines(serial: str) -> list[dict[str, Any]]:
         text = _file(serial).read_text(encoding="utf-8", errors="replace")
     except OSError:
         return []
-    return [line for line in map(_parsed, text.splitlines()) if line is not None]
+    return [line for line in map(_parse, text.splitlines()) if line is not None]
 
 
-def _parsed(text: str) -> dict[str, Any] | None:
-    """Return one line, None where it was cut short or is none of ours."""
+def _parse(text: str) -> dict[str, Any] | None:
+    """Return one line of the history, None where it was cut short or has another form."""
     try:
         line = json.loads(text)
         numbers = line["wrench"] + line["noise"] if line["kind"] == "zero" else line["greatest"]

@@ -55,7 +55,7 @@ class Display:
         self._arrived.clear()
         self._saturated_before = self._saturated_now = 0
 
-    def zeroed(self, mean: Six) -> None:
+    def set_zero(self, mean: Six) -> None:
         """Subtract this zero from now on [raw units]."""
         self._flush()
         self._zero = mean

@@ -234,15 +234,15 @@ class Codec:
             if length > LONGEST:
                 raise BrokenMessage(f"a message of {length} bytes is none of ours")
             if len(body := file.read(length)) == length:
-                yield self.unpacked(body)
+                yield self.decode(body)
 
-    def packed(self, message: object) -> bytes:
-        """Return a message as bytes."""
+    def encode(self, message: object) -> bytes:
+        """Return a message as bytes, its length first."""
         body = msgspec.msgpack.encode((type(message).__name__, message), enc_hook=_array_out)
         return LENGTH.pack(len(body)) + body
 
-    def unpacked(self, body: bytes) -> Any:  # noqa: ANN401  one of the types it was given
-        """Return the message of these bytes, the length not among them. Raises BrokenMessage."""
+    def decode(self, body: bytes) -> Any:  # noqa: ANN401  one of the types it was given
+        """Return the message of these bytes, which are without the length. Raises BrokenMessage."""
         try:
             name, fields = msgspec.msgpack.decode(body, type=tuple[str, msgspec.Raw])
             cls: Any = self._types[name]

@@ -123,7 +123,7 @@ class Outbox:
             self._news.clear()
             while (report := self._next()) is not None:
                 try:
-                    self._file.write(self._packed(report))
+                    self._file.write(self._encode(report))
                     self._file.flush()
                 except OSError:
                     with self._lock:
@@ -132,12 +132,12 @@ class Outbox:
                         self._idle.set()
                     return
 
-    def _packed(self, report: Report) -> bytes:
-        """Return the bytes of a report; of one that cannot be packed, a sentence, so that the others still go out."""
+    def _encode(self, report: Report) -> bytes:
+        """Return the bytes of a report, or of a sentence where it cannot be encoded, so that others still go out."""
         try:
-            return self._codec.packed(report)
+            return self._codec.encode(report)
         except Exception as error:  # noqa: BLE001  the client must not go blind for an error of ours
-            return self._codec.packed(Failed(type(report).__name__, f"a report could not be sent ({error})"))
+            return self._codec.encode(Failed(type(report).__name__, f"a report could not be sent ({error})"))
 
     def _next(self) -> Report | None:
         with self._lock:

@@ -95,7 +95,7 @@ Send = Callable[[m.Report], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
+class SessionSetup:
     """All that a session needs to run."""
 
     plan: SessionPlan
@@ -108,7 +108,7 @@ class Prepared:
     before: tuple[LoggedEvent, ...] = ()  # all that was recorded before
 
 
-def begin(request: m.StartSession, bench: Bench, clock: Clock) -> Prepared:
+def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
     """Begin to record in a new folder. Raises RecordingError, SetupError or NotNow."""
     plan, people = request.plan, request.people
     if plan.forces and bench.connected is None:
@@ -128,10 +128,10 @@ def begin(request: m.StartSession, bench: Bench, clock: Clock) -> Prepared:
         clock=clock,
         reserve=RESERVE,
     )
-    return Prepared(plan, writer, clock, people, info)
+    return SessionSetup(plan, writer, clock, people, info)
 
 
-def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
+def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup:
     """Go on with a session that was cut short; its transducer is opened again, on the session's clock.
 
     Raises RecordingError, NotNow, and what opening the transducer raises.
@@ -158,12 +158,12 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
     writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
     resumed = Continuation(at, resuming.resumed_data(gap, info, software_versions()), last)
-    return Prepared(
+    return SessionSetup(
         recording.plan, writer, going_on, people, info, going_on.offset_ns, resumed, tuple(recording.events)
     )
 
 
-def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
+def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
     """Run the session to its end, send all that happens in it, and seal it unless it can go on.
 
     Raises RecordingError.
@@ -218,7 +218,7 @@ def _recorded_people(recording: Recording) -> m.People:
 class _Operator:
     """Client and simulated people as the runner's operator."""
 
-    def __init__(self, prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
+    def __init__(self, prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
         self._bench = bench
         self._display = display
         self._inbox = inbox
@@ -277,12 +277,12 @@ class _Operator:
             elif event.kind == "take_discarded":
                 self._touching = False
             elif event.kind == "zeroed":
-                self._display.zeroed(tuple(event.data["mean"]))
+                self._display.set_zero(tuple(event.data["mean"]))
                 if self._info is not None:
                     remember_zero(self._info, event.data["mean"], event.data["spread"])
 
 
-def _helper(prepared: Prepared, bench: Bench) -> Operator | None:
+def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
     people = prepared.people
     connected = bench.connected if prepared.plan.forces else None
     if people.kind == "people":

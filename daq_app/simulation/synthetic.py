@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from daq_app.console import Console
-from daq_app.simulation.wiring import INPUT, Connected, SimulatedPeople, connected, planted_surface
+from daq_app.simulation.wiring import INPUT, Connection, SimulatedPeople, connect, planted_surface
 from drivers.clock import Clock, SimulatedClock
 from sessions.file_access import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
@@ -110,7 +110,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         visit(plan(chosen, subject, own, forces=False), scored[-1], SimulatedPeople(SimulatedSubject(own), clock))
     subject, own = f"S{STROKING:02d}", _seed(seed, STROKING)
     folder = out / f"{subject}-forces"
-    with connected(f"sim:?seed={seed}&rate=200", clock) as bench:
+    with connect(f"sim:?seed={seed}&rate=200", clock) as bench:
         people = SimulatedPeople(SimulatedSubject(own), clock, bench)
         end = visit(plan(chosen, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
         planted = tuple(
@@ -213,7 +213,7 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
     planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
     people = SyntheticPeople(
-        SimulatedSubject(own, settings), clock, Connected(transducer, bench, transducer.now), planned, spoilt
+        SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), planned, spoilt
     )
     conduct(
         planned,
@@ -244,9 +244,9 @@ class SyntheticPeople(SimulatedPeople):
     """Simulated people whose finger, calibration and visit are their own, and what goes wrong in it."""
 
     def __init__(
-        self, subject: SimulatedSubject, clock: Clock, bench: Connected, planned: SessionPlan, spoilt: Spoilt
+        self, subject: SimulatedSubject, clock: Clock, bench: Connection, planned: SessionPlan, spoilt: Spoilt
     ) -> None:
-        super().__init__(subject, clock, bench, self._perceived)
+        super().__init__(subject, clock, bench, self._perceived_surface)
         self._plan, self._spoilt = planned, spoilt
 
     def show(self, command: steps.Command) -> None:
@@ -276,7 +276,7 @@ class SyntheticPeople(SimulatedPeople):
         place = block.trials.index(trial)
         return block, place, block.trials[place - 1].stimulus.known_index if place else None
 
-    def _perceived(self, trial: Trial) -> Surface:
+    def _perceived_surface(self, trial: Trial) -> Surface:
         surface = self.subject.perceived(planted_surface(trial))
         light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)

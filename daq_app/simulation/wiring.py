@@ -20,11 +20,11 @@ from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
 __all__ = [
-    "Connected",
+    "Connection",
     "SimulatedHand",
     "SimulatedPeople",
     "SimulatedSubject",
-    "connected",
+    "connect",
     "planted_surface",
     "serve_digital_ft",
     "serve_net_ft",
@@ -39,7 +39,7 @@ _OPTIONS = frozenset({"seed", "rate", "tool"})
 
 
 @dataclass(frozen=True, slots=True)
-class Connected:
+class Connection:
     """An opened transducer, and the bench behind it where that is simulated in this process."""
 
     transducer: Transducer
@@ -56,7 +56,7 @@ class Connected:
 
 
 @contextmanager
-def connected(uri: str, clock: Clock) -> Generator[Connected]:
+def connect(uri: str, clock: Clock) -> Generator[Connection]:
     """Open the transducer at `uri` and close it in any case.
 
     `sim:?seed=7&rate=200` is the simulated bench: a box on loopback, read by the very driver a real box is read by.
@@ -67,7 +67,7 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
         recording = Recording.open(Path(uri.removeprefix(REPLAY)))
         replayed = ReplayTransducer(recording, clock, uri)
         try:
-            yield Connected(replayed, recorded_frame=recording.plan.frame)
+            yield Connection(replayed, recorded_frame=recording.plan.frame)
         finally:
             replayed.close()
         return
@@ -75,7 +75,7 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
     if address.scheme != SIMULATED:
         transducer = open_transducer(uri, clock)
         try:
-            yield Connected(transducer)
+            yield Connection(transducer)
         finally:
             transducer.close()
         return
@@ -86,8 +86,8 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
     box.start()
     try:
         tool = f"&tool={address.options['tool']}" if "tool" in address.options else ""
-        with connected(box.uri + tool, clock) as inner:
-            yield Connected(inner.transducer, bench, box.now)
+        with connect(box.uri + tool, clock) as inner:
+            yield Connection(inner.transducer, bench, box.now)
     finally:
         box.close()
 
@@ -117,7 +117,7 @@ class SimulatedHand:
     """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
 
     def __init__(
-        self, subject: SimulatedSubject, bench: Connected | None, surface: SurfaceOf = planted_surface
+        self, subject: SimulatedSubject, bench: Connection | None, surface: SurfaceOf = planted_surface
     ) -> None:
         """Let the subject stroke the `surface` of each trial, unseen where there is no bench.
 
@@ -170,7 +170,7 @@ class SimulatedPeople(SimulatedHand):
         self,
         subject: SimulatedSubject,
         clock: Clock,
-        bench: Connected | None = None,
+        bench: Connection | None = None,
         surface: SurfaceOf = planted_surface,
     ) -> None:
         """Let the subject answer on the session's clock; for the rest see `SimulatedHand`."""

@@ -176,20 +176,20 @@ def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | 
         time = clock(act.time)
         match act.kind, act.value:
             case "press", float(position):
-                line = line.pressed(time, position, act.device)
+                line = line.press(time, position, act.device)
             case "drag", float(position):
-                line = line.dragged(time, position, act.device)
+                line = line.drag(time, position, act.device)
             case "release", _:
-                line = line.released()
+                line = line.release()
             case "step", float(by):
-                line = line.stepped(time, by)
+                line = line.step(time, by)
             case "number", float() | None as number:
-                choice = choice.typed(time, number)
+                choice = choice.type_number(time, number)
             case "choose", "first" | "second" as which:
-                choice = choice.chosen(time, which, act.device)
+                choice = choice.choose(time, which, act.device)
             case _:
                 pass  # a value that does not go with its act
-    return choice.judgement(hand) if choice != Choice() else line.released().scored(hand)
+    return choice.judgement(hand) if choice != Choice() else line.release().judgement(hand)
 
 
 def _key(session: SessionState, trial: int, take: int) -> str:

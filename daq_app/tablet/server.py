@@ -151,7 +151,7 @@ class TabletServer:
         with self._door:
             if self._admit(connection, hello.code, by_code=True):
                 return True
-            why = self._guessed(hello)
+            why = self._refuse_code(hello)
         _tell(connection, written(Refused(why)))
         return False
 
@@ -170,8 +170,8 @@ class TabletServer:
         self._changed()
         return True
 
-    def _guessed(self, hello: Hello) -> str:
-        """Return why a tablet is refused, after a while; another code takes the place of one that is guessed at."""
+    def _refuse_code(self, hello: Hello) -> str:
+        """Return after a pause why a tablet is refused; after several wrong codes the code is replaced."""
         time.sleep(WRONG_CODE)
         with self._lock:
             taken = bool(self._token)

@@ -155,12 +155,12 @@ class SessionState:
         return replace(self, trials=changed)
 
 
-def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
-    """Return a session that has just begun, or goes on, at `now` [s]."""
+def begin_session(begun: m.SessionBegun, now: float) -> SessionState:
+    """Return the state of a session that begins, or goes on, at `now` [s]."""
     trials = tuple(TrialState(t, chosen=t.standard or not b.candidates) for b in begun.plan.blocks for t in b.trials)
     session = SessionState(begun.folder, begun.plan, begun.people, begun.simulated, trials, now, since=now)
     for event in begun.events:
-        session = _logged(session, event)
+        session = _fold_event(session, event)
     return replace(session, marks=())  # theirs is the clock of a stream that has ended
 
 
@@ -173,22 +173,22 @@ def session_after(session: SessionState, message: object, now: float) -> Session
 def _after(session: SessionState, message: object, now: float) -> SessionState:
     match message:
         case LoggedEvent():
-            return _logged(session, message)
+            return _fold_event(session, message)
         case Status():
             saved = now if message.safe.time_ns != session.saved_ns else session.saved
             phase = cast("Phase", message.state) if message.state in REPORTED else session.phase
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):
-            return _judged(session, trial, take, quality)
+            return _judge(session, trial, take, quality)
         case m.Sealing():
             return replace(session, sealing="running")
         case m.Sealed():
             return replace(session, sealing="sealed")
         case _:
-            return _shown(_ended(session, message), message)
+            return _fold_command(_fold_end(session, message), message)
 
 
-def _ended(session: SessionState, message: object) -> SessionState:
+def _fold_end(session: SessionState, message: object) -> SessionState:
     match message:
         case m.SessionEnded(folder, end, resumable):
             return replace(_over(session), folder=folder, end=end, resumable=resumable)
@@ -228,8 +228,8 @@ def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
     return (trial,) if first is None else (first, trial)
 
 
-def _shown(session: SessionState, message: object) -> SessionState:
-    """Return the session after a command: what it asks for is what is waited for now."""
+def _fold_command(session: SessionState, message: object) -> SessionState:
+    """Return the session after a command, in the phase that waits for its answer."""
     match message:
         case steps.AskBegin():
             return replace(session, phase="idle", command=message)
@@ -247,10 +247,10 @@ def _shown(session: SessionState, message: object) -> SessionState:
         case steps.AskFinish():
             return replace(session, phase="closing", trial=None, command=message, notice=None)
         case _:
-            return _noticed(session, message)
+            return _fold_notice(session, message)
 
 
-def _noticed(session: SessionState, message: object) -> SessionState:
+def _fold_notice(session: SessionState, message: object) -> SessionState:
     match message:
         case steps.ShowInstruction(block):
             return replace(session, block=block)
@@ -264,14 +264,14 @@ def _noticed(session: SessionState, message: object) -> SessionState:
             return session
 
 
-def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
+def _fold_event(session: SessionState, event: LoggedEvent) -> SessionState:
     number, data = event.trial, event.data
     match event.kind:
         case "contact_onset":
             phase = "stroking" if session.phase == "ready" else session.phase
-            return _marked(replace(session, phase=phase, redone=()), _instant(session, "onset", data))
+            return _add_mark(replace(session, phase=phase, redone=()), _instant(session, "onset", data))
         case "finger_lifted":
-            return _marked(session, _instant(session, "lift", data))
+            return _add_mark(session, _instant(session, "lift", data))
         case "readings_joined":
             return replace(session, time_offset=data["time_offset"], marks=())
         case "pause":
@@ -304,9 +304,9 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
         case "take_kept":
             return session.with_trial(number, outcome="done")
         case "take_discarded":
-            return _discarded(session, number, str(data["reason"]))
+            return _discard(session, number, str(data["reason"]))
         case "take_restored":
-            return _restored(session, number, data["take"])
+            return _restore(session, number, data["take"])
         case "skip":
             return replace(session.with_trial(number, outcome="skipped"), redone=())
         case _:
@@ -320,15 +320,15 @@ def _answer(form: str, answer: float | str | None) -> str:
     return tr("no answer") if answer is None else tr(form, answer=answer)
 
 
-def _discarded(session: SessionState, number: int | None, reason: str) -> SessionState:
+def _discard(session: SessionState, number: int | None, reason: str) -> SessionState:
     of = session.of(number)
     earlier = () if of is None else (*of.earlier, replace(of, earlier=()))
     outcome = "skipped" if reason.startswith("skipped: ") else "coming"
     return session.with_trial(number, outcome=outcome, answer=None, discarded=reason, earlier=earlier)
 
 
-def _restored(session: SessionState, number: int | None, take: int) -> SessionState:
-    """Return the session with a discarded take in hand again, and what was known of it."""
+def _restore(session: SessionState, number: int | None, take: int) -> SessionState:
+    """Return the session with a discarded take as the present one again, with its answer and quality."""
     of = session.of(number)
     was = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
     if was is None:
@@ -337,15 +337,15 @@ def _restored(session: SessionState, number: int | None, take: int) -> SessionSt
     return session.with_trial(number, outcome="coming", **known)
 
 
-def _judged(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:
-    """Return the session with what was found of a stroke; nothing where the take is over and done again."""
+def _judge(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:
+    """Return the session with the quality of a stroke; as it is where that take has been repeated."""
     of = session.of(trial)
     if of is None or of.takes != take:
         return session
     session = replace(session.with_trial(trial, quality=quality), judged=trial)
     if quality.steady is None or session.over:
         return session
-    return _marked(session, Mark("steady", *quality.steady))
+    return _add_mark(session, Mark("steady", *quality.steady))
 
 
 def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mapping[str, Any]) -> Mark:
@@ -353,7 +353,7 @@ def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mappin
     return Mark(kind, at, at)
 
 
-def _marked(session: SessionState, mark: Mark) -> SessionState:
-    """Return the session with another mark; a steady window that is found anew takes the place of the one before."""
+def _add_mark(session: SessionState, mark: Mark) -> SessionState:
+    """Return the session with another mark; a new steady window replaces the earlier one that it overlaps."""
     kept = [m for m in session.marks if m.kind != "steady" or mark.kind != "steady" or m.stop < mark.start]
     return replace(session, marks=(*kept, mark)[-MARKS:])

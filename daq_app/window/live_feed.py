@@ -36,10 +36,10 @@ class Load:
 
     shares: tuple[float, ...] = (0.0,) * 7  # of LOADS, as `drivers.calibration.loads` has them
 
-    def latched(self, other: "Load") -> "Load":
+    def latch(self, other: "Load") -> "Load":
         """Return the greater of each share.
 
-        >>> Load((0.1, 0.0, 0.9, 0.0, 0.0, 0.0, 0.9)).latched(Load((0.2,) * 6 + (0.4,))).shares
+        >>> Load((0.1, 0.0, 0.9, 0.0, 0.0, 0.0, 0.9)).latch(Load((0.2,) * 6 + (0.4,))).shares
         (0.2, 0.2, 0.9, 0.2, 0.2, 0.2, 0.9)
         """
         return Load(tuple(np.fmax(self.shares, other.shares).tolist()))
@@ -73,10 +73,10 @@ def together(reports: Iterable[Report]) -> Iterator[Report]:
             yield from group
             continue
         lives = [report for report in group if isinstance(report, Live)]
-        yield lives[0] if len(lives) == 1 else _joined(lives)
+        yield lives[0] if len(lives) == 1 else _join(lives)
 
 
-def _joined(lives: list[Live]) -> Live:
+def _join(lives: list[Live]) -> Live:
     arrays = {name: np.concatenate([getattr(live, name) for live in lives]) for name in ARRAYS}
     return structs.replace(lives[0], **arrays, left_out=sum(live.left_out for live in lives))
 
@@ -129,7 +129,7 @@ class LiveFeed:
         """Return the readings of the take in hand, as a wrench: N, N mm."""
         if not self._take:
             return ReadingBlock.empty()
-        whole = _joined(list(self._take))
+        whole = _join(list(self._take))
         sequence, wrench = whole.sequence, whole.wrench
         return ReadingBlock(sequence, sequence, whole.status, whole.time, whole.received_ns, raw=wrench)
 

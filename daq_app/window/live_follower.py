@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
+from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, SettledSolve, Use
 from daq_app.wording import tr
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import PredictionOptions, with_own_finger
@@ -58,7 +58,7 @@ def settled_scene(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
+class _Observation:
     time: float  # [s, device time]
     row: Array
     picture: Picture
@@ -78,8 +78,8 @@ class _Model:
         picture.sed(follower.state)  # what it needs is made at once
         return cls(follower, picture)
 
-    def drawn(self) -> tuple[Picture, Array]:
-        """Return what is drawn, and where its nodes are while nothing touches (n, 2) [mm]."""
+    def picture_and_rest(self) -> tuple[Picture, Array]:
+        """Return the picture, and the positions of its nodes while nothing touches (n, 2) [mm]."""
         state, picture = self.stepper.state, self.picture
         nodes, sed = picture.nodes(state), picture.sed(state)
         return Picture(nodes, picture.faces, sed, self.stepper.outline()), picture.rest
@@ -103,7 +103,7 @@ class Follower:
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
         self._said: deque[tuple[float, float]] = deque()
-        self._seen: deque[_Seen] = deque(maxlen=SEEN)
+        self._seen: deque[_Observation] = deque(maxlen=SEEN)
 
     def follows(self, use: Use) -> bool:
         """Say whether it follows just this finger already."""
@@ -115,7 +115,7 @@ class Follower:
             self._stream = forces.stream
             self._said.clear()
             self._seen.clear()
-            self._untouched()
+            self._forget_contact()
         steps = [self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)]
         sed = np.array([said for said, _ in steps])
         instead = np.array([len(self._models) > 1 and not reached for _, reached in steps])
@@ -123,27 +123,27 @@ class Follower:
         while self._said and self._said[0][0] < forces.time[-1] - KEPT:
             self._said.popleft()
         shown = self._models[1 if self._reached and len(self._models) > 1 else 0]
-        row, now, (picture, rest) = shown.stepper.row(), float(forces.time[-1]), shown.drawn()
+        row, now, (picture, rest) = shown.stepper.row(), float(forces.time[-1]), shown.picture_and_rest()
         if sed[-1] > 0.0 and (not self._seen or abs(now - self._seen[-1].time) >= SEEN_EVERY):
-            self._seen.append(_Seen(now, row, picture, rest, shown.stepper.depth))
+            self._seen.append(_Observation(now, row, picture, rest, shown.stepper.depth))
         return Provisional(
             forces.time, sed, row, picture, shown.stepper.depth, self._mu,
             self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
-    def settling(self, request: Settle) -> Callable[[], Settled]:
+    def settling(self, request: Settle) -> Callable[[], SettledSolve]:
         """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
         first, last = request.steady
         said = np.array([sed for time, sed in self._said if first <= time <= last])
         said = said[np.isfinite(said)]
         provisional = float(said.mean()) if len(said) else None
         seen = next((seen for seen in reversed(self._seen) if first <= seen.time <= last), None)
-        return lambda: _settled(request, self._kinematics, provisional, seen)
+        return lambda: _solve_settled(request, self._kinematics, provisional, seen)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
         """Return the SED under forces [N], and whether it is of finite strain; nothing that touches is within reach."""
         if normal < TOUCH:
-            self._untouched()
+            self._forget_contact()
             return 0.0, True
         if normal >= FLOOR:
             self._mu = max(self._mu, abs(pull) / normal)
@@ -157,15 +157,17 @@ class Follower:
         self._reached = bool(finite) and not np.isnan(finite[0])
         return (finite[0], True) if self._reached else (small, False)
 
-    def _untouched(self) -> None:
+    def _forget_contact(self) -> None:
         self._mu, self._tangential = LEAST_MU, 0.0
         self._reached = len(self._models) > 1
         for one in self._models:
             one.stepper.forget()
 
 
-def _settled(request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
-    """Return the full solve; where there is none, why, with the last state that was followed in the steady window."""
+def _solve_settled(
+    request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Observation | None
+) -> SettledSolve:
+    """Solve a stroke in full; where that fails, return why, with the last state that was followed in its window."""
     scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
     why, failed, prediction = tr("The stroke gives no friction."), False, None
     try:
@@ -175,13 +177,13 @@ def _settled(request: Settle, kinematics: Kinematics, provisional: float | None,
     if prediction is None:
         row, picture, depth = np.full(len(ROW), np.nan), None, None
         if seen is not None:
-            lost = most_squeezed(seen.rest, seen.picture.nodes, seen.picture.faces) if failed else None
+            lost = place_of_greatest_shortening(seen.rest, seen.picture.nodes, seen.picture.faces) if failed else None
             row, picture, depth = seen.row, replace(seen.picture, lost=lost), seen.depth
-        return Settled(request.trial, None, None, provisional, row, picture, depth, kinematics, why)
+        return SettledSolve(request.trial, None, None, provisional, row, picture, depth, kinematics, why)
     fields = fields_of(prediction)
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
-    return Settled(
+    return SettledSolve(
         request.trial, prediction.sed_ending, known_error(prediction, prediction.error_estimate), provisional,
         prediction.row.sed, picture, prediction.indentation, kinematics, effect=_greatest_effect(prediction),
     )  # fmt: skip
@@ -194,14 +196,14 @@ def _greatest_effect(prediction: Prediction) -> str:
     return name and f"{name} {float(f'{100 * known[name]:.2g}'):g} % of the SED"
 
 
-def most_squeezed(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:
+def place_of_greatest_shortening(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:
     """Return the middle (x, y) [mm] of the face that is shortened most in any direction.
 
     `rest` and `moved` are nodes (n, 2) before and after, `faces` (f, 4); each is taken to stretch as its diagonals do.
 
     >>> square = np.array([[0.0, 0.0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]])
     >>> pressed = square * [1.0, 0.5] + [[0, 0], [0, 0], [-0.8, 0]] * 2
-    >>> most_squeezed(square, pressed, np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))
+    >>> place_of_greatest_shortening(square, pressed, np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))
     (1.1, 0.25)
     """
     before, after = (np.stack([at[:, 2] - at[:, 0], at[:, 3] - at[:, 1]], axis=2) for at in (rest[faces], moved[faces]))

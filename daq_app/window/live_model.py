@@ -92,8 +92,8 @@ class Settle:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Settled:
-    """The full solve of a stroke, beside what was shown while it was made."""
+class SettledSolve:
+    """The full solve of a stroke, with the mean of what was shown live."""
 
     trial: int
     sed: float | None  # [MPa]; None where `reason` says why
@@ -110,7 +110,7 @@ class Settled:
     def difference(self) -> float | None:
         """Return by which part of the full solve the provisional value is larger [-]; None where one is missing.
 
-        >>> Settled(1, 0.004, 0.01, 0.005, np.empty(0), None, 2.0, "small").difference
+        >>> SettledSolve(1, 0.004, 0.01, 0.005, np.empty(0), None, 2.0, "small").difference
         0.25
         """
         if not self.sed or self.provisional is None:
@@ -134,7 +134,7 @@ def forces_of(live: Live, frame: Frame) -> Forces | None:
     return Forces(mean[:, 0], -mean[:, 3], pull, int(live.received_ns[-1]), live.stream)
 
 
-def joined(batches: list[Forces]) -> Forces:
+def join_forces(batches: list[Forces]) -> Forces:
     """Return several batches of one stream as one."""
     time, normal, pull = (np.concatenate([getattr(b, name) for b in batches]) for name in ("time", "normal", "pull"))
     return Forces(time, normal, pull, batches[-1].received_ns, batches[-1].stream)
@@ -148,12 +148,12 @@ class ModelWords:
     state: Literal["none", "provisional", "instead", "beyond", "failed", "settled"]
 
 
-def model_words(said: Provisional | None, settled: Settled | None, problem: str) -> ModelWords:
+def model_words(said: Provisional | None, settled: SettledSolve | None, problem: str) -> ModelWords:
     """Return what is said of the picture that is shown."""
     if problem:
         return ModelWords(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:
-        return ModelWords(_of_settled(settled), "failed" if settled.sed is None else "settled")
+        return ModelWords(_settled_words(settled), "failed" if settled.sed is None else "settled")
     if said is None:
         return ModelWords(tr("The live model is starting."), "none")
     if said.beyond:
@@ -171,7 +171,7 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
     return ModelWords(known + tr(KINEMATICS[said.kinematics]), "provisional")
 
 
-def _of_settled(settled: Settled) -> str:
+def _settled_words(settled: SettledSolve) -> str:
     shown = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
     how, picture, depth = tr(KINEMATICS[settled.kinematics]), settled.picture, settled.depth
     if settled.sed is None:
@@ -201,8 +201,8 @@ class ModelTrace(LiveTrace):
         super().__init__(1.0 / STEP, channels=len(MODEL_CHANNELS), gap=GAP)
         self._stream: int | None = None
 
-    def predicted(self, said: Provisional) -> None:
-        """Take another prediction."""
+    def add_prediction(self, said: Provisional) -> None:
+        """Add a prediction to the trace."""
         if said.stream != self._stream:
             self._stream = said.stream
             self.clear()

@@ -8,7 +8,17 @@ from typing import Any
 
 from daq_app.child_process import Child, give_way
 from daq_app.recorder.messages import Live
-from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
+from daq_app.window.live_model import (
+    Forces,
+    Kinematics,
+    Provisional,
+    Ready,
+    Settle,
+    SettledSolve,
+    Use,
+    forces_of,
+    join_forces,
+)
 from daq_app.wording import tr
 from sessions.plan.plan import Frame, SessionPlan
 
@@ -28,11 +38,11 @@ def run(connection: Connection) -> None:
     follower: Follower | None = None
     speaking = threading.Lock()
 
-    def say(message: Ready | Provisional | Settled) -> None:
+    def say(message: Ready | Provisional | SettledSolve) -> None:
         with speaking, suppress(OSError):  # a window that is gone is noticed below
             connection.send(message)
 
-    def solve(solving: Callable[[], Settled]) -> None:
+    def solve(solving: Callable[[], SettledSolve]) -> None:
         say(solving())
 
     with suppress(EOFError, OSError):
@@ -60,7 +70,7 @@ class LiveModel:
 
     def __init__(self) -> None:
         self.said: Provisional | None = None  # the newest
-        self.settled: Settled | None = None  # of the last stroke; None again once another begins
+        self.settled: SettledSolve | None = None  # of the last stroke; None again once another begins
         self.problem = ""  # why nothing is said; empty where all is well
         self.predictions = 0  # that came so far
         self._news: list[Provisional] = []
@@ -121,7 +131,7 @@ class LiveModel:
         self._news = []
         try:
             while (message := self._child.receive()) is not None:
-                self._under_way -= not isinstance(message, Settled)  # it comes when it comes
+                self._under_way -= not isinstance(message, SettledSolve)  # it comes when it comes
                 self._heard(message)
             if not self._under_way:
                 self._send(self._child)
@@ -130,7 +140,7 @@ class LiveModel:
             self.problem = tr("the live model has stopped; it starts again with the next session")
         return tuple(self._news)
 
-    def _heard(self, message: Ready | Provisional | Settled) -> None:
+    def _heard(self, message: Ready | Provisional | SettledSolve) -> None:
         match message:
             case Ready(problem):
                 self.problem = problem
@@ -140,7 +150,7 @@ class LiveModel:
                 self.predictions += 1
                 if message.sed[-1] > 0.0:
                     self.settled = None
-            case Settled():
+            case SettledSolve():
                 self.settled = message
 
     def _send(self, child: Child) -> None:
@@ -150,7 +160,7 @@ class LiveModel:
             if isinstance(request, Settle):
                 return
         elif self._waiting and not self.problem:
-            child.send(joined(self._waiting))
+            child.send(join_forces(self._waiting))
             self._waiting = []
         else:
             return

@@ -99,7 +99,7 @@ class LiveTrace:
             self._columns = self._no_columns(width, first)
         begin, _ = self._positions(self._columns.open_from, last)
         self._columns = self._columns.onward(self._time[begin:b], self._values[:, begin:b], first)
-        return self._columns.drawn(self._gap)
+        return self._columns.envelope(self._gap)
 
     def _no_columns(self, width: float = 0.0, first: float = 0.0) -> "_Columns":
         return _Columns(width, first, np.empty(0, np.int64), np.empty((len(self._values), 0), np.float32))
@@ -133,8 +133,8 @@ class _Columns:
         numbers = np.concatenate([self.numbers[keep], column[starts]])
         return _Columns(self.width, first, numbers, np.hstack([old, _pairs(values, starts)]))
 
-    def drawn(self, gap: float) -> Columns:
-        """Return what is drawn of them."""
+    def envelope(self, gap: float) -> Columns:
+        """Return the least and the greatest value of each column, with gaps where readings are missing."""
         behind = np.flatnonzero(np.diff(self.numbers) > 1 + gap / self.width)
         at = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
         return _with_gaps(at, self.pairs.astype(np.float64), behind, 2)

@@ -49,7 +49,7 @@ class SessionForm:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class Refusal:
     """Why no session can begin: a sentence for each field that is wrong, by its name."""
 
     sentences: Mapping[str, str]
@@ -76,7 +76,7 @@ class Enrolment:
 
 
 @dataclass(frozen=True, slots=True)
-class Unfinished:
+class UnfinishedSession:
     """A session that was cut short and can go on."""
 
     folder: Path
@@ -100,30 +100,30 @@ def pilot_form(form: SessionForm, bench: Bench) -> SessionForm:
     return replace(form, subject=PILOT, forces=forces, height="", normal="", area="", simulated=True, pilot=True)
 
 
-def checked(
+def check_form(
     form: SessionForm, bench: Bench, now: datetime, new_seed: int, settings: tuple[Setting, ...] = ()
-) -> StartSession | Refused:
+) -> StartSession | Refusal:
     """Return the request that begins the session, or what is wrong with the form.
 
     `new_seed` is used where the form names none; `settings` are kept with the session beside the page's own. In a
     study, protocol, seed and the subject's own finger are those that were decided at its enrolment.
     """
     if wrong := _refusals(form, bench):
-        return Refused(wrong)
+        return Refusal(wrong)
     phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
     phases: list[Phase] = [phase for phase, wanted in phases_wanted.items() if wanted]
     frame, area = (bench.frame, _number(form.area)) if form.forces else (None, None)
     setting = VisitSetting(frame, area, form.stroking_hand, form.answering_hand, form.language or None)
     try:
-        chosen, seed, body, place = _decided(form, new_seed)
+        chosen, seed, body, place = _choose_protocol(form, new_seed)
         planned = plan(
             chosen, form.subject.strip(), seed, forces=form.forces, setting=setting,
             phases=phases if len(phases) > 1 else None, body=body, place=place,
         )  # fmt: skip
     except StudyError as error:
-        return Refused({"subject": _sentence(error)})
+        return Refusal({"subject": _sentence(error)})
     except (SettingsError, OSError) as error:
-        return Refused({"protocol": _sentence(error)})
+        return Refusal({"protocol": _sentence(error)})
     if form.forces and form.height.strip():
         face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
         planned = replace(planned, frame=face)
@@ -156,8 +156,8 @@ def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
         wrong.setdefault("subject" if said.protocol else "study", said.words)
     if wrong:
         return wrong
-    session = checked(form, bench, datetime.now(), 0)
-    if isinstance(session, Refused):
+    session = check_form(form, bench, datetime.now(), 0)
+    if isinstance(session, Refusal):
         return session.sentences
     try:
         check_room(Path(session.folder).parent, need(session.plan, bench.rate if form.forces else None))
@@ -166,8 +166,8 @@ def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
     return {}
 
 
-def offered(form: SessionForm) -> tuple[Phase, ...]:
-    """Return what may come before the trials that count, as the study's protocol or the form's has it."""
+def optional_phases(form: SessionForm) -> tuple[Phase, ...]:
+    """Return the phases that may precede the main trials in the protocol of the study, or else of the form."""
     try:
         return phases_before(_protocol(form))
     except (StudyError, SettingsError, OSError):
@@ -211,8 +211,8 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     return Enrolment(name, words, enrolled=True)
 
 
-def enrolled(form: SessionForm) -> str:
-    """Enrol the form's subject in its study, nothing of its finger being known; return why not, empty where done."""
+def enrol_subject(form: SessionForm) -> str:
+    """Enrol the form's subject in its study, without measures of its finger; return why it failed, or ""."""
     try:
         enrol(place_of(form), form.subject.strip(), Body())
     except (StudyError, SettingsError) as error:
@@ -225,8 +225,8 @@ def place_of(form: SessionForm) -> Path:
     return Path(form.folder.strip() or ".").expanduser() / form.study.strip()
 
 
-def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
-    """Return protocol, seed, the subject's own and its place, as a study or the form decides them."""
+def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
+    """Return protocol, seed, the subject's finger and its place, from the study if there is one, else the form."""
     study = _study(form)
     if study is None:
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
@@ -248,9 +248,9 @@ def _protocol(form: SessionForm) -> Protocol:
     return protocol(form.protocol) if study is None else study.protocol
 
 
-def unfinished(folder: Path) -> tuple[Unfinished, ...]:
+def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
     """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
-    unfinished: list[Unfinished] = []
+    unfinished: list[UnfinishedSession] = []
     places = (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite"))
     for place in sorted(places, key=lambda place: -place.stat().st_mtime):
         if len(unfinished) == SHOWN:
@@ -265,7 +265,7 @@ def unfinished(folder: Path) -> tuple[Unfinished, ...]:
         subject, trials = recording.plan.subject, recording.trials
         done = sum(record.outcome != "open" for record in trials)
         words = tr("{subject}: trials done {done} of {count}", subject=subject, done=done, count=len(trials))
-        unfinished.append(Unfinished(place.parent, words))
+        unfinished.append(UnfinishedSession(place.parent, words))
     return tuple(unfinished)
 
 

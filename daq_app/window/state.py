@@ -8,7 +8,7 @@ from msgspec import Struct
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
-from daq_app.window.course_state import Judged, SessionState, session_after, session_begun
+from daq_app.window.course_state import Judged, SessionState, begin_session, session_after
 from daq_app.window.live_feed import Load
 from daq_app.wording import tr
 from drivers.catalog import Probe
@@ -113,10 +113,10 @@ class BenchState:
 
 def bench_after(bench: BenchState, message: Message) -> BenchState:
     """Return the bench after a message; the same object where it does not concern the bench."""
-    return _loaded(_tared(_linked(bench, message), message), message)
+    return _fold_load(_fold_tare(_fold_link(bench, message), message), message)
 
 
-def _linked(bench: BenchState, message: Message) -> BenchState:
+def _fold_link(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.Connect(uri):
             return BenchState(link="connecting", uri=uri, devices=bench.devices)
@@ -141,28 +141,28 @@ def _linked(bench: BenchState, message: Message) -> BenchState:
             return bench
 
 
-def _tared(bench: BenchState, message: Message) -> BenchState:
+def _fold_tare(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.Tare():
             return replace(bench, taring=True)
         case m.Failed("Tare"):
             return replace(bench, taring=False)
         case m.Tared(mean, spread, _, readings, duration):
-            return _zeroed(replace(bench, taring=False), mean, spread, readings, duration)
+            return _set_zero(replace(bench, taring=False), mean, spread, readings, duration)
         case LoggedEvent(kind="zeroed", data=data):
-            return _zeroed(bench, data["mean"], data["spread"], data["readings"], data["duration"])
+            return _set_zero(bench, data["mean"], data["spread"], data["readings"], data["duration"])
         case _:
             return bench
 
 
-def _loaded(bench: BenchState, message: Message) -> BenchState:
+def _fold_load(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.HealthReport():
             # The recorder's is complete: latching it would bring back what was acknowledged while it was on its way.
             peak = Load((*message.peak, message.combined_peak))
             return replace(bench, health=message.health, rate=message.rate, saturated=message.saturated, peak=peak)
         case Loaded(load):
-            return replace(bench, load=load, peak=bench.peak.latched(load))
+            return replace(bench, load=load, peak=bench.peak.latch(load))
         case LifeKnown(serial, life) if bench.info is not None and bench.info.serial == serial:
             return replace(bench, life=life)
         case m.AcknowledgeOverloads():
@@ -175,7 +175,7 @@ def _loaded(bench: BenchState, message: Message) -> BenchState:
             return bench
 
 
-def _zeroed(bench: BenchState, mean: Any, spread: Any, readings: int, duration: float) -> BenchState:  # noqa: ANN401
+def _set_zero(bench: BenchState, mean: Any, spread: Any, readings: int, duration: float) -> BenchState:  # noqa: ANN401
     """Return the bench with a zero given in raw units, (6,) each."""
     if bench.info is None or len(mean) != 6:
         return bench
@@ -215,7 +215,7 @@ def fold(state: AppState, message: Message) -> AppState:
 def _of_the_session(state: AppState, message: Message) -> AppState:
     match message:
         case m.SessionBegun():
-            return replace(state, session=session_begun(message, state.now), failed=None)
+            return replace(state, session=begin_session(message, state.now), failed=None)
         case m.StartSession() | m.ResumeSession():
             return replace(state, failed=None)
         case NewSession() if state.session is not None and state.session.over:

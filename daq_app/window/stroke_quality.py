@@ -170,9 +170,9 @@ class Judge:
         self.prepare()
         assert self._worker is not None
         future = self._worker.submit(stroke_quality, block, session.plan, in_newtons(info), trial.trial)
-        future.add_done_callback(lambda done: self._judged(number, take, done))
+        future.add_done_callback(lambda done: self._report_quality(number, take, done))
 
-    def _judged(self, number: int, take: int, done: "Future[Quality]") -> None:
+    def _report_quality(self, number: int, take: int, done: "Future[Quality]") -> None:
         if done.cancelled():
             return
         if error := done.exception():

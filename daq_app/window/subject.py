@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Literal
 
 from daq_app.recorder.messages import SessionBegun
-from daq_app.window.course_state import SessionState, session_after, session_begun
-from daq_app.window.new_session import PILOT, Bench, Refused, SessionForm, checked
+from daq_app.window.course_state import SessionState, begin_session, session_after
+from daq_app.window.new_session import PILOT, Bench, Refusal, SessionForm, check_form
 from daq_app.wording import SUBJECT, tr, tr_noop, translations
 from sessions.plan.plan import Frame, Hand, SessionPlan
 from sessions.plan.protocols.languages import ENGLISH
@@ -215,7 +215,7 @@ class PreviewPage:
     view: SubjectView
 
 
-def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage, ...] | Refused:
+def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage, ...] | Refusal:
     """Return every page of the form's protocol in the form's language, each once, or what is wrong with the form.
 
     The session's own machine is led through every trial, and each page is what the window would show the subject then.
@@ -225,8 +225,8 @@ def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage,
     plain = replace(
         form, subject=PILOT, folder=folder, seed="", height="", normal="", area="", simulated=False, pilot=True
     )
-    session_plan = checked(plain, Bench(connected=True, simulated=True, frame=Frame()), datetime.now(), 0)
-    if isinstance(session_plan, Refused):
+    session_plan = check_form(plain, Bench(connected=True, simulated=True, frame=Frame()), datetime.now(), 0)
+    if isinstance(session_plan, Refusal):
         return session_plan
     language = session_plan.plan.language
     first = PreviewPage(tr("before the session"), subject_view(None, translate, language))
@@ -237,7 +237,7 @@ def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage,
 
 def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
     pages: dict[str, SubjectView] = {}
-    session: SessionState = session_begun(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
+    session: SessionState = begin_session(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
     step = machine.start(plan)
     while not isinstance(step[0], states.Ended):
         state, commands = step
@@ -287,33 +287,33 @@ class Answer:
         """Return where the mark stands; None before the first touch."""
         return round(self.positions[-1][1], DIGITS) if self.positions else None
 
-    def pressed(self, time: float, position: float, device: Device) -> "Answer":
-        """Return the answer after the line was touched, clicked or tapped on [s, 0 to 100]."""
+    def press(self, time: float, position: float, device: Device) -> "Answer":
+        """Return the answer after a touch or click on the line at `time` [s] and `position` [0 to 100]."""
         again = self.corrections + bool(self.positions)
-        return replace(self._moved(time, position, device), corrections=again, down=True)
+        return replace(self._move(time, position, device), corrections=again, down=True)
 
-    def dragged(self, time: float, position: float, device: Device) -> "Answer":
-        """Return the answer after what is held down has moved; one answer, however far it goes."""
-        return self._moved(time, position, device) if self.down else self
+    def drag(self, time: float, position: float, device: Device) -> "Answer":
+        """Return the answer after a movement of what is held down; it stays one answer, however far that goes."""
+        return self._move(time, position, device) if self.down else self
 
-    def released(self) -> "Answer":
-        """Return the answer after the finger or button has left."""
+    def release(self) -> "Answer":
+        """Return the answer after the release of finger or button."""
         return replace(self, down=False)
 
-    def stepped(self, time: float, by: float) -> "Answer":
-        """Return the answer after a key moved the mark by so much; the first key puts it in the middle."""
+    def step(self, time: float, by: float) -> "Answer":
+        """Return the answer after a key moved the mark by `by`; the first key puts the mark in the middle."""
         if not self.positions:
-            return self._moved(time, MIDDLE, "keyboard")
+            return self._move(time, MIDDLE, "keyboard")
         last, before = self.positions[-1]
         again = self.corrections + (time - last > PAUSE or self.device != "keyboard")
-        return replace(self._moved(time, before + by, "keyboard"), corrections=again)
+        return replace(self._move(time, before + by, "keyboard"), corrections=again)
 
-    def scored(self, hand: Hand | None) -> Scored:
-        """Return the event of an answer that is given."""
+    def judgement(self, hand: Hand | None) -> Scored:
+        """Return the answer as the event that a session records."""
         first = self.positions[0][0] if self.positions else None
         return Scored(self.score, self.positions, first, self.corrections, hand, self.device)
 
-    def _moved(self, time: float, position: float, device: Device) -> "Answer":
+    def _move(self, time: float, position: float, device: Device) -> "Answer":
         place = min(max(position, 0.0), 100.0)
         if self.positions and self.positions[-1][1] == place:
             return replace(self, device=device)
@@ -329,13 +329,13 @@ class Choice:
     corrections: int = 0  # how often another value took the place of one
     device: Device | None = None
 
-    def chosen(self, time: float, value: Which, device: Device) -> "Choice":
-        """Return the answer with one of two at `time` [s]."""
+    def choose(self, time: float, value: Which, device: Device) -> "Choice":
+        """Return the answer after the choice of one of two at `time` [s]."""
         again = self.corrections + (self.value not in (None, value))
         return Choice(value, self._first(time), again, device)
 
-    def typed(self, time: float, number: float | None) -> "Choice":
-        """Return the answer with another number in the field at `time` [s]; one that is not above 0 is none.
+    def type_number(self, time: float, number: float | None) -> "Choice":
+        """Return the answer after another number stands in the field at `time` [s]; it counts above 0 only.
 
         What stands while a number is typed is not yet an answer that is corrected.
         """
@@ -346,7 +346,7 @@ class Choice:
         return time if self.first_touch is None else self.first_touch
 
     def judgement(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
-        """Return the event of an answer that is given."""
+        """Return the answer as the event that a session records."""
         if self.value in ("first", "second"):
             return PairedChoice(self.value, self.first_touch, self.corrections, hand, self.device)
         number = self.value if isinstance(self.value, float) else None

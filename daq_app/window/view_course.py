@@ -164,7 +164,7 @@ def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     if not again:
         return Button(tr("Redo"), "R", enabled=False)
     numbers = "–".join(str(trial.trial.number) for trial in again)
-    question = tr("Why redo {trials}? What was recorded of it no longer counts.", trials=_named(again))
+    question = tr("Why redo {trials}? What was recorded of it no longer counts.", trials=_name_trials(again))
     return Button(tr("Redo {numbers}", numbers=numbers), "R", sends=sends, question=question)
 
 
@@ -179,10 +179,10 @@ def _undo_words(session: SessionState) -> str:
     trials = tuple(trial for trial in session.trials if trial.trial.number in session.redone)
     if not trials:
         return ""
-    return tr("Done again: {trials}. Ctrl+Z undoes that until the next stroke.", trials=_named(trials))
+    return tr("Done again: {trials}. Ctrl+Z undoes that until the next stroke.", trials=_name_trials(trials))
 
 
-def _named(trials: tuple[TrialState, ...]) -> str:
+def _name_trials(trials: tuple[TrialState, ...]) -> str:
     named = tr(" and ").join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in trials)
     return tr("trial {named}", named=named) if len(trials) == 1 else tr("trials {named}", named=named)
 
@@ -204,7 +204,7 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
             finish = Button(tr("End session"), "Space", sends=steps.Finish())
             return tr("Every trial is done. Press Space to end the session."), finish
         case "ended":
-            return _ended(session)
+            return _ending(session)
         case _:
             trial = session.of(session.trial)
             return ("", None) if trial is None else _to_do_in(trial.trial, session)
@@ -265,7 +265,7 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     return sentence if session.plan.forces else tr("{sentence} Then press Space.", sentence=sentence)
 
 
-def _ended(session: SessionState) -> tuple[str, Button | None]:
+def _ending(session: SessionState) -> tuple[str, Button | None]:
     if not session.over:
         return tr("The session is being ended."), None
     if session.resumable:

@@ -15,7 +15,7 @@ from hostile_devices import net_ft
 from daq_app.cli.main import run
 from daq_app.recorder.messages import HealthReport
 from daq_app.simulation import wiring
-from daq_app.simulation.wiring import connected
+from daq_app.simulation.wiring import connect
 from daq_app.window.state import BenchState, bench_after
 from daq_app.window.view import bench_view
 from drivers.clock import RealClock
@@ -46,7 +46,7 @@ def recorded(tmp_path, monkeypatch):
         monkeypatch.setattr(wiring, "NetFtBox", partial(NetFtBox, faults=Faults(faults)))
         clock, folder = RealClock(), tmp_path / "session"
         planned = plan(protocol("sensotact-friction"), "P01", 1)
-        with connected("sim:?seed=3", clock) as bench:
+        with connect("sim:?seed=3", clock) as bench:
             writer = SessionWriter.create(
                 folder, planned, bench.transducer.info, provenance(clock), subject_simulated=True, clock=clock
             )

@@ -71,7 +71,7 @@ def same(a, b):
 @given(data=st.data())
 def test_messages_come_out_as_they_went_in_but_for_one_that_is_cut_short(types, messages, data):
     codec = Codec(types)
-    packed = list(map(codec.packed, messages))
+    packed = list(map(codec.encode, messages))
     end = data.draw(st.integers(0, sum(map(len, packed))))
     whole = sum(total <= end for total in itertools.accumulate(map(len, packed)))
     received = list(codec.read(io.BytesIO(b"".join(packed)[:end])))
@@ -86,9 +86,9 @@ def test_no_two_messages_of_one_direction_share_a_name():
 @given(st.binary(max_size=60))
 def test_bytes_that_are_no_message_are_refused_and_nothing_else(garbage):
     with pytest.raises(BrokenMessage):
-        Codec([Connect]).unpacked(b"\x92\xa7Connect\xc0" + garbage)
+        Codec([Connect]).decode(b"\x92\xa7Connect\xc0" + garbage)
     with pytest.raises(BrokenMessage):
-        Codec([Connect]).unpacked(Codec([Zeroed]).packed(Zeroed())[LENGTH.size :])
+        Codec([Connect]).decode(Codec([Zeroed]).encode(Zeroed())[LENGTH.size :])
 
 
 def test_a_length_beyond_all_reason_is_refused_before_anything_is_gathered():
@@ -97,9 +97,9 @@ def test_a_length_beyond_all_reason_is_refused_before_anything_is_gathered():
 
 
 def test_an_array_of_objects_is_refused():
-    body = Codec([Live]).packed(TOLD[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
+    body = Codec([Live]).encode(TOLD[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
     with pytest.raises(BrokenMessage):
-        Codec([Live]).unpacked(body)
+        Codec([Live]).decode(body)
 
 
 def test_a_report_that_cannot_be_told_does_not_keep_the_others_back():

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from daq_app.simulation import wiring
-from daq_app.simulation.wiring import connected
+from daq_app.simulation.wiring import connect
 from drivers import clock_recovery, deadline, digital_ft, serial_ft, streaming
 from drivers.address import parse_address
 from drivers.catalog import DRIVERS
@@ -204,7 +204,7 @@ def undisturbed_run(name, folder):
         before = handles(device)
         course = Undisturbed(device.uri, device.bench)
         course.found = identified(name, device.uri)
-        with connected(device.uri, clock) as opened:
+        with connect(device.uri, clock) as opened:
             transducer, bench, now = (
                 opened.transducer,
                 opened.bench or device.bench,
@@ -264,7 +264,7 @@ def disturbed_course(name, folder):
         device = started(name, faults, clock, folder, monkeypatch)
         before = handles(device)
         told, blocks, sentence = {}, [], ""
-        with connected(device.uri, clock) as opened:
+        with connect(device.uri, clock) as opened:
             transducer, now = opened.transducer, opened.bench_now or device.now
             transducer.start()
             blocks.append(transducer.read(10.0))
@@ -302,7 +302,7 @@ def planted_statuses_course(name, folder):
         quickened(monkeypatch)
         device = started(name, faults, clock, folder, monkeypatch)
         try:
-            with connected(device.uri, clock) as opened:
+            with connect(device.uri, clock) as opened:
                 transducer, now = opened.transducer, opened.bench_now or device.now
                 transducer.start()
                 for status in simulator(name).statuses:

@@ -23,7 +23,7 @@ from driver_courses import (
     undisturbed_course,
 )
 
-from daq_app.simulation.wiring import connected
+from daq_app.simulation.wiring import connect
 from drivers.catalog import DRIVERS, reachable
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError
@@ -237,7 +237,7 @@ def test_every_status_that_the_maker_lists_is_named_and_judged_within_a_second(n
 @pytest.mark.parametrize("name", LIVE)
 def test_a_malformed_address_is_refused_in_one_sentence(name):
     for wrong in ("unheard-of=1", "tool=1,2,3"):
-        with pytest.raises(SetupError, match=wrong.split("=")[0]), connected(f"{name}:?{wrong}", PacedClock(1.0)):
+        with pytest.raises(SetupError, match=wrong.split("=")[0]), connect(f"{name}:?{wrong}", PacedClock(1.0)):
             pass
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from calibration_files import GAMMA, NANO43, parsed
 
-from daq_app.simulation.wiring import connected
+from daq_app.simulation.wiring import connect
 from drivers.address import parse_address, with_tool, without_tool
 from drivers.calibration import loads
 from drivers.clock import PacedClock
@@ -94,7 +94,7 @@ def test_anything_but_six_plausible_numbers_is_refused(tool):
 
 def test_a_box_that_combines_its_gauges_itself_is_moved_too_and_its_raw_readings_stay():
     clock = PacedClock(10.0)
-    with connected("sim:?tool=0,0,20,0,0,0", clock) as bench:
+    with connect("sim:?tool=0,0,20,0,0,0", clock) as bench:
         transducer = bench.transducer
         transducer.start()
         blocks = [transducer.read(1.0) for _ in range(3)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kills import STATES, VICTIMS, Killing
 
-from daq_app.simulation.wiring import connected
+from daq_app.simulation.wiring import connect
 from drivers.clock import RealClock
 
 pytestmark = pytest.mark.slow
@@ -38,7 +38,7 @@ def test_recorder_client_or_both_killed_at_any_moment_lose_nothing_acknowledged(
 
 def test_the_box_at_its_full_rate_loses_nothing_for_a_minute():
     clock = RealClock()
-    with connected(f"sim:?rate={FULL_RATE}", clock) as bench:
+    with connect(f"sim:?rate={FULL_RATE}", clock) as bench:
         bench.transducer.start()
         began, numbers, lags = clock.now_ns(), [], []
         while clock.now_ns() - began < LISTENED * 1e9:

@@ -12,7 +12,7 @@ import numpy as np
 
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, table
 from daq_app.recorder.device_history import Life, life_of
-from daq_app.simulation.wiring import connected
+from daq_app.simulation.wiring import connect
 from drivers.catalog import Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
@@ -85,7 +85,7 @@ def _life_words(life: Life) -> str:
 
 def _probe(uri: str, console: Console) -> int:
     clock = RealClock()
-    with connected(uri, clock) as bench:
+    with connect(uri, clock) as bench:
         transducer = bench.transducer
         readings = _listen(transducer, clock, console)
         health, info = transducer.health, transducer.info

@@ -78,7 +78,7 @@ def test_back_in_english_the_line_is_as_it_was(shown):
 def test_next_stays_at_the_answering_hand_in_every_language(shown):
     for language in ("en", "ar"):
         page = shown(SubjectView("line", "?", "", ("a", "b"), 0, (1, 1), "right", language))
-        page.line._take(page.line.answer.pressed(0.0, 50.0, "mouse").released())
+        page.line._take(page.line.answer.press(0.0, 50.0, "mouse").release())
         assert page.next.mapTo(page, QPointF(0, 0)).x() > page.width() / 2
 
 

@@ -11,7 +11,7 @@ from qt_events import wheel
 
 from daq_app.qt.answer_fields import NumberField
 from daq_app.recorder.messages import Connect, Disconnect
-from daq_app.window.new_session import Unfinished
+from daq_app.window.new_session import UnfinishedSession
 from daq_app.window.state import DevicesFound, Searching
 
 pytestmark = pytest.mark.qt
@@ -95,7 +95,7 @@ def test_a_search_that_finds_nothing_says_so_and_what_to_do(driver):
 
 def test_a_session_that_was_cut_short_is_offered_above_every_card(driver, tmp_path):
     page = driver.window.page
-    page.cut_short.show_sessions((Unfinished(tmp_path, "P03: 2 of 10 trials done"),))
+    page.cut_short.show_sessions((UnfinishedSession(tmp_path, "P03: 2 of 10 trials done"),))
     driver.application.processEvents()
     offer = page.cut_short.go_on.mapTo(page, page.cut_short.go_on.rect().bottomLeft()).y()
     assert all(frame.mapTo(page, frame.rect().topLeft()).y() > offer for frame in page.frames.values())

@@ -19,7 +19,7 @@ def test_forces_and_torques_that_are_each_allowed_can_be_an_overload_together():
 
 
 def test_a_latched_load_keeps_the_greatest_of_each():
-    held = Load((0.1,) * 6 + (0.3,)).latched(Load((0.0, 0.2, 0.0, 0.0, 0.0, 1.2, 0.1)))
+    held = Load((0.1,) * 6 + (0.3,)).latch(Load((0.0, 0.2, 0.0, 0.0, 0.0, 1.2, 0.1)))
     assert held == Load((0.1, 0.2, 0.1, 0.1, 0.1, 1.2, 0.3))
     assert held.over == ("Tz",)
 

@@ -14,10 +14,10 @@ from daq_app.window.live_model import (
     ModelTrace,
     Provisional,
     Settle,
-    Settled,
+    SettledSolve,
     Use,
     forces_of,
-    joined,
+    join_forces,
     model_words,
 )
 from daq_app.window.live_model_process import LiveModel
@@ -97,7 +97,7 @@ def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_i
     assert beyond.sed[first:].tolist() == small.sed[first:].tolist()
     assert model_words(beyond, None, "").state == "instead"
     trace = ModelTrace()
-    trace.predicted(beyond)
+    trace.add_prediction(beyond)
     told = np.isfinite(trace.columns(5.0, 8.0, 2000).values)
     assert (told[0] != told[1]).all()
     finite.take(lifted)
@@ -193,7 +193,7 @@ def test_readings_become_200_steps_a_second_and_unhealthy_ones_are_left_out():
 
 def test_joined_batches_are_one_batch():
     first, second = (forces_of(live(t, np.zeros((4, 6))), FRAME) for t in (np.arange(4) / 200, 1 + np.arange(4) / 200))
-    assert joined([first, second]).time.tolist() == [*first.time, *second.time]
+    assert join_forces([first, second]).time.tolist() == [*first.time, *second.time]
 
 
 @pytest.mark.parametrize(
@@ -201,9 +201,9 @@ def test_joined_batches_are_one_batch():
     [
         (None, None, "", "none"),
         (None, None, "no finger", "none"),
-        (None, Settled(1, 0.004, 0.01, 0.0041, np.empty(0), None, 2.0, "small"), "", "settled"),
-        (None, Settled(1, 0.004, None, None, np.empty(0), None, 2.0, "finite"), "", "settled"),
-        (None, Settled(1, None, None, None, np.empty(0), None, None, "finite", "it wedges"), "", "failed"),
+        (None, SettledSolve(1, 0.004, 0.01, 0.0041, np.empty(0), None, 2.0, "small"), "", "settled"),
+        (None, SettledSolve(1, 0.004, None, None, np.empty(0), None, 2.0, "finite"), "", "settled"),
+        (None, SettledSolve(1, None, None, None, np.empty(0), None, None, "finite", "it wedges"), "", "failed"),
     ],
 )
 def test_every_state_of_the_model_has_words(said, settled, problem, state):
@@ -215,7 +215,7 @@ def test_every_state_of_the_model_has_words(said, settled, problem, state):
 def test_a_gap_in_the_readings_is_a_gap_in_the_curve(follower):
     trace = ModelTrace()
     for start in (0.0, 1.0):
-        trace.predicted(follower.take(forces_of(live(start + np.arange(20) / 200, np.zeros((20, 6))), FRAME)))
+        trace.add_prediction(follower.take(forces_of(live(start + np.arange(20) / 200, np.zeros((20, 6))), FRAME)))
     columns = trace.columns(0.0, 2.0, 600)
     assert np.isnan(columns.values[0]).sum() == 1
     assert np.flatnonzero(np.isnan(columns.values[0])).tolist() == [20]

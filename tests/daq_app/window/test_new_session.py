@@ -5,7 +5,16 @@ from pathlib import Path
 import pytest
 
 from daq_app.recorder.messages import People, StartSession
-from daq_app.window.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered, pilot_form
+from daq_app.window.new_session import (
+    Bench,
+    Refusal,
+    SessionForm,
+    check_form,
+    enrol_subject,
+    enrolment,
+    optional_phases,
+    pilot_form,
+)
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import Body, protocol_file, protocol_names
 from sessions.plan.study import create_study, enrol, study_key, withdraw
@@ -17,7 +26,7 @@ FORM = SessionForm(subject="P07", folder="kept")
 
 
 def test_a_form_that_is_right_begins_a_session_in_a_folder_of_its_own():
-    made = checked(replace(FORM, study="pilot", seed="7"), SIMULATED, NOW, 99)
+    made = check_form(replace(FORM, study="pilot", seed="7"), SIMULATED, NOW, 99)
     assert isinstance(made, StartSession)
     assert made.folder == "kept/pilot/P07_sensotact-friction_20260301T143005"
     assert made.plan.subject == "P07"
@@ -27,7 +36,7 @@ def test_a_form_that_is_right_begins_a_session_in_a_folder_of_its_own():
 
 
 def test_an_empty_seed_is_a_new_one_and_is_marked_as_nobodys_choice():
-    made = checked(FORM, REAL, NOW, 99)
+    made = check_form(FORM, REAL, NOW, 99)
     assert made.plan.seed == 99
     assert made.settings[0].origin == "default"
 
@@ -43,7 +52,7 @@ def test_an_empty_seed_is_a_new_one_and_is_marked_as_nobodys_choice():
     ],
 )
 def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind):
-    assert checked(replace(form, seed="3"), bench, NOW, 0).people == People(kind, 3)
+    assert check_form(replace(form, seed="3"), bench, NOW, 0).people == People(kind, 3)
 
 
 @pytest.mark.parametrize(
@@ -65,8 +74,8 @@ def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind)
     ],
 )
 def test_what_is_wrong_is_said_beside_its_field(form, bench, field, words):
-    made = checked(form, bench, NOW, 0)
-    assert isinstance(made, Refused)
+    made = check_form(form, bench, NOW, 0)
+    assert isinstance(made, Refusal)
     assert list(made.sentences) == [field]
     assert words in made.sentences[field]
     assert made.sentences[field].endswith(".")
@@ -74,20 +83,20 @@ def test_what_is_wrong_is_said_beside_its_field(form, bench, field, words):
 
 def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
-    made = checked(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
+    made = check_form(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
     assert "is a file" in made.sentences["folder"]
 
 
 def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():
-    assert checked(replace(FORM, height="12,5"), REAL, NOW, 0).plan.frame == Frame("-z", "default", 12.5, "measured")
-    assert checked(FORM, REAL, NOW, 0).plan.frame.height_origin == "default"
+    assert check_form(replace(FORM, height="12,5"), REAL, NOW, 0).plan.frame == Frame("-z", "default", 12.5, "measured")
+    assert check_form(FORM, REAL, NOW, 0).plan.frame.height_origin == "default"
 
 
 def test_the_axis_of_pressing_and_the_contact_area_are_recorded_as_they_were_set():
-    made = checked(replace(FORM, normal="+x", area="85"), REAL, NOW, 0).plan
+    made = check_form(replace(FORM, normal="+x", area="85"), REAL, NOW, 0).plan
     assert (made.frame.normal, made.frame.normal_origin) == ("+x", "set")
     assert (made.contact_area, made.contact_area_origin) == (85.0, "set")
-    assert checked(FORM, REAL, NOW, 0).plan.frame.normal_origin == "default"
+    assert check_form(FORM, REAL, NOW, 0).plan.frame.normal_origin == "default"
 
 
 @pytest.fixture
@@ -103,8 +112,8 @@ def in_study(study, subject):
 
 def test_a_session_of_a_study_is_the_one_decided_at_enrolment_whatever_the_page_says(study):
     member = enrol(study, "P07", Body(contact_angle=40.0))
-    made = checked(in_study(study, "P07"), SIMULATED, NOW, 99)
-    again = checked(replace(in_study(study, "P07"), forces=False), SIMULATED, NOW, 98)
+    made = check_form(in_study(study, "P07"), SIMULATED, NOW, 99)
+    again = check_form(replace(in_study(study, "P07"), forces=False), SIMULATED, NOW, 98)
     assert made.plan.protocol == "sensotact-friction"
     assert made.plan.contact_angle == 40.0
     assert made.plan.seed == again.plan.seed not in (7, 98, 99)
@@ -117,15 +126,15 @@ def test_a_session_of_a_study_is_the_one_decided_at_enrolment_whatever_the_page_
 def test_who_is_not_enrolled_is_enrolled_at_a_button_and_who_was_withdrawn_is_refused(study):
     form = in_study(study, "P08")
     assert enrolment(form).may_enrol
-    assert "not enrolled" in checked(form, SIMULATED, NOW, 0).sentences["subject"]
-    assert enrolled(form) == ""
+    assert "not enrolled" in check_form(form, SIMULATED, NOW, 0).sentences["subject"]
+    assert enrol_subject(form) == ""
     assert "P08 is enrolled" in enrolment(form).words
     assert "blinded" in enrolment(form).words
-    assert "enrolled in pilot before" in enrolled(form)
+    assert "enrolled in pilot before" in enrol_subject(form)
     withdraw(study, "P08", "moved away")
     assert not enrolment(form).may_enrol
     assert "moved away" in enrolment(form).words
-    assert "moved away" in checked(form, SIMULATED, NOW, 0).sentences["subject"]
+    assert "moved away" in check_form(form, SIMULATED, NOW, 0).sentences["subject"]
 
 
 def test_a_folder_that_is_no_study_leaves_protocol_and_seed_to_the_page(tmp_path):
@@ -135,27 +144,29 @@ def test_a_folder_that_is_no_study_leaves_protocol_and_seed_to_the_page(tmp_path
 def test_a_study_that_cannot_be_read_says_so(study):
     (study / "study.sqlite").write_bytes(b"not a database")
     assert "cannot be read" in enrolment(in_study(study, "P07")).words
-    assert isinstance(checked(in_study(study, "P07"), SIMULATED, NOW, 0), Refused)
+    assert isinstance(check_form(in_study(study, "P07"), SIMULATED, NOW, 0), Refusal)
 
 
 def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and_come_before_what_counts(tmp_path):
-    assert offered(FORM) == ("pre-evaluation", "practice")
-    made = checked(replace(FORM, pre_evaluation=True, practice=True), REAL, NOW, 0).plan
+    assert optional_phases(FORM) == ("pre-evaluation", "practice")
+    made = check_form(replace(FORM, pre_evaluation=True, practice=True), REAL, NOW, 0).plan
     phases = list(dict.fromkeys(trial.phase for trial in made.trials))
     assert phases == ["pre-evaluation", "practice", "main"]
     bare = tmp_path / "bare.toml"
     lines = protocol_file("sensotact-friction").read_text(encoding="utf-8").splitlines()
     bare.write_text("\n".join(line for line in lines if not line.startswith("practice")), encoding="utf-8")
-    assert offered(replace(FORM, protocol=str(bare))) == ("pre-evaluation",)
-    assert "practice" in checked(replace(FORM, protocol=str(bare), practice=True), REAL, NOW, 0).sentences["protocol"]
-    assert offered(replace(FORM, protocol="nowhere")) == ()
+    assert optional_phases(replace(FORM, protocol=str(bare))) == ("pre-evaluation",)
+    assert (
+        "practice" in check_form(replace(FORM, protocol=str(bare), practice=True), REAL, NOW, 0).sentences["protocol"]
+    )
+    assert optional_phases(replace(FORM, protocol="nowhere")) == ()
 
 
 @pytest.mark.parametrize("name", protocol_names())
 def test_any_protocol_is_piloted_on_the_simulated_bench_and_without_it(name, tmp_path):
     form = SessionForm(protocol=name, folder=str(tmp_path), subject="Ada Lovelace", height="tall")
     for bench, forces in ((Bench(True, True, Frame()), True), (Bench(True), False), (Bench(), False)):
-        made = checked(pilot_form(form, bench), bench, NOW, 5)
+        made = check_form(pilot_form(form, bench), bench, NOW, 5)
         assert made.people.kind == "simulated people"
         assert made.plan.subject == "PILOT"
         assert made.plan.forces is forces
@@ -166,7 +177,7 @@ def test_a_pilot_in_a_study_runs_the_studys_protocol_and_leaves_nothing_in_it(tm
     text = protocol_file("paired-comparison").read_text(encoding="utf-8")
     create_study(tmp_path / "study", text, 11, blinded=True)
     form = SessionForm(study="study", folder=str(tmp_path))
-    made = checked(pilot_form(form, Bench()), Bench(), NOW, 5)
+    made = check_form(pilot_form(form, Bench()), Bench(), NOW, 5)
     assert made.plan.protocol == "paired-comparison"
     assert Path(made.folder).parent == tmp_path / "pilots"
     assert not any(setting.name == "study" for setting in made.settings)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from daq_app.window.new_session import Refused, SessionForm
+from daq_app.window.new_session import Refusal, SessionForm
 from daq_app.window.subject import mirror_view, preview, subject_view
 from sessions.plan.plan import Visibility
 from sessions.plan.protocols import protocol, protocol_names
@@ -72,7 +72,7 @@ def test_whatever_else_is_wrong_with_the_form_its_pages_are_shown():
 def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
     (tmp_path / "wrong.toml").write_text("name = ")
     refused = preview(replace(SessionForm(), protocol=str(tmp_path / "wrong.toml")))
-    assert isinstance(refused, Refused)
+    assert isinstance(refused, Refusal)
     assert "wrong.toml" in refused.sentences["protocol"]
 
 
