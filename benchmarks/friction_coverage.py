@@ -106,16 +106,16 @@ class Visit:
             surface = next(iter(surfaces.values()))
             time = np.arange(np.ceil(2.5 * number * RATE), 2.5 * (number + 1) * RATE) / RATE
             trial = Trial(len(surfaces) + 1 + number, "b", Stimulus("slipperiness", surface.index, "P"), 1, 1)
-            parts.append((trial, _block(time, self._measured(time, self._press(time - time[0])))))
+            parts.append((trial, _block(time, self._measured_wrench(time, self._press(time - time[0])))))
         begin = 2.5 * self._trouble.presses + 0.5
         for number, surface in enumerate(surfaces.values(), 1):
             self._bench.mount(surface)
             planted = self._bench.begin_stroke(self._subject.stroke(surface), begin)
             time = np.arange(np.ceil((begin - 0.2) * RATE), (planted.end + 0.6) * RATE) / RATE
             trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
-            parts.append((trial, _block(time, self._measured(time, self._exerted(time, planted)))))
+            parts.append((trial, _block(time, self._measured_wrench(time, self._true_wrench(time, planted)))))
             truths.append(self._truth(planted))
-            forces.append(self._exerted(np.array([np.mean(planted.steady)]), planted)[0, :3])
+            forces.append(self._true_wrench(np.array([np.mean(planted.steady)]), planted)[0, :3])
             begin = planted.end + 1.0
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
         plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=Frame("-z", "set", HEIGHT, "set"))
@@ -147,7 +147,7 @@ class Visit:
     def _truth(self, planted: PlantedStroke) -> Truth:
         steady = np.linspace(*planted.steady, FINE)
         whole = np.linspace(planted.touch, planted.end, FINE)
-        tangential = np.hypot(*self._exerted(whole, planted)[:, :2].T)
+        tangential = np.hypot(*self._true_wrench(whole, planted)[:, :2].T)
         mu = planted.mu * (1.0 if self._trouble.level else float(self._factor(steady, planted).mean()))
         return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": planted.speed}
 
@@ -163,13 +163,13 @@ class Visit:
             saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
             factor *= np.where(time > planted.slip, 1.0 - self._drop * (1.0 - saw), 1.0)
         if self._trouble.law:
-            pressed = np.maximum(-self._bench.exerted(time)[:, 2], 1e-3)
+            pressed = np.maximum(-self._bench.true_wrench(time)[:, 2], 1e-3)
             factor *= (pressed / planted.peak_normal_force) ** self._trouble.law
         return factor
 
-    def _exerted(self, time: Array, planted: PlantedStroke) -> Array:
+    def _true_wrench(self, time: Array, planted: PlantedStroke) -> Array:
         """Return the true wrench (n, 6) [N, N mm] in the face's frame."""
-        plain = self._bench.exerted(time)
+        plain = self._bench.true_wrench(time)
         more = plain[:, :2] * (self._factor(time, planted) - 1.0)[:, None]
         pressed = np.minimum(plain[:, 2], -1e-12)
         x = (HEIGHT * plain[:, 0] - plain[:, 4]) / pressed
@@ -183,10 +183,10 @@ class Visit:
         x, y = PUSH * self._hand.standard_normal((2, 1)) * normal
         return np.column_stack([x, y, -normal, -HEIGHT * y, HEIGHT * x, np.zeros_like(time)])
 
-    def _measured(self, time: Array, true: Array) -> Array:
+    def _measured_wrench(self, time: Array, true: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the transducer tells of a true one in the face's frame."""
         turned = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
-        measured = turned @ self._errors.T + self._bench.wrench(time) - self._bench.exerted(time)
+        measured = turned @ self._errors.T + self._bench.wrench(time) - self._bench.true_wrench(time)
         if self._trouble.hum:
             measured[:, :3] += self._trouble.hum * np.sin(2 * np.pi * 50.0 * time[:, None] + self._phases[3:6])
         if self._trouble.flicker:

@@ -95,7 +95,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
             waiting.append(block)
         if now >= due and waiting:
             due = now + SHOWN_EVERY
-            gathered, waiting = ReadingBlock.joined(waiting), []
+            gathered, waiting = ReadingBlock.concatenate(waiting), []
             wrench = calibration.wrench(gathered.raw, np.zeros(6))
             if drawer is not None:
                 shown.send((gathered.time, wrench))

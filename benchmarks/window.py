@@ -74,7 +74,7 @@ def _session(options: argparse.Namespace) -> None:
     from daq_app.qt import start
 
     start.SIMULATED_BENCH = f"sim:?seed=7&rate={options.rate}"
-    watched = _Watched()
+    watched = _Observations()
     application = QApplication([])
     window = start.open_window(application)
     window.resize(*map(int, options.size.split("x")))
@@ -105,7 +105,7 @@ def _session(options: argparse.Namespace) -> None:
             window.bridge._client._process.wait(20.0)
 
 
-class _Watched:
+class _Observations:
     """What is noted while the window works: its paints, and the beats of a timer of its event loop."""
 
     def __init__(self) -> None:

@@ -61,7 +61,7 @@ def parse_calibration_file(data: bytes, name: str) -> CalibrationFile:
     """Return what the bytes of a calibration file called `name` say. Raises SetupError with one sentence otherwise."""
     try:
         with np.errstate(all="ignore"):  # numbers too great for a matrix are found out below
-            return _parsed(data, name)
+            return _parse(data, name)
     except _Unusable as why:
         raise SetupError(f"{name}: {why}; take the file as the maker delivered it for this serial number") from None
 
@@ -70,7 +70,7 @@ class _Unusable(Exception):
     """Why a file cannot be used; the message is the middle of a sentence."""
 
 
-def _parsed(data: bytes, name: str) -> CalibrationFile:
+def _parse(data: bytes, name: str) -> CalibrationFile:
     sensor, body = _sensor_and_body(data)
     force = _unit(body, "ForceUnits", FORCE)
     torque = _unit(body, "TorqueUnits", TORQUE)

@@ -183,7 +183,7 @@ class ClockRecovery:
             self._zero_ns = received_ns - round((damaged.sum() + len(damaged) - 1) * self._period * 1e9)
         if not self._held_damaged:
             if self._lateness(damaged, received_ns) <= self._limit:
-                return self._placed(damaged, received_ns)
+                return self._place(damaged, received_ns)
             self._held_since_ns = self._looked_ns = received_ns
             self._held_late = self._lateness(damaged, received_ns)
         self._held_damaged.append(damaged)
@@ -210,7 +210,7 @@ class ClockRecovery:
             self._sequence += missing
             self._time += missing * self._period
             self.lost += missing
-        return self._placed(damaged, self._held_until_ns)
+        return self._place(damaged, self._held_until_ns)
 
     def bridge(self, received_ns: int) -> None:
         """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one record."""
@@ -229,7 +229,7 @@ class ClockRecovery:
         steady = self._time + (int(damaged.sum()) + len(damaged)) * self._period
         return (received_ns - self._zero_ns) * 1e-9 - steady
 
-    def _placed(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
+    def _place(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
         """Place records whose numbers follow on, and let the clock lead."""
         slots = np.cumsum(damaged + 1)
         count = int(slots[-1])

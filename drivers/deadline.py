@@ -55,19 +55,19 @@ class Deadline:
         return time.monotonic() - self._began
 
     @property
-    def left(self) -> float:
-        """Real seconds that are left, not below 0. Raises Stopped."""
+    def remaining(self) -> float:
+        """Return the time that remains [real s], not below 0. Raises Stopped."""
         if self._stopping is not None and self._stopping.is_set():
             raise Stopped
         return max(self._seconds - self.spent, 0.0)
 
     def within(self, seconds: float) -> "Deadline":
         """Return a limit on a part of the wait: in `seconds`, and not later than this one."""
-        return Deadline(min(seconds, self.left), self._stopping)
+        return Deadline(min(seconds, self.remaining), self._stopping)
 
     def check(self) -> None:
         """Raise LinkLost when the time is over, Stopped when it shall end."""
-        if self.left <= 0.0:
+        if self.remaining <= 0.0:
             raise LinkLost(f"it was not ready within {self._seconds:.2g} s; check its power, the cable and the address")
 
     def bound(self, link: Link) -> "_BoundLink":
@@ -91,7 +91,7 @@ class _BoundLink:
         while True:
             self.deadline.check()
             remaining = until - time.monotonic()
-            data = self.link.receive(max(min(remaining, TICK, self.deadline.left), 0.0))
+            data = self.link.receive(max(min(remaining, TICK, self.deadline.remaining), 0.0))
             if data is not None or remaining <= TICK:
                 return data
 

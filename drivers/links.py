@@ -19,7 +19,7 @@ class UdpLink:
 
     def __init__(self, host: str, port: int, deadline: Deadline) -> None:
         """Bind a free local port. Raises SetupError when the host cannot be found, LinkLost when no way leads there."""
-        address = _resolved(host, deadline)
+        address = _resolve(host, deadline)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
@@ -59,8 +59,8 @@ class UdpLink:
 
 
 @contextlib.contextmanager
-def _named(where: str, missing: str, advice: str, deadline: Deadline) -> Generator[None]:
-    """Raise LinkLost for what goes wrong on the network inside: where, what is missing, and what to do."""
+def _name_failures(where: str, missing: str, advice: str, deadline: Deadline) -> Generator[None]:
+    """Raise LinkLost for a failure of the network inside, which says where, what is missing and what to do."""
     try:
         yield
     except TimeoutError:
@@ -77,7 +77,7 @@ def tcp_answer(host: str, port: int, request: bytes, size: int, deadline: Deadli
     where = f"{host}, TCP port {port}"
     answer = b""
     with (
-        _named(where, "no whole answer", "check the address and the tcp port", deadline),
+        _name_failures(where, "no whole answer", "check the address and the tcp port", deadline),
         _Call(host, port, deadline) as call,
     ):
         call.send(request)
@@ -92,8 +92,8 @@ class _Call:
     def __init__(self, host: str, port: int, deadline: Deadline) -> None:
         """Connect. Raises SetupError when the host cannot be found, OSError."""
         self._deadline = deadline
-        address = _resolved(host, deadline)
-        self._socket = socket.create_connection((address, port), timeout=self._left())
+        address = _resolve(host, deadline)
+        self._socket = socket.create_connection((address, port), timeout=self._remaining())
 
     def __enter__(self) -> "_Call":
         return self
@@ -103,21 +103,21 @@ class _Call:
 
     def send(self, data: bytes) -> None:
         """Send all of `data`. Raises OSError."""
-        self._socket.settimeout(self._left())
+        self._socket.settimeout(self._remaining())
         self._socket.sendall(data)
 
     def receive(self, most: int) -> bytes:
         """Return what comes next, at most so many bytes; none at the end of the connection. Raises OSError."""
         while True:
-            self._socket.settimeout(min(self._left(), TICK))
+            self._socket.settimeout(min(self._remaining(), TICK))
             try:
                 return self._socket.recv(most)
             except TimeoutError:
                 continue  # a stop may be wanted, and the deadline may be over
 
-    def _left(self) -> float:
-        """Return how long may be waited [real s]. Raises TimeoutError, Stopped."""
-        left = self._deadline.left
+    def _remaining(self) -> float:
+        """Return the time that remains [real s]. Raises TimeoutError, Stopped."""
+        left = self._deadline.remaining
         if left <= 0.0:
             raise TimeoutError
         return left
@@ -138,7 +138,10 @@ def http_get(host: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
     or what answers is not HTTP or is longer than MOST_BODY.
     """
     where = f"http://{host}:{port}{path}"
-    with _named(where, "no answer", "check power, cable and address", deadline), _Call(host, port, deadline) as call:
+    with (
+        _name_failures(where, "no answer", "check power, cable and address", deadline),
+        _Call(host, port, deadline) as call,
+    ):
         call.send(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
         return _answer(call, where)
 
@@ -179,7 +182,7 @@ def _stated_length(head: bytes) -> int | None:
     return None
 
 
-def _resolved(host: str, deadline: Deadline) -> str:
+def _resolve(host: str, deadline: Deadline) -> str:
     """Return the IPv4 address of a host's name. Raises SetupError when it has none, or none is found in time."""
     hosts: list[str] = []
 
@@ -189,7 +192,7 @@ def _resolved(host: str, deadline: Deadline) -> str:
 
     looking = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
     looking.start()
-    while looking.is_alive() and (left := deadline.left) > 0.0:
+    while looking.is_alive() and (left := deadline.remaining) > 0.0:
         looking.join(min(left, TICK))
     if not hosts:
         raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1")

@@ -46,7 +46,7 @@ class ReadingBlock:
         return ReadingBlock(whole, whole, whole, np.empty(0), whole, np.empty((0, 6)))
 
     @staticmethod
-    def joined(blocks: Iterable["ReadingBlock"]) -> "ReadingBlock":
+    def concatenate(blocks: Iterable["ReadingBlock"]) -> "ReadingBlock":
         """Return the readings of all blocks, in the order given."""
         kept = [block for block in blocks if len(block)]
         if not kept:

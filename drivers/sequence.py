@@ -134,9 +134,9 @@ class SequenceAccount:
 
     def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
         """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""
-        ahead = _signed(record.number - before.number)
-        ticks = _signed(record.counter - before.counter)
-        on_line = self.step is not None and ticks == _signed(ahead * self.step)
+        ahead = _signed_difference(record.number - before.number)
+        ticks = _signed_difference(record.counter - before.counter)
+        on_line = self.step is not None and ticks == _signed_difference(ahead * self.step)
         if ahead == 0:
             return "same" if ticks == 0 else "off"
         if ahead < 0:
@@ -154,15 +154,19 @@ class SequenceAccount:
         else:
             assert self._last is not None
             self.frozen += relation == "frozen"
-            self._go(record, _signed(record.number - self._last.number), _signed(record.counter - self._last.counter))
+            self._go(
+                record,
+                _signed_difference(record.number - self._last.number),
+                _signed_difference(record.counter - self._last.counter),
+            )
             return True
         return False
 
     def _learn(self, record: _Record) -> None:
         """Take the step from a record that comes right after the one just adopted."""
         assert self._last is not None
-        ticks = _signed(record.counter - self._last.counter)
-        if _signed(record.number - self._last.number) == 1 and ticks > 0:
+        ticks = _signed_difference(record.counter - self._last.counter)
+        if _signed_difference(record.number - self._last.number) == 1 and ticks > 0:
             self.changed += self.step not in (None, ticks)
             self.step = ticks
 
@@ -171,9 +175,12 @@ class SequenceAccount:
         last = self._last
         if last is None:
             self._sequence = self._first - 1
-            self._go(record, max(_signed(record.number - self._first), 0) + 1, record.counter)
+            self._go(record, max(_signed_difference(record.number - self._first), 0) + 1, record.counter)
             return
-        ahead, ticks = _signed(record.number - last.number), _signed(record.counter - last.counter)
+        ahead, ticks = (
+            _signed_difference(record.number - last.number),
+            _signed_difference(record.counter - last.counter),
+        )
         step = self.step or 1
         # A device that had only just been switched on before it rebooted looks here as if it had gone on.
         if ticks <= 0:  # the counter began anew: only the host's clock knows for how long the device was away
@@ -194,17 +201,17 @@ class SequenceAccount:
 
     def _reject(self, record: _Record) -> None:
         """Count a record that nothing went on from."""
-        behind = 0 if self._last is None else -_signed(record.number - self._last.number)
+        behind = 0 if self._last is None else -_signed_difference(record.number - self._last.number)
         if 0 < behind <= NEAR:
             self.late += 1
         else:
             self.garbage += 1
 
 
-def _signed(difference: int) -> int:
+def _signed_difference(difference: int) -> int:
     """Return a difference modulo 2**32 as the nearer of its two readings, in [-2**31, 2**31).
 
-    >>> _signed(5 - (2**32 - 1)), _signed(-3)
+    >>> _signed_difference(5 - (2**32 - 1)), _signed_difference(-3)
     (6, -3)
     """
     return (difference + WRAP // 2) % WRAP - WRAP // 2

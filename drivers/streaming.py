@@ -99,11 +99,11 @@ def measured_rate(
                     count += more
                     came.append((count, clock.now_ns()))
                 data = link.receive(TICK)
-                if part.left <= 0.0:
+                if part.remaining <= 0.0:
                     break
             before, rate = rate, rate_of_least_late(came)
             alike = look and (abs(rate / stated - 1.0) < _ALIKE or abs(rate / before - 1.0) < _ALIKE)
-            if alike or deadline.left <= 0.0:
+            if alike or deadline.remaining <= 0.0:
                 break
     finally:
         conversation.end(Deadline(ENDING).bound(link))
@@ -113,8 +113,8 @@ def measured_rate(
 
 
 @dataclass(frozen=True, slots=True)
-class _Arrived:
-    """Records that arrived together, or the beginning of the stream anew where there are none."""
+class _Arrival:
+    """Records that arrived together; None where the stream began anew."""
 
     records: Records | None
     received_ns: int
@@ -148,7 +148,7 @@ class StreamingTransducer(ThreadedTransducer):
         self._conversation = conversation
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
         self._gather = _GATHER if gathers and self._period < _GATHER else 0.0
-        self._pending: deque[_Arrived] = deque()
+        self._pending: deque[_Arrival] = deque()
         self.reset()
 
     @property
@@ -180,7 +180,7 @@ class StreamingTransducer(ThreadedTransducer):
         super().reset()
         self._pending.clear()
         self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
-        self._unpaced: list[_Arrived] = []  # arrivals that the numbering keeps back
+        self._unpaced: list[_Arrival] = []  # arrivals that the numbering keeps back
         self._restarted = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()
@@ -214,7 +214,7 @@ class StreamingTransducer(ThreadedTransducer):
         try:
             first = self._conversation.begin(limit.bound(link))
             if self._ever:
-                self._pending.append(_Arrived(None, self.clock.now_ns()))
+                self._pending.append(_Arrival(None, self.clock.now_ns()))
             with self.lock:
                 self._malformed_before += self._decoder.malformed
                 self._decoder = self._conversation.decoder()
@@ -236,7 +236,7 @@ class StreamingTransducer(ThreadedTransducer):
             silence += min(now - looked, TICK + _GATHER)  # beyond that this computer was busy, and records may wait
             looked = now
             if records is not None and len(records.status):
-                self._pending.append(_Arrived(records, received_ns))
+                self._pending.append(_Arrival(records, received_ns))
                 self._heard, self._ever = now, True
                 silence, quiet = 0.0, _QUIET + 4.0 * self._period
                 if not self.news.is_set():

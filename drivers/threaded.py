@@ -63,7 +63,7 @@ class ThreadedTransducer(ABC):
         thread.start()
         try:
             while not self.has_come() and self.ended is None and thread.is_alive():
-                if waiting.left <= 0.0:
+                if waiting.remaining <= 0.0:
                     self.ended = LinkLost(self.never_came(waiting.spent))
                 self.news.wait(deadline.TICK)
                 self.news.clear()
@@ -87,7 +87,7 @@ class ThreadedTransducer(ABC):
                 self.digest(end=not streaming)
                 blocks, self._ready = self._ready, []
             if blocks:
-                block = ReadingBlock.joined(blocks)
+                block = ReadingBlock.concatenate(blocks)
                 self._lag_ms = (self.clock.now_ns() - int(block.received_ns[-1])) * 1e-6
                 return block
             if not streaming and self.ended is not None:

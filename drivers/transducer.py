@@ -64,13 +64,13 @@ class StatusTable:
 
     def doubtful(self, status: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Tell of each status (n,) whether it speaks against the reading's six values."""
-        return self._judged(status, ("saturated", "doubtful"))
+        return self._mask(status, ("saturated", "doubtful"))
 
     def faulty(self, status: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Tell of each status (n,) whether it speaks of a fault of the device, and not of values out of range."""
-        return self._judged(status, ("doubtful",))
+        return self._mask(status, ("doubtful",))
 
-    def _judged(self, status: NDArray[np.int64], verdicts: tuple[Verdict, ...]) -> NDArray[np.bool_]:
+    def _mask(self, status: NDArray[np.int64], verdicts: tuple[Verdict, ...]) -> NDArray[np.bool_]:
         if not status.any():
             return np.zeros(len(status), np.bool_)
         kinds, which = np.unique(status, return_inverse=True)

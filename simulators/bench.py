@@ -114,15 +114,15 @@ class Bench:
             if self._strokes and at < self._strokes[-1][0] + self._strokes[-1][1].lift:
                 raise ValueError(f"a stroke cannot begin at {at} s: the one before has not ended")
             course = Course(stroke, surface.mu, surface.holds)
-            planted = self._planted(at, course, surface)
+            planted = self._planted_stroke(at, course, surface)
             self._strokes = (*self._strokes, (at, course, planted))
         return planted
 
-    def planted(self) -> tuple[PlantedStroke, ...]:
-        """Return the truth of every stroke begun so far, in order."""
+    def ground_truth(self) -> tuple[PlantedStroke, ...]:
+        """Return the ground truth of every stroke begun so far, in order."""
         return tuple(planted for _, _, planted in self._strokes)
 
-    def exerted(self, times: Array) -> Array:
+    def true_wrench(self, times: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the finger truly exerts at `times` (n,) [s], without any error."""
         wrench = np.zeros((len(times), 6))
         if not len(times):
@@ -132,18 +132,18 @@ class Bench:
             if begun + course.lift < first:
                 break
             if begun + course.touch <= last:
-                wrench += _exerted(course, times - begun, self.settings.height)
+                wrench += _course_wrench(course, times - begun, self.settings.height)
         forces, torques = wrench[:, :3], wrench[:, 3:]
         return np.hstack([forces @ self._rotation.T, torques @ self._rotation.T])
 
     def wrench(self, times: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the transducer feels at `times` (n,) [s], noise and drift too."""
         settings = self.settings
-        wrench = self.exerted(times) * np.array(settings.gains) + np.array(settings.offset)
+        wrench = self.true_wrench(times) * np.array(settings.gains) + np.array(settings.offset)
         wrench += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
         return wrench + _white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
 
-    def _planted(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
+    def _planted_stroke(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
         start, stop = course.steady
         travel = course.position(np.array([start, stop]))
         limit = 3.0 * self.settings.noise_force
@@ -169,7 +169,7 @@ class Bench:
         )
 
 
-def _exerted(course: Course, time: Array, height: float) -> Array:
+def _course_wrench(course: Course, time: Array, height: float) -> Array:
     """Return the wrench (n, 6) of a course about the transducer's origin; the face lies `height` [mm] above it."""
     stroke = course.stroke
     normal = course.normal_force(time)
@@ -287,7 +287,7 @@ class DirectTransducer:
         kept = numbers[~self._is_lost(numbers / RATE)]
         self._lost += len(numbers) - len(kept)
         time = kept / RATE
-        counts = np.rint(self._bench.wrench(self._sampled_at(time)) / _SCALE)
+        counts = np.rint(self._bench.wrench(self._sampling_times(time)) / _SCALE)
         received = self._began_ns + np.rint(time * 1e9).astype(np.int64)
         return ReadingBlock(kept, kept, np.zeros_like(kept), time, received, counts)
 
@@ -302,8 +302,8 @@ class DirectTransducer:
             lost |= (time >= start) & (time < stop)
         return lost
 
-    def _sampled_at(self, time: Array) -> Array:
-        """Return the instants (n,) [s] whose readings are given at `time` (n,) [s]."""
+    def _sampling_times(self, time: Array) -> Array:
+        """Return the instants (n,) [s] of the readings that are returned for `time` (n,) [s]."""
         at = time.copy()
         for start, stop in self._middles(self._hurt.frozen):
             at[(time >= start) & (time < stop)] = start
@@ -311,6 +311,6 @@ class DirectTransducer:
 
     def _middles(self, strokes: frozenset[int]) -> list[tuple[float, float]]:
         """Return the middle stretches [s, bench] of those of the strokes that were begun."""
-        begun = self._bench.planted() if strokes else ()
+        begun = self._bench.ground_truth() if strokes else ()
         chosen = [stroke for number, stroke in enumerate(begun, 1) if number in strokes]
         return [(s.slip + MIDDLE[0] * (s.lift - s.slip), s.slip + MIDDLE[1] * (s.lift - s.slip)) for s in chosen]

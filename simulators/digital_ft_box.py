@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench
 from simulators.faults import Faults
-from simulators.simulator import ROOM, LineBox, PseudoTerminal, Simulator, served
+from simulators.simulator import ROOM, LineBox, PseudoTerminal, Simulator, serve_on_ports
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class DigitalFtBox(LineBox):
 
     def _packets(self, times: Array) -> list[bytes]:
         """Return a packet for each of `times` (n,) [s]."""
-        gauges = np.rint(self.faults.sensed(self._bench, times) @ self._gauges.T)
+        gauges = np.rint(self.faults.sensed_wrench(self._bench, times) @ self._gauges.T)
         gauges[self.faults.during("saturate", times)] = 32767
         over = np.any(np.abs(gauges) >= 32767, axis=1)
         gauges = np.clip(gauges, -32768, 32767)[:, [0, 2, 4, 1, 3, 5]].astype(">i2")
@@ -132,11 +132,11 @@ class DigitalFtBox(LineBox):
                 self._heard.clear()
                 break
             del self._heard[:long]
-            answer = b"\x0a" + self._carried_out(function, frame[2:-2])
+            answer = b"\x0a" + self._carry_out(function, frame[2:-2])
             answers += answer + _crc(answer)
         return answers
 
-    def _carried_out(self, function: int, data: bytes) -> bytes:
+    def _carry_out(self, function: int, data: bytes) -> bytes:
         """Carry out one request; return function code and data of the answer."""
         if function == 0x46 and data == b"\x55":
             self._streaming_since, self._sent, self._jammed_by = self.now(), 0, 0
@@ -171,7 +171,7 @@ def _crc(frame: bytes) -> bytes:
 
 SIMULATOR = Simulator(
     "digital-ft",
-    served(lambda bench, clock, faults: DigitalFtBox(bench, clock, faults=faults)),
+    serve_on_ports(lambda bench, clock, faults: DigitalFtBox(bench, clock, faults=faults)),
     factor=0.25,
     statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
     unshown=0.2,  # a sum of seven bits

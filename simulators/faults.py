@@ -91,8 +91,8 @@ class Faults:
         fault = self._at("units", time)
         return 1.0 if fault is None else fault.share
 
-    def aged(self, times: Array) -> Array:
-        """Return how far the device's own clock has come (n,) [s] at `times` (n,) [s]."""
+    def device_time(self, times: Array) -> Array:
+        """Return the time of the device's own clock (n,) [s] at `times` (n,) [s]."""
         return times if self._clock is None else _through(times, *self._clock)
 
     def instants(self, ages: Array) -> Array:
@@ -109,12 +109,12 @@ class Faults:
         `done` were sent before, and count in that number. The device's own clock gives `rate` records a second. Of
         more than `most` at one go the first are left out: a line would have carried on while the computer was busy.
         """
-        since, age = self.aged(np.array([begun, now])).tolist()
+        since, age = self.device_time(np.array([begun, now])).tolist()
         total = max(int((age - since) * rate), done)
         return self.instants(since + np.arange(max(done, total - most), total) / rate), total
 
-    def sensed(self, bench: Bench, times: Array) -> Array:
-        """Return the wrench (n, 6) that a device which drifts or is wrongly calibrated feels at `times` (n,) [s]."""
+    def sensed_wrench(self, bench: Bench, times: Array) -> Array:
+        """Return the wrench (n, 6) that a drifting or wrongly calibrated device senses at `times` (n,) [s]."""
         wrench = bench.wrench(times)
         local = times % self._repeat if self._repeat > 0.0 else times
         for fault in self._timetable:
@@ -158,29 +158,29 @@ class Faults:
                 continue
             draw = np.random.default_rng([self._seed, round(time * 1e6), KINDS.index(kind)])
             if draw.uniform() < fault.share:
-                return self._carried_out(fault, time, datagram, draw)
-        return [datagram, *self._take_swapped()]
+                return self._carry_out(fault, time, datagram, draw)
+        return [datagram, *self._take_swapped_datagram()]
 
-    def _carried_out(self, fault: Fault, time: float, datagram: bytes, draw: np.random.Generator) -> list[bytes]:
+    def _carry_out(self, fault: Fault, time: float, datagram: bytes, draw: np.random.Generator) -> list[bytes]:
         match fault.kind:
             case "repeat":
-                return [datagram, datagram, *self._take_swapped()]
+                return [datagram, datagram, *self._take_swapped_datagram()]
             case "reorder" if self._swapped is None:
                 self._swapped = datagram
                 return []
             case "corrupt":
-                return [draw.bytes(len(datagram)), *self._take_swapped()]
+                return [draw.bytes(len(datagram)), *self._take_swapped_datagram()]
             case "shorten":
-                return [datagram[: int(draw.integers(0, len(datagram)))], *self._take_swapped()]
+                return [datagram[: int(draw.integers(0, len(datagram)))], *self._take_swapped_datagram()]
             case "delay":
                 heapq.heappush(self._delayed, (time + fault.delay, datagram))
                 return []
             case "lose":
                 return []
             case _:
-                return [datagram, *self._take_swapped()]
+                return [datagram, *self._take_swapped_datagram()]
 
-    def _take_swapped(self) -> list[bytes]:
+    def _take_swapped_datagram(self) -> list[bytes]:
         swapped, self._swapped = self._swapped, None
         return [] if swapped is None else [swapped]
 

@@ -20,7 +20,7 @@ from drivers import usb_link
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
-from simulators.simulator import Simulated, Simulator, unplug
+from simulators.simulator import RunningSimulator, Simulator, unplug
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class LabJackU6Box:
     def command(self, request: bytes) -> None:
         """Take a request; its answer is ready at once."""
         with self._lock:
-            self._answer = self._answered(request)
+            self._answer = self._respond(request)
 
     def answer(self) -> bytes | None:
         """Return the answer to the last request, once."""
@@ -70,7 +70,7 @@ class LabJackU6Box:
             answer, self._answer = self._answer, None
         return answer
 
-    def streamed(self, patience: float) -> bytes | None:
+    def stream_packet(self, patience: float) -> bytes | None:
         """Return the next stream packet, or None when none came within `patience` real seconds."""
         deadline = time.monotonic() + patience
         while True:
@@ -92,7 +92,7 @@ class LabJackU6Box:
         self._missed = 0  # scans thrown away since the buffer was full
         self._report: tuple[int, int] | None = None  # where in the buffer scans are missing, and how many
 
-    def _answered(self, request: bytes) -> bytes:
+    def _respond(self, request: bytes) -> bytes:
         if request == b"\xa8\xa8":
             error = 48 if self._streams else 50 if self._scan is None else 0
             if not error:
@@ -110,7 +110,7 @@ class LabJackU6Box:
         if number == 0x2D:
             return _long(0x2D, bytes(2) + self._memory(body[1])) if body[1] <= 9 else _long(0x2D, bytes([26, 0]))
         if number == 0x11:
-            return _long(0x11, bytes([self._configured(body), 0]))
+            return _long(0x11, bytes([self._configure(body), 0]))
         return _long(number, bytes([5, 0]))
 
     def _identity(self) -> bytes:
@@ -132,8 +132,8 @@ class LabJackU6Box:
             numbers = [x for g in gains[first : first + 2] for x in (_VOLTS_PER_CODE_BELOW * g, _ZERO_CODE)]
         return b"".join(round(x * 2**32).to_bytes(8, "little", signed=True) for x in numbers)
 
-    def _configured(self, body: bytes) -> int:
-        """Take the settings of a stream; return the error code, 0 for none."""
+    def _configure(self, body: bytes) -> int:
+        """Set up a stream; return the error code, 0 for none."""
         count, _, samples, _, _, flags = body[:6]
         interval = int.from_bytes(body[6:8], "little")
         channels = [(body[8 + 2 * i], body[9 + 2 * i]) for i in range(count)] if len(body) == 8 + 2 * count else []
@@ -190,7 +190,7 @@ class LabJackU6Box:
 
     def _codes(self, times: Array) -> NDArray[np.int64]:
         """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
-        volts = self._faults.sensed(self.bench, times) @ self._gauges.T + _OFFSETS
+        volts = self._faults.sensed_wrench(self.bench, times) @ self._gauges.T + _OFFSETS
         volts[self._faults.during("saturate", times), 2] = 11.0
         slope = np.where(volts < 0.0, -_VOLTS_PER_CODE_BELOW, _VOLTS_PER_CODE)
         return np.clip(np.rint(_ZERO_CODE + volts / slope), 0, 65535).astype(np.int64)
@@ -198,22 +198,22 @@ class LabJackU6Box:
 
 def _short(command: int, error: int) -> bytes:
     body = bytes([command, error, 0])
-    return bytes([_folded(body)]) + body
+    return bytes([_checksum8(body)]) + body
 
 
 def _long(number: int, data: bytes, command: int = 0xF8) -> bytes:
     sixteen = (sum(data) % 65536).to_bytes(2, "little")
     head = bytes([command, len(data) // 2, number]) + sixteen
-    return bytes([_folded(head)]) + head + data
+    return bytes([_checksum8(head)]) + head + data
 
 
 def _sums_agree(request: bytes) -> bool:
     whole = (sum(request[6:]) % 65536).to_bytes(2, "little")
-    return request[0] == _folded(request[1:6]) and request[4:6] == whole
+    return request[0] == _checksum8(request[1:6]) and request[4:6] == whole
 
 
-def _folded(data: bytes) -> int:
-    """Return the sum of bytes with its carry added in again, twice."""
+def _checksum8(data: bytes) -> int:
+    """Return the checksum of one byte: the sum of the bytes, its carry added twice."""
     total = sum(data)
     total = total // 256 + total % 256
     return total // 256 + total % 256
@@ -315,7 +315,7 @@ class SimulatedBus(_Backend):
     def bulk_read(self, dev_handle: SimpleNamespace, ep: int, intf: int, buff: Any, timeout: int) -> int:  # noqa: ANN401
         """Fill `buff` with an answer or a stream packet. Raises USBTimeoutError when there is none in `timeout` ms."""
         box = self._box(dev_handle)
-        data = box.answer() if ep == _ENDPOINTS[1] else box.streamed(timeout * 1e-3)
+        data = box.answer() if ep == _ENDPOINTS[1] else box.stream_packet(timeout * 1e-3)
         if data is None:
             self._box(dev_handle)
             raise _core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
@@ -335,7 +335,7 @@ class SimulatedBus(_Backend):
         return box
 
 
-def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulated:
+def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningSimulator:
     box = LabJackU6Box(bench, clock, faults=faults)
     bus = usb_link.BACKEND = SimulatedBus([box])
     uri = f"labjack-u6://?rate=300&cal={calibration_file(folder, f'SIM{bench.seed:05d}')}"
@@ -343,7 +343,7 @@ def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulate
     def forget() -> None:
         usb_link.BACKEND = None
 
-    return Simulated(uri, bench, box.now, unplug(faults), bus.claims, forget)
+    return RunningSimulator(uri, bench, box.now, unplug(faults), bus.claims, forget)
 
 
 SIMULATOR = Simulator("labjack-u6", _start, factor=2.0, statuses=(54, 55, 63))  # codes in a stream

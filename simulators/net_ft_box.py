@@ -14,7 +14,7 @@ from drivers.transducer import SetupError
 from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.net_ft_electronics import AXIA, NET_FT, Electronics, Product
-from simulators.simulator import LINE_FAULTS, ServedBox, Simulator, served
+from simulators.simulator import LINE_FAULTS, ServedBox, Simulator, serve_on_ports
 
 HOST = "127.0.0.1"
 _BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader
@@ -248,7 +248,8 @@ def _open_port(kind: socket.SocketKind, option: str, port: int) -> socket.socket
 _ERROR = 1 << 31  # set beside any other bit
 SIMULATOR = Simulator(
     "net-ft",
-    served(lambda bench, clock, faults: NetFtBox(bench, clock, faults=faults, first=(10_000_000, 1))),  # on for long
+    # Its counter is that of a box which has run for long.
+    serve_on_ports(lambda bench, clock, faults: NetFtBox(bench, clock, faults=faults, first=(10_000_000, 1))),
     factor=10.0,
     tells=("repeat", "reorder", "delay", "stall", *LINE_FAULTS),
     hides=(),

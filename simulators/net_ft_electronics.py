@@ -108,9 +108,9 @@ class Pages:
             "prodname": self.product.name,
             "mfgtxdmdl": "SI-36-0.5",
             "runstat": f"0x{status:08x}",
-            "runft": _listed(counts),
-            "runsg": _listed([0] * 6),
-            "setbias": _listed(self._bias),
+            "runft": _join(counts),
+            "runsg": _join([0] * 6),
+            "setbias": _join(self._bias),
             "setuserfilter": self._kept["setuserfilter"],
             "setpke": self._kept["setpke"],
             "setmce": 0,
@@ -126,12 +126,12 @@ class Pages:
             "scfgtu": torque[0],
             "cfgcpf": self.counts,
             "cfgcpt": self.counts,
-            "cfgmr": _listed([f"{r:.9g}" for r in rated]),
+            "cfgmr": _join([f"{r:.9g}" for r in rated]),
             "cfgtdu": 3,
             "scfgtdu": "mm",
             "cfgtau": 1,
             "scfgtau": "degrees",
-            "cfgtfx": _listed([0] * 6),
+            "cfgtfx": _join([0] * 6),
             "comrdte": "Enabled" if self.streams else "Disabled",
             "comrdtrate": int(self.product.ticks / self.step),
             "comrdtbsiz": self.buffered,
@@ -170,7 +170,7 @@ class Pages:
         self.step = int(self.product.ticks // rate)
 
 
-def _listed(values: list[int] | list[str]) -> str:
+def _join(values: list[int] | list[str]) -> str:
     return ";".join(str(value) for value in values)
 
 
@@ -221,7 +221,7 @@ class Electronics:
         return float(self._faults.instants(np.array([age]))[0])
 
     def _age(self, time: float) -> float:
-        return float(self._faults.aged(np.array([time]))[0])
+        return float(self._faults.device_time(np.array([time]))[0])
 
     def readings(self, ticks: list[int]) -> list[bytes]:
         """Return counter, status and six counts, packed, at each of `ticks`."""
@@ -270,7 +270,7 @@ class Electronics:
 
     def _status_and_counts(self, times: Array) -> tuple[list[int], NDArray[np.int64]]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
-        wrench = self._faults.sensed(self._bench, times)
+        wrench = self._faults.sensed_wrench(self._bench, times)
         forced = self._faults.during("saturate", times)
         wrench[forced] = self._rated  # what a clipped converter shows
         over = forced | np.any(np.abs(wrench) > self._rated, axis=1)

@@ -13,7 +13,7 @@ import numpy as np
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
-from simulators.simulator import Simulated, Simulator, unplug
+from simulators.simulator import RunningSimulator, Simulator, unplug
 
 ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]
 OVERFLOW = "The application is not able to keep up with the hardware acquisition.\n\nTask Name: _unnamedTask<0>"
@@ -112,7 +112,7 @@ class _Task:
         if self._begun is None or faults.active("lose", library.now()):
             raise DaqError(OVERFLOW)
         times, self._delivered = faults.due(self._begun, library.now(), self.timing.samp_clk_rate, self._delivered)
-        volts = faults.sensed(library.bench, times) @ library.gauges.T
+        volts = faults.sensed_wrench(library.bench, times) @ library.gauges.T
         for time, six in zip(times.tolist(), volts, strict=True):
             if faults.active("stall", time):
                 six[:] = self._last
@@ -126,11 +126,11 @@ class _Task:
             raise DaqError(ABSENT)
 
 
-def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulated:
+def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningSimulator:
     library = SimulatedNidaqmx(bench, clock, faults)
     library.install()
     uri = f"nidaq://Dev1?cal={calibration_file(folder, f'SIM{bench.seed:05d}')}"
-    return Simulated(uri, bench, library.now, unplug(faults), lambda: library.open, library.remove)
+    return RunningSimulator(uri, bench, library.now, unplug(faults), lambda: library.open, library.remove)
 
 
 SIMULATOR = Simulator("nidaq", _start, factor=1.0, tells=("lose", "saturate", "unplug", "reboot", "slow"))

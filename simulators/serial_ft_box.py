@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.simulator import LineBox, PseudoTerminal, Simulator, served
+from simulators.simulator import LineBox, PseudoTerminal, Simulator, serve_on_ports
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ class SerialFtBox(LineBox):
         """Return how long nothing has to be sent [real s]."""
         if self._streaming_since is None:
             return _NAP
-        due = self._ended(self._sent + 1)
+        due = self._end_time(self._sent + 1)
         return min(max((due - self.now()) / self.clock.factor, _SHORTEST_NAP), _NAP)
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
@@ -102,9 +102,9 @@ class SerialFtBox(LineBox):
         for record in self.faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
             self._say(port, record)
 
-    def _ended(self, record: int) -> float:
-        """Return when the last byte of a record of this stream is through."""
-        since = self.faults.aged(np.array([self._streaming_since or 0.0]))
+    def _end_time(self, record: int) -> float:
+        """Return when the last byte of a record of this stream is sent."""
+        since = self.faults.device_time(np.array([self._streaming_since or 0.0]))
         return float(self.faults.instants(since + record * self._period)[0])
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
@@ -154,7 +154,7 @@ class SerialFtBox(LineBox):
         """Return a record as bytes for each of `times` (n,) [s]."""
         if not len(times):
             return []
-        wrench = self.faults.sensed(self._bench, times)
+        wrench = self.faults.sensed_wrench(self._bench, times)
         packed: list[bytes] = []
         over = np.any(np.abs(wrench) > self._rated, axis=1)
         bias = self._biases[-1] if self._biases else np.zeros(6)
@@ -173,7 +173,7 @@ class SerialFtBox(LineBox):
 
 SIMULATOR = Simulator(
     "serial-ft",
-    served(lambda bench, clock, faults: SerialFtBox(bench, clock, faults=faults)),
+    serve_on_ports(lambda bench, clock, faults: SerialFtBox(bench, clock, faults=faults)),
     factor=2.0,
     statuses=tuple(range(1, 10)),
     unshown=0.2,  # binary records have no checksum

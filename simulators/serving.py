@@ -163,7 +163,7 @@ def serve_net_ft(
     """
 
     def box(port: int) -> NetFtBox:
-        bench, faults = _scripted(script, seed)
+        bench, faults = _read_script(script, seed)
         return NetFtBox(bench, clock_at(factor), rate=rate, ports=(rdt_port, tcp_port, port), faults=faults)
 
     if http_port is None:
@@ -186,7 +186,7 @@ def serve_serial_ft(
 
     Raises SetupError where there are no pseudo-terminals or the script is missing, TimetableError when it is wrong.
     """
-    bench, faults = _scripted(script, seed)
+    bench, faults = _read_script(script, seed)
     box = SerialFtBox(bench, clock_at(factor), baud=baud, faults=faults)
     box.start()
     return box
@@ -194,12 +194,12 @@ def serve_serial_ft(
 
 def serve_digital_ft(*, seed: int = 0, factor: float = 1.0, script: Path | None = None) -> DigitalFtBox:
     """Return an RS-485 transducer that serves on a pseudo-terminal until it is closed. Raises as `serve_serial_ft`."""
-    bench, faults = _scripted(script, seed)
+    bench, faults = _read_script(script, seed)
     box = DigitalFtBox(bench, clock_at(factor), faults=faults)
     box.start()
     return box
 
 
-def _scripted(script: Path | None, seed: int) -> tuple[ScriptedBench, Faults]:
+def _read_script(script: Path | None, seed: int) -> tuple[ScriptedBench, Faults]:
     timetable = usual_timetable() if script is None else load_timetable(script)
     return ScriptedBench(seed, timetable), Faults(timetable.faults, seed=seed, repeat=timetable.repeat)

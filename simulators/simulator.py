@@ -184,8 +184,8 @@ LINE_FAULTS: tuple[Kind, ...] = ("lose", "corrupt", "shorten", "saturate", "unpl
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
-    """A simulated device that runs."""
+class RunningSimulator:
+    """A simulated device that runs, and how to reach and to stop it."""
 
     uri: str  # the address that opens it
     bench: Bench  # what it feels
@@ -195,7 +195,7 @@ class Simulated:
     forget: Callable[[], None] = lambda: None  # lets the computer have its own USB and libraries again
 
 
-Start = Callable[[Bench, Clock, Faults, Path], Simulated]  # in a folder for what it writes
+Start = Callable[[Bench, Clock, Faults, Path], RunningSimulator]  # in a folder for what it writes
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,13 +224,13 @@ class _Box(Protocol):
     def close(self) -> None: ...
 
 
-def served(make: Callable[[Bench, Clock, Faults], _Box]) -> Start:
-    """Return how a box is started that serves on ports of this computer."""
+def serve_on_ports(make: Callable[[Bench, Clock, Faults], _Box]) -> Start:
+    """Return the function that starts a box with ports of its own on this computer."""
 
-    def start(bench: Bench, clock: Clock, faults: Faults, _: Path) -> Simulated:
+    def start(bench: Bench, clock: Clock, faults: Faults, _: Path) -> RunningSimulator:
         box = make(bench, clock, faults)
         box.start()
-        return Simulated(box.uri, bench, box.now, box.close)
+        return RunningSimulator(box.uri, bench, box.now, box.close)
 
     return start
 

@@ -41,8 +41,8 @@ class SimulatedSubject:
         self._slant = float(draw.normal(0.0, 1.5))
         self._moisture = float(np.exp(draw.normal(0.0, self.settings.moisture)))
 
-    def perceived(self, surface: Surface) -> Surface:
-        """Return the surface as this subject's finger rubs on it: the same forces press, others drag."""
+    def perceived_surface(self, surface: Surface) -> Surface:
+        """Return the surface with this subject's friction on it; normal forces stay as they are."""
         return replace(surface, mu=surface.mu * self._moisture, tau_max=surface.tau_max * self._moisture)
 
     def stroke(self, surface: Surface, repetition: int = 1) -> Stroke:

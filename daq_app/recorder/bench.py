@@ -223,7 +223,7 @@ class _Tare:
 
     def result(self, info: TransducerInfo) -> Tared:
         """Return the zero. Raises NotNow where something moved."""
-        gathered = ReadingBlock.joined(self._blocks)
+        gathered = ReadingBlock.concatenate(self._blocks)
         # Readings come in lumps; the stretch has the length that was asked for.
         stretch = gathered.between(0, int(np.count_nonzero(gathered.time <= gathered.time[0] + self._duration)))
         wrench = info.calibration.wrench(stretch.raw, np.zeros(6))

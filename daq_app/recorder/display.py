@@ -84,7 +84,7 @@ class Display:
             self._tell_health(health, now)
 
     def _flush(self) -> None:
-        info, block = self._info, ReadingBlock.joined(self._waiting)
+        info, block = self._info, ReadingBlock.concatenate(self._waiting)
         self._waiting = []
         if info is None or not len(block):
             return

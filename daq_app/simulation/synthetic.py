@@ -236,7 +236,7 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
             "direction": stroke.direction,
             **people.meant(trial),
         }
-        for trial, stroke in zip(people.stroked, bench.planted(), strict=True)
+        for trial, stroke in zip(people.stroked, bench.ground_truth(), strict=True)
     ]
 
 
@@ -277,7 +277,7 @@ class SyntheticPeople(SimulatedPeople):
         return block, place, block.trials[place - 1].stimulus.known_index if place else None
 
     def _perceived_surface(self, trial: Trial) -> Surface:
-        surface = self.subject.perceived(planted_surface(trial))
+        surface = self.subject.perceived_surface(planted_surface(trial))
         light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
@@ -350,7 +350,7 @@ def _relation(
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
     for seed in range(_FIRST, _FIRST + DRAWN):
         person, order = SimulatedSubject(seed, people), [int(one) for one in draw.permutation(len(surfaces))]
-        perceived = [person.perceived(surface) for surface in surfaces]
+        perceived = [person.perceived_surface(surface) for surface in surfaces]
         own = seds(perceived[0].mu / surfaces[0].mu)
         before: list[int | None] = [None, *(indices[one] for one in order[:-1])]
         rows = np.array(

@@ -134,7 +134,7 @@ class SimulatedHand:
         """Return what the bench planted in the last stroke of each trial, by its number."""
         assert self.connected is not None
         assert self.connected.bench is not None
-        planted = self.connected.bench.planted()
+        planted = self.connected.bench.ground_truth()
         return {trial.number: stroke for trial, stroke in zip(self.stroked, planted, strict=True)}
 
     def show(self, command: steps.Command) -> None:

@@ -49,7 +49,7 @@ def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> Strea
     with at(address), contextlib.closing(_line(place, deadline)) as link:
         bound = deadline.bound(link)
         word = hold(bound)
-        stored = _stored(place, bound)
+        stored = _read_calibration(place, bound)
         conversation = _DigitalConversation(place.number, stored)
         rate = measured_rate(link, conversation, clock, _MEASURED, deadline, wire.STREAM_RATE)
     info = _info(place, stored, word, rate)
@@ -64,14 +64,14 @@ def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
         if word is None:
             streams = link.receive(0.05) is not None
             raise LinkLost("it streams, and nobody reads; open it to end that" if streams else "no transducer answers")
-        return _info(place, _stored(place, link), word, math.nan)
+        return _info(place, _read_calibration(place, link), word, math.nan)
 
 
 def _line(place: _Where, _deadline: Deadline) -> SerialLink:
     return SerialLink(place.port, place.baud, place.parity)
 
 
-def _stored(place: _Where, link: Link) -> wire.StoredCalibration:
+def _read_calibration(place: _Where, link: Link) -> wire.StoredCalibration:
     registers = read(link, wire.calibration_address(place.number), wire.CALIBRATION_SIZE)
     try:
         return wire.parse_calibration(registers)
@@ -151,9 +151,9 @@ class _DigitalConversation:
         if serial != expected:
             raise DeviceFault(f"transducer {serial or 'without a name'} answers where {expected} was; open it anew")
         wanted = self.stored.gains_and_offsets
-        _done(link, wire.request(wire.UNLOCK, bytes([wire.UNLOCK_KEY])), "to be unlocked")
-        _done(link, wire.write_registers(wire.GAINS_AND_OFFSETS, wanted), "its gains and offsets")
-        _done(link, wire.request(wire.UNLOCK, bytes([wire.LOCK_KEY])), "to be locked")
+        _carry_out(link, wire.request(wire.UNLOCK, bytes([wire.UNLOCK_KEY])), "to be unlocked")
+        _carry_out(link, wire.write_registers(wire.GAINS_AND_OFFSETS, wanted), "its gains and offsets")
+        _carry_out(link, wire.request(wire.UNLOCK, bytes([wire.LOCK_KEY])), "to be locked")
         if read(link, wire.GAINS_AND_OFFSETS, len(wanted) // 2) != wanted:
             raise DeviceFault(
                 "the transducer did not take the gains and offsets of its calibration; switch it off and on"
@@ -200,8 +200,8 @@ def read(link: Link, first: int, count: int) -> bytes:
     return read_so_far
 
 
-def _done(link: Link, request: bytes, what: str) -> None:
-    """Carry out a request that is answered with success or a repetition of what was written."""
+def _carry_out(link: Link, request: bytes, what: str) -> None:
+    """Carry out a request whose answer says success or repeats what was written."""
     answer = _answer(link, request, what)
     if request[1] == wire.UNLOCK and answer != b"\x01":
         raise DeviceFault(f"the transducer was asked {what} and refused; switch it off and on")
@@ -214,7 +214,7 @@ def _answer(link: Link, request: bytes, what: str) -> bytes:
         if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
             while link.receive(_ANSWER) is not None:
                 pass
-        if isinstance(answer, wire.Refused):
+        if isinstance(answer, wire.Refusal):
             raise DeviceFault(f"the transducer was asked {what} and refused: {answer.reason}")
         if answer is not None:
             return answer

@@ -67,7 +67,7 @@ _PROOF = 6  # packets in a row that must be sound before a new place is believed
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class Refusal:
     """The transducer understood a request and will not carry it out."""
 
     reason: str
@@ -99,7 +99,7 @@ def crc16(data: bytes) -> int:
 
 def request(function: int, data: bytes) -> bytes:
     """Return the frame that asks for `function`."""
-    return _framed(bytes([ADDRESS, function]) + data)
+    return _with_crc(bytes([ADDRESS, function]) + data)
 
 
 def read_registers(first: int, count: int) -> bytes:
@@ -112,7 +112,7 @@ def write_registers(first: int, registers: bytes) -> bytes:
     return request(WRITE, struct.pack(">HHB", first, len(registers) // 2, len(registers)) + registers)
 
 
-def answer_in(response: bytes, request: bytes) -> bytes | Refused | None:
+def answer_in(response: bytes, request: bytes) -> bytes | Refusal | None:
     """Return the data of the answer to `request`, wherever it lies in `response`; None while it is not there.
 
     For registers read that is their bytes, else what follows the function code. Raises nothing.
@@ -127,7 +127,7 @@ def answer_in(response: bytes, request: bytes) -> bytes | Refused | None:
         if frame != request:  # an adapter may repeat what we send
             return frame[3:-2] if function == READ else frame[2:-2]
     for frame in _frames(response, bytes([ADDRESS, function | _EXCEPTION]), 5):
-        return Refused(_REASONS.get(frame[2], f"exception {frame[2]}"))
+        return Refusal(_REASONS.get(frame[2], f"exception {frame[2]}"))
     return None
 
 
@@ -235,7 +235,7 @@ def _records(batches: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]],
     return Records(gauges, status.astype(np.int64), np.concatenate(damaged))
 
 
-def _framed(frame: bytes) -> bytes:
+def _with_crc(frame: bytes) -> bytes:
     return frame + struct.pack("<H", crc16(frame))
 
 
@@ -244,7 +244,7 @@ def _frames(response: bytes, head: bytes, size: int) -> Iterator[bytes]:
     at = response.find(head)
     while 0 <= at <= len(response) - size:
         frame = response[at : at + size]
-        if _framed(frame[:-2]) == frame:
+        if _with_crc(frame[:-2]) == frame:
             yield frame
         at = response.find(head, at + 1)
 

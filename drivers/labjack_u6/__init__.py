@@ -39,7 +39,7 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
     place = _where(address)
     if place.calibration is None:
         raise AddressError(f"{place.uri} names no calibration; add cal=FILE, the transducer's own .cal file")
-    link, identity = _linked(place, deadline)
+    link, identity = _open_link(place, deadline)
     with at(address), contextlib.closing(link):
         constants = _constants(deadline.bound(link))
     scans = wire.scan_clock(place.rate)
@@ -51,7 +51,7 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
 def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError where another program has it or nothing is plugged in."""
     place = _where(address)
-    link, identity = _linked(place, deadline)
+    link, identity = _open_link(place, deadline)
     with at(address), contextlib.closing(link):
         if place.calibration is None:
             raise SetupError(
@@ -61,8 +61,8 @@ def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
     return _info(place, place.calibration, identity, constants, wire.scan_clock(place.rate))
 
 
-def _linked(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
-    """Return the one converter that is meant, open, and who it is."""
+def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
+    """Open the converter that the address names, and return its link and identity."""
     fitting: dict[int, Any] = {}
     refused: list[SetupError] = []
     for one in devices(_VENDOR, _PRODUCT):
@@ -98,7 +98,7 @@ def _linked(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
 
 def _again(place: _Where, serial: int, deadline: Deadline) -> UsbLink:
     """Open the same converter anew, wherever it is plugged in now."""
-    return _linked(_Where(place.uri, serial, place.rate, place.calibration), deadline)[0]
+    return _open_link(_Where(place.uri, serial, place.rate, place.calibration), deadline)[0]
 
 
 def _info(
@@ -161,7 +161,7 @@ class _GaugeConversation:
         identity = _identity(link)
         if identity.serial != self.serial:
             raise DeviceFault(f"converter {identity.serial} answers where {self.serial} was; open it anew")
-        wire.check_configured(_reply(link, wire.configure_stream(self.scan_clock)))
+        wire.check_configuration(_reply(link, wire.configure_stream(self.scan_clock)))
         if code := wire.normal_error(_reply(link, wire.START), 0xA9):
             raise DeviceFault(f"the converter does not stream: {wire.meaning(code)}; pull its plug and put it in again")
         return b""

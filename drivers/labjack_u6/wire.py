@@ -92,18 +92,18 @@ class Constants:
 
 def read_identity() -> bytes:
     """Return the request for who the converter is (ConfigU6, writing nothing)."""
-    return _extended(0x08, bytes(20))
+    return _extended_command(0x08, bytes(20))
 
 
 def read_memory(block: int) -> bytes:
     """Return the request for four calibration constants."""
-    return _extended(0x2D, bytes([0, block]))
+    return _extended_command(0x2D, bytes([0, block]))
 
 
 def configure_stream(clock: ScanClock) -> bytes:
     """Return the request that sets six differential gauges, one after the other, to be scanned at the clock's rate."""
     head = struct.pack("<6BH", GAUGES, 1, GAUGES * SCANS, 0, 0, clock.flags, clock.interval)
-    return _extended(0x11, head + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(GAUGES)))
+    return _extended_command(0x11, head + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(GAUGES)))
 
 
 def scan_clock(rate: float) -> ScanClock:
@@ -139,8 +139,8 @@ def parse_constants(positive: bytes | None, negative: bytes | None) -> Constants
     return Constants(slope, negative_slope, centre)
 
 
-def check_configured(answer: bytes | None) -> None:
-    """Raise DeviceFault when the answer to a stream's settings is no yes."""
+def check_configuration(answer: bytes | None) -> None:
+    """Raise DeviceFault unless the answer confirms a stream's settings."""
     _data(answer, 0x11, 8)
 
 
@@ -241,7 +241,7 @@ def _fixed_points(data: bytes) -> tuple[float, ...]:
     return tuple(value / 2**32 for value in struct.unpack("<4q", data))
 
 
-def _extended(command: int, data: bytes) -> bytes:
+def _extended_command(command: int, data: bytes) -> bytes:
     head = struct.pack("<3BH", 0xF8, len(data) // 2, command, sum(data) & 0xFFFF)
     return bytes([_sum8(head)]) + head + data
 

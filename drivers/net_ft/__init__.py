@@ -40,7 +40,7 @@ def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTran
     """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
     place = _where(address)
     return NetFtTransducer(
-        _prepared(place, deadline),
+        _prepare(place, deadline),
         connect=lambda limit: UdpLink(address.host, place.rdt_port, limit),
         who=lambda: _who(place),
         clock=clock,
@@ -75,8 +75,8 @@ def _where(address: Address) -> _Where:
     )
 
 
-def _prepared(place: _Where, deadline: Deadline) -> TransducerInfo:
-    """Set what the address asks for, and return who answers, as read back afterwards."""
+def _prepare(place: _Where, deadline: Deadline) -> TransducerInfo:
+    """Set the box as the address asks, and return its description, read back afterwards."""
     configuration = _configuration(place, deadline)
     if not configuration.streams:
         raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
@@ -91,15 +91,15 @@ def _prepared(place: _Where, deadline: Deadline) -> TransducerInfo:
                 f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
                 "set the rate on its Communications page"
             )
-    done = _commanded(place, configuration, deadline) if place.set_bias or place.reset_latch else {}
+    done = _command(place, configuration, deadline) if place.set_bias or place.reset_latch else {}
     if place.buffered:
         done["streaming"] = "buffered"
     info = _info(place, configuration)
     return replace(info, settings={**info.settings, **done})
 
 
-def _commanded(place: _Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
-    """Carry out over the command port what the address asks for; return what came of it, for the record."""
+def _command(place: _Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
+    """Send the commands that the address asks for, and return the results for the record."""
     units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24, deadline))
     if units is None or (units.counts_per_force, units.counts_per_torque) != (
         configuration.counts_per_force,

@@ -90,20 +90,20 @@ NET_FT, AXIA = StatusTable(_NET_FT, SUMMARY), StatusTable(_AXIA, SUMMARY)  # the
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Decoded:
-    """What a batch of datagrams held: n records and some datagrams that are none."""
+class DecodedBatch:
+    """A batch of datagrams decoded: n records, and how many datagrams held none."""
 
     records: NDArray[np.void]  # (n,) of RECORD
     origin: NDArray[np.intp]  # (n,) the datagram each came in
     malformed: int  # datagrams of a length that no record has
 
 
-def decode(datagrams: Sequence[bytes]) -> Decoded:
+def decode(datagrams: Sequence[bytes]) -> DecodedBatch:
     """Return the records of `datagrams`, one or several whole ones in each. Raises nothing."""
     size = RECORD.itemsize
     counts = [0 if len(datagram) % size else len(datagram) // size for datagram in datagrams]
     records = np.frombuffer(b"".join([d for d, count in zip(datagrams, counts, strict=True) if count]), RECORD)
-    return Decoded(records, np.repeat(np.arange(len(counts)), counts), counts.count(0))
+    return DecodedBatch(records, np.repeat(np.arange(len(counts)), counts), counts.count(0))
 
 
 def parse_wrench(answer: bytes) -> tuple[int, ...] | None:

@@ -72,7 +72,7 @@ def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
     """Return an open line on which a controller answers, and its baud rate."""
     tried: list[int] = []
     for baud in place.bauds:
-        if deadline.left <= 0.0:
+        if deadline.remaining <= 0.0:
             break
         tried.append(baud)
         link = SerialLink(place.port, baud)
@@ -80,7 +80,7 @@ def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
             if prompted(deadline.bound(link), tries=2):
                 return link, baud
         except LinkLost:
-            if deadline.left > 0.0:
+            if deadline.remaining > 0.0:
                 link.close()
                 raise
         except BaseException:

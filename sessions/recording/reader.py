@@ -180,7 +180,7 @@ class Recording:
             blocks_read.append(
                 ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)})
             )
-        return ReadingBlock.joined(blocks_read)
+        return ReadingBlock.concatenate(blocks_read)
 
     def last_block(self) -> ReadingBlock:
         """Return the last block of readings (an empty one where there is none). Raises RecordingError when damaged."""

@@ -28,7 +28,7 @@ class RecordedReadings:
 
     def up_to(self, position: int | None) -> ReadingBlock:
         """Hand the same over as one."""
-        return ReadingBlock.joined(list(self.blocks_up_to(position)))
+        return ReadingBlock.concatenate(list(self.blocks_up_to(position)))
 
     def take_until(self, instant_ns: int) -> ReadingBlock:
         """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""
@@ -40,7 +40,7 @@ class RecordedReadings:
                 taken.append(self._take(count))
             if late.any():
                 break
-        return ReadingBlock.joined(taken)
+        return ReadingBlock.concatenate(taken)
 
     def next_received_ns(self) -> int | None:
         """Return when the next reading was received [ns]; None after the last."""

@@ -289,7 +289,7 @@ class SessionWriter:
     def _insert_blocks(self) -> int:
         """Insert the waiting readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""
         rows = self._block_rows
-        waiting = ReadingBlock.joined(self._blocks)
+        waiting = ReadingBlock.concatenate(self._blocks)
         for start in range(0, len(waiting), LARGEST_BLOCK):
             block = waiting.between(start, start + LARGEST_BLOCK)
             rows += 1

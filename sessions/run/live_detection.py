@@ -43,7 +43,7 @@ class TakeWatch:
             return ()
         if self._detector is not None:
             return self._touches(self._detector, block)
-        self._stretch = ReadingBlock.joined([self._stretch, block])
+        self._stretch = ReadingBlock.concatenate([self._stretch, block])
         self._stretch = self._stretch.between(_last(self._stretch.time, self.zero_duration), len(self._stretch))
         zero = self._zero()
         if zero is None:

@@ -23,7 +23,7 @@ from simulators.bench import Bench
 from simulators.faults import Fault, Faults
 from simulators.net_ft_box import NetFtBox
 from simulators.serving import SIMULATORS
-from simulators.simulator import Simulated
+from simulators.simulator import RunningSimulator
 from simulators.stroke import Stroke, paper_surfaces
 
 SEED = 3
@@ -56,11 +56,11 @@ ONE_AFTER_THE_OTHER = tuple(FIELD)  # with the slow clock last: it stays slow
 
 def simulated_bench(faults, monkeypatch):
     monkeypatch.setattr(wiring, "NetFtBox", partial(NetFtBox, faults=faults))
-    return Simulated(f"sim:?seed={SEED}", Bench(SEED), lambda: 0.0, lambda: None)
+    return RunningSimulator(f"sim:?seed={SEED}", Bench(SEED), lambda: 0.0, lambda: None)
 
 
 def recording():
-    return Simulated(f"replay:{RECORDED}", Bench(SEED), lambda: 0.0, lambda: None)
+    return RunningSimulator(f"replay:{RECORDED}", Bench(SEED), lambda: 0.0, lambda: None)
 
 
 def started(name, faults, clock, folder, monkeypatch):
@@ -225,7 +225,7 @@ def undisturbed_run(name, folder):
                     newest = max([newest, *blocks[-1].time[-1:].tolist()])
             finally:
                 stopped(transducer, course)
-            course.blocks.append(ReadingBlock.joined([*blocks, transducer.read(0.0)]))
+            course.blocks.append(ReadingBlock.concatenate([*blocks, transducer.read(0.0)]))
             course.after_stop = len(transducer.read(0.0))
             course.healths.append(transducer.health)
             if name != "replay":
@@ -233,7 +233,7 @@ def undisturbed_run(name, folder):
                 course.started_twice = refusal(transducer)
                 again = transducer.read(10.0)
                 stopped(transducer, course)
-                course.blocks.append(ReadingBlock.joined([again, transducer.read(0.0)]))
+                course.blocks.append(ReadingBlock.concatenate([again, transducer.read(0.0)]))
                 course.healths.append(transducer.health)
                 while min(course.stops) >= STOPS_WITHIN and len(course.stops) < 4 * AGAIN:  # a busy machine
                     transducer.start()
@@ -286,7 +286,7 @@ def disturbed_course(name, folder):
     return Disturbed(
         told,
         info,
-        ReadingBlock.joined(blocks),
+        ReadingBlock.concatenate(blocks),
         health,
         sentence,
         device.uri,
@@ -342,7 +342,7 @@ def gone_through(kind, tells, transducer, blocks, faults, clock, now):
     origin_ns = clock.now_ns() - round(now() * 1e9)
     deadline, behind = Deadline(PATIENCE), None
     went_on = False
-    while deadline.left > 0.0:
+    while deadline.remaining > 0.0:
         block = transducer.read(0.1 * clock.factor)
         blocks.append(block)
         if kind == "slow":
@@ -351,7 +351,9 @@ def gone_through(kind, tells, transducer, blocks, faults, clock, now):
             went_on = (int(block.received_ns[-1]) - origin_ns) * 1e-9 > end + 0.05 * clock.factor
         if went_on and behind is None:
             behind = Deadline(LAGS)  # a busy device may still have to send what it made before the fault
-        if behind is not None and (not tells or behind.left <= 0.0 or counted(kind, (before, transducer.health, True))):
+        if behind is not None and (
+            not tells or behind.remaining <= 0.0 or counted(kind, (before, transducer.health, True))
+        ):
             break
     return before, transducer.health, went_on
 

@@ -134,7 +134,7 @@ def line(scheme, options, data):
 class _Endless(LabJackU6Box):
     """A converter whose stream cannot be stopped, and holds no scan."""
 
-    def streamed(self, patience):
+    def stream_packet(self, patience):
         """Return bytes at once, however long may be waited."""
         time.sleep(min(patience, 0.001))
         return bytes(62)

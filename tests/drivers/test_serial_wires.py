@@ -99,7 +99,7 @@ def readings(device, transducer, until):
     while device.box.now() < until:
         blocks.append(transducer.read(0.1))
     transducer.stop()
-    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
 
 
 FAULTS = {  # what a line without numbers and clock can show of each
@@ -130,9 +130,9 @@ def survives(device, kind):
     device.box.faults = Faults([Fault(kind, begin, end, share=share)], seed=1)
     block, deadline = ReadingBlock.empty(), end + 20.0 * device.clock.factor
     while (device.heard(block) < end + 0.3) and device.box.now() < deadline:
-        block = ReadingBlock.joined([block, transducer.read(0.1)])
+        block = ReadingBlock.concatenate([block, transducer.read(0.1)])
     transducer.stop()
-    block = ReadingBlock.joined([block, transducer.read(0.0)])
+    block = ReadingBlock.concatenate([block, transducer.read(0.0)])
     health = transducer.health
     transducer.close()
     assert device.heard(block) > end, "it did not go on after the fault"

@@ -99,7 +99,7 @@ def test_a_box_that_combines_its_gauges_itself_is_moved_too_and_its_raw_readings
         transducer.start()
         blocks = [transducer.read(1.0) for _ in range(3)]
         transducer.stop()
-    block, calibration = ReadingBlock.joined(blocks), transducer.info.calibration
+    block, calibration = ReadingBlock.concatenate(blocks), transducer.info.calibration
     assert transducer.health.received >= len(block) > 0
     own, moved = block.raw * np.repeat([1e-6, 1e-3], 3), calibration.wrench(block.raw, np.zeros(6))
     np.testing.assert_allclose(moved[:, 3], own[:, 3] + 20.0 * own[:, 1])

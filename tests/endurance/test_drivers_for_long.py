@@ -19,7 +19,7 @@ from drivers.transducer import LinkLost, SetupError, Transducer
 from simulators.bench import Bench
 from simulators.faults import Fault, Faults
 from simulators.serving import SIMULATORS
-from simulators.simulator import Simulated, Simulator
+from simulators.simulator import RunningSimulator, Simulator
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")]
 
@@ -39,7 +39,7 @@ class Run:
     error: str = ""
 
 
-def boxes(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path) -> dict[str, Simulated]:
+def boxes(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path) -> dict[str, RunningSimulator]:
     """Return every simulated device in the list, started."""
     return {name: one.start(Bench(3), clock, faults(one), folder) for name, one in SIMULATORS.items()}
 

@@ -62,7 +62,7 @@ def judged(seed, subject):
             person = carries if block.name == "stickiness" else does_not
             surface = planted_surface(trial)
             before = block.trials[place - 1].stimulus.known_index if place else None
-            felt = person.perceived(surface)
+            felt = person.perceived_surface(surface)
             mu = felt.mu * drag / press
             score = person.score(felt, 1, place, before)
             rows.append(row(trial, block, place, score, mu=mu, sed=stand_in(mu)))
@@ -106,7 +106,7 @@ def met_by_chance(seed, subject):
     for place, trial in enumerate(block.trials):
         near, own = draw.normal(size=2).tolist()
         index = round(50 + 15 * near)
-        felt = person.perceived(Surface(mu=0.45 + 0.06 * (0.8 * near + 0.6 * own), index=index))
+        felt = person.perceived_surface(Surface(mu=0.45 + 0.06 * (0.8 * near + 0.6 * own), index=index))
         score = person.meant(felt, place, before) + PEOPLE.judgement_noise * draw.normal()
         made = row(trial, block, place, score, mu=felt.mu, sed=stand_in(felt.mu))
         rows.append(replace(made, index=index, before=before))

@@ -50,7 +50,7 @@ def test_readings_come_back_to_the_last_bit_however_they_were_cut(blocks, commit
             if i in commits:
                 writer.commit()
         writer.close()
-        assert bits(Recording.open(folder).readings()) == bits(ReadingBlock.joined(blocks))
+        assert bits(Recording.open(folder).readings()) == bits(ReadingBlock.concatenate(blocks))
 
 
 JSON = st.recursive(

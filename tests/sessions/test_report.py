@@ -274,7 +274,7 @@ def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing
 
         def readings(self):
             block = recording.readings()
-            return ReadingBlock.joined([block.between(0, before), block.between(after, len(block))])
+            return ReadingBlock.concatenate([block.between(0, before), block.between(after, len(block))])
 
     made = course(Cut())
     missing = made.normal.index(None)

@@ -54,7 +54,7 @@ def test_mu_tau_max_speed_and_direction_lie_in_the_wrench(surface, seed):
 def test_onset_and_lift_are_where_the_planted_force_crosses_three_deviations_of_the_noise():
     bench, truth = planted(SURFACES["stickiness", 50], at=3.0)
     at = np.array([truth.onset - 2e-5, truth.onset + 2e-5, truth.lift - 2e-5, truth.lift + 2e-5])
-    normal = -bench.exerted(at)[:, 2]
+    normal = -bench.true_wrench(at)[:, 2]
     assert (normal > 0.012).tolist() == [False, True, True, False]
     assert truth.touch < truth.onset < truth.slip < truth.peak < truth.lift < truth.end
     assert truth.touch - 3.0 >= 0.5
@@ -124,13 +124,13 @@ def test_nothing_is_stroked_unless_mounted_and_no_two_strokes_at_once():
     with pytest.raises(ValueError, match="has not ended"):
         bench.begin_stroke(Stroke(3.0, 20.0), first.end - 0.01)
     bench.begin_stroke(Stroke(3.0, 20.0), first.end + 0.01)
-    assert len(bench.planted()) == 2
+    assert len(bench.ground_truth()) == 2
 
 
 def test_a_surface_mounted_after_a_stroke_began_does_not_change_it():
     bench, truth = planted(SURFACES["stickiness", 0])
     bench.mount(SURFACES["stickiness", 100])
-    assert bench.planted() == (truth,)
+    assert bench.ground_truth() == (truth,)
 
 
 @pytest.mark.parametrize(

@@ -106,11 +106,11 @@ def test_a_fault_that_cannot_be_carried_out_is_refused(wrong):
 
 def test_a_drift_walks_to_its_share_of_each_range_and_stays():
     faults, times = Faults([Fault("drift", 1.0, 3.0, share=0.1)]), np.array([0.5, 2.0, 3.0, 9.0])
-    drift = faults.sensed(Bench(1, ONES), times) - 1.0  # of ranges of 36 N and 500 N mm
+    drift = faults.sensed_wrench(Bench(1, ONES), times) - 1.0  # of ranges of 36 N and 500 N mm
     np.testing.assert_allclose(drift[:, 2], [0.0, 1.8, 3.6, 3.6])
     np.testing.assert_allclose(drift[:, 5], [0.0, 25.0, 50.0, 50.0])
 
 
 def test_a_wrong_calibration_feels_more_than_there_is_while_it_lasts():
     faults, times = Faults([Fault("miscalibrate", 1.0, 2.0, share=0.25)]), np.array([0.0, 1.0, 2.0])
-    np.testing.assert_allclose(faults.sensed(Bench(1, ONES), times)[:, 0], [1.0, 1.25, 1.0])
+    np.testing.assert_allclose(faults.sensed_wrench(Bench(1, ONES), times)[:, 0], [1.0, 1.25, 1.0])

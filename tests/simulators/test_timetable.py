@@ -95,21 +95,21 @@ def test_a_bench_is_stroked_as_its_timetable_says_again_and_again():
     surface = paper_surfaces()["stickiness", 100]
     bench = ScriptedBench(1, Timetable(((1.0, surface),), repeat=10.0))
     normal = -bench.wrench(np.arange(0.0, 30.0, 0.01))[:, 2]
-    touched = [p.touch for p in bench.planted()]
+    touched = [p.touch for p in bench.ground_truth()]
     assert [int(t // 10) for t in touched] == [0, 1, 2]
-    assert all(normal[int(100 * p.peak)] == pytest.approx(p.peak_normal_force, abs=0.1) for p in bench.planted())
+    assert all(normal[int(100 * p.peak)] == pytest.approx(p.peak_normal_force, abs=0.1) for p in bench.ground_truth())
 
 
 def test_a_timetable_without_repeat_ends():
     bench = ScriptedBench(1, Timetable(((1.0, paper_surfaces()["stickiness", 0]),)))
     bench.wrench(np.arange(0.0, 100.0, 1.0))
-    assert len(bench.planted()) == 1
+    assert len(bench.ground_truth()) == 1
 
 
 def test_strokes_that_nobody_asked_about_in_their_time_are_skipped():
     bench = ScriptedBench(1, usual_timetable())
     bench.wrench(np.array([6000.5]))
-    assert [p.touch > 5990.0 for p in bench.planted()] == [True]
+    assert [p.touch > 5990.0 for p in bench.ground_truth()] == [True]
 
 
 def test_without_a_script_the_papers_ten_surfaces_are_stroked():

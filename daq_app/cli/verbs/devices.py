@@ -132,7 +132,7 @@ def _listen(transducer: Transducer, clock: Clock, console: Console) -> ReadingBl
         console.progress(passed / PROBED, f"listening, {transducer.health.received} readings")
         blocks.append(transducer.read(0.1))
     transducer.stop()
-    return ReadingBlock.joined(blocks)
+    return ReadingBlock.concatenate(blocks)
 
 
 def _measured_rate(readings: ReadingBlock) -> float | None:

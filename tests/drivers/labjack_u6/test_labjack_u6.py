@@ -53,7 +53,7 @@ def readings(transducer, device, until):
     while device.now() < until:
         blocks.append(transducer.read(0.1))
     transducer.stop()
-    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
 
 
 @pytest.mark.parametrize(
@@ -75,13 +75,13 @@ def test_plain_requests_are_those_another_library_packs():
 
 
 def test_answers_are_read_as_packed_by_hand():
-    wire.check_configured(bytes.fromhex("0B F8 01 11 00 00 00 00"))
+    wire.check_configuration(bytes.fromhex("0B F8 01 11 00 00 00 00"))
     with pytest.raises(DeviceFault, match="a stream is active"):
-        wire.check_configured(bytes.fromhex("3B F8 01 11 30 00 30 00"))
+        wire.check_configuration(bytes.fromhex("3B F8 01 11 30 00 30 00"))
     assert wire.normal_error(bytes.fromhex("A9 A9 00 00"), 0xA9) == 0
     assert wire.normal_error(bytes.fromhex("D9 A9 30 00"), 0xA9) == 48
     with pytest.raises(DeviceFault, match="garbled"):
-        wire.check_configured(b"\xb8\xb8")
+        wire.check_configuration(b"\xb8\xb8")
 
 
 def test_constants_are_signed_numbers_of_32_bits_before_and_behind_the_point():
@@ -117,7 +117,7 @@ def packets(count, seed=5):
     device.command(wire.START)
     found = []
     while len(found) < count:
-        found += filter(None, [device.streamed(0.1)])
+        found += filter(None, [device.stream_packet(0.1)])
     return found
 
 
@@ -266,7 +266,7 @@ def test_another_client_reads_the_same_volts_from_the_simulated_converter():
             device.command(bytes(data))
 
         def read(self, length, stream=False, _modbus=False):
-            data = device.streamed(1.0) if stream else device.answer()
+            data = device.stream_packet(1.0) if stream else device.answer()
             return data if stream else list(data[:length])
 
     client = Client(autoOpen=False)
@@ -283,7 +283,7 @@ def test_another_client_reads_the_same_volts_from_the_simulated_converter():
     )
     client.streamStart()
     client.streamSamplesPerPacket = 24
-    packet = device.streamed(1.0)
+    packet = device.stream_packet(1.0)
     theirs = client.processStreamData(packet, numBytes=62)
     constants = wire.parse_constants(*_memory(device))
     ours = wire.StreamDecoder(constants).feed(packet).raw

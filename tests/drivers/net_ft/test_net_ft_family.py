@@ -38,7 +38,7 @@ def streamed(transducer, seconds):
     while not (blocks and len(blocks[-1]) and blocks[-1].time[-1] > seconds):
         blocks.append(transducer.read(0.1))
     transducer.stop()
-    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
 
 
 def test_an_axia_streams_whole_fractions_of_its_own_converter_rate(served):

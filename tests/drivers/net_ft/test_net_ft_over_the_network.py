@@ -26,7 +26,7 @@ def read_until(transducer, enough):
     while not enough():
         blocks.append(transducer.read(0.05))
     transducer.stop()
-    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
 
 
 def port(uri, name):
@@ -97,7 +97,7 @@ def test_a_rate_that_somebody_changes_on_the_web_page_is_told_in_words_and_times
     assert http_get("127.0.0.1", port(one.uri, "http"), "/comm.cgi?comrdtrate=100", Deadline(3.0)).status == 302
     block = read_until(transducer, lambda: transducer.health.off_rate)
     transducer.close()
-    block = ReadingBlock.joined([before, block])
+    block = ReadingBlock.concatenate([before, block])
     assert transducer.health.rate_words == "it sends at 100 Hz, not at 200 Hz"
     assert (transducer.health.lost, transducer.health.received) == (0, len(block))
     assert set(np.round(np.diff(block.time), 9)) <= {0.005, 0.01, 0.015}

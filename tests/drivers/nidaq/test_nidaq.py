@@ -38,7 +38,7 @@ def readings(transducer, count):
     while sum(map(len, blocks)) < count:
         blocks.append(transducer.read(0.1))
     transducer.stop()
-    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
 
 
 def test_it_says_who_it_is_and_at_which_rate_it_was_set(library, address):
