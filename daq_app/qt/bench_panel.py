@@ -46,7 +46,7 @@ class BenchPanel(Panel):
         self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
         self._choice.setCompleter(None)  # pyright: ignore[reportArgumentType]  what is typed stays what it is
         self.search = button(tr("Search"), tr("search for transducers"), search)
-        self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_chosen)
+        self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_choice)
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
         name = tr("acknowledge overloads: begin to watch anew")
         self.acknowledge = button(tr("Acknowledge A"), name, lambda: send(AcknowledgeOverloads()))
@@ -82,7 +82,7 @@ class BenchPanel(Panel):
         self.tare.setEnabled(view.can_tare)
         self.acknowledge.setEnabled(view.can_acknowledge)
 
-    def connect_chosen(self) -> None:
+    def connect_choice(self) -> None:
         """Connect what is chosen or typed, or disconnect what is connected."""
         view = self._view
         if view is not None and view.connect is not None:
@@ -93,7 +93,7 @@ class BenchPanel(Panel):
 
     def _leave(self, *, connecting: bool = False) -> None:
         if connecting:
-            self.connect_chosen()
+            self.connect_choice()
         self.window().setFocus()
 
     def _chosen_uri(self) -> str:

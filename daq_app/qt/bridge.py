@@ -144,7 +144,7 @@ class Bridge(QObject):
             try:
                 self._take(report)
             except Exception as error:  # noqa: BLE001  what one report cannot be used for must not cost the others
-                self.drawing_failed(error)
+                self.report_drawing_failure(error)
         with suppress(Empty):
             while True:
                 self._fold(message := self._from_threads.get_nowait())
@@ -153,7 +153,7 @@ class Bridge(QObject):
         self._show()
         self.frame.emit()
 
-    def drawing_failed(self, error: Exception) -> None:
+    def report_drawing_failure(self, error: Exception) -> None:
         """Say that a picture could not be drawn; nothing else is touched by it."""
         sentence = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
         if self.state.drawing != sentence:

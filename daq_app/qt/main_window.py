@@ -131,7 +131,7 @@ class MainWindow(QMainWindow):
             "undo": self._undo,
             "new": lambda: self.rooms.over and self.bridge.send(NewSession()),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
-            "connect": self.bench.connect_chosen,
+            "connect": self.bench.connect_choice,
             "acknowledge": lambda: self.bridge.view.bench.can_acknowledge and self.bridge.send(AcknowledgeOverloads()),
             "hold": self.live.bar.hold.click,
             "model": self.live.bar.finite.click,
@@ -211,7 +211,7 @@ class MainWindow(QMainWindow):
         if missing is None:
             self._begin(self.page.form(), bench)
         elif missing.field == "forces" and self.bridge.view.bench.lamp == "off":
-            self.bench.connect_chosen()
+            self.bench.connect_choice()
         else:
             self._form_changed()
             self.page.go_to_missing()
@@ -287,7 +287,7 @@ class MainWindow(QMainWindow):
             self.side.show_force()
             self.live.draw(() if session is None else session.marks, self.bridge.state.now)
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
-            self.bridge.drawing_failed(error)
+            self.bridge.report_drawing_failure(error)
 
     def _fold_bench(self) -> None:
         self._bench_shown = not self.bench.isVisible()

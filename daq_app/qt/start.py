@@ -134,7 +134,7 @@ def open_window(
     def show_error(_kind: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
         """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""
         if isinstance(error, Exception):
-            bridge.drawing_failed(error)
+            bridge.report_drawing_failure(error)
 
     sys.excepthook = show_error
     bridge.begin()

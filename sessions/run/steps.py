@@ -33,18 +33,18 @@ class Zeroed(Struct, frozen=True):
     noise: float = 0.0  # standard deviation of N [N]
 
 
-class _Detected(Struct, frozen=True):
+class _Detection(Struct, frozen=True):
     """The live detector saw something in the readings."""
 
     time: float = 0.0  # [s, device time]
     noticed: float = 0.0  # reading at which it was certain [s, device time]
 
 
-class ContactOnset(_Detected, frozen=True):
+class ContactOnset(_Detection, frozen=True):
     """The live detector saw the finger touch."""
 
 
-class FingerLifted(_Detected, frozen=True):
+class FingerLifted(_Detection, frozen=True):
     """The live detector saw the finger leave."""
 
 
