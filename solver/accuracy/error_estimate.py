@@ -27,7 +27,6 @@ from solver.arrays import Array
 from solver.body import Patches
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
 from solver.equilibrium.finger import Finger
-from solver.equilibrium.load_path import end
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
 from solver.scene import Scene
@@ -89,29 +88,6 @@ class Steps:
     def extrapolate(self, usual: Array) -> Array:
         """Extrapolate numbers (c,) after the usual steps to these."""
         return usual - (1.0 - 1.0 / self.times) * self.excess
-
-
-def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumState | None = None) -> Steps | None:
-    """Return the load steps that a scene needs, judged on one mesh, whose `settled` state may be known.
-
-    None where the state does not depend on its load path. Raises SolveFailure, Cancelled.
-    """
-    if settled is not None and not settled.load.path_dependent:
-        return None
-    ends = [end(scene, finger, 1.0) if settled is None or scene.viscoelastic else settled]
-    usual, *fewer = finger.all_numbers(ends + [end(scene, finger, part) for part in PARTS.tolist()])
-    return Steps.of(usual, np.array(fewer), scene.solve.tolerance)
-
-
-def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
-    """Return how many times the usual steps a load path needs whose end does not depend on them.
-
-    The end of its press decides. Raises as `choose_steps`.
-    """
-    if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.frictionless:
-        return 1
-    steps = choose_steps(scene.press_only(), finger)
-    return 1 if steps is None else steps.times
 
 
 class Errors(NamedTuple):

@@ -1,20 +1,25 @@
-"""Make a prediction of a solved state: numbers with error estimates, skin, history and omitted effects."""
+"""Solutions of scenes, and their predictions: numbers with error estimates, skin, history and omitted effects."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver._kernels.contact_system import tributary
-from solver.accuracy.audits import rounding
+from solver.accuracy import audits
 from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import STATE_NAMES
-from solver.equilibrium import EquilibriumState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, Way
+from solver.failures import SolveFailure
+from solver.mesh import Lines
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
+from solver.progress import Progress
 from solver.scene import Scene
 
 
@@ -84,7 +89,7 @@ def prediction(
         geometry=finger.geometry,
         displacement=solved.displacement,
         history=None if solved.way is None else history(scene, finger, solved.way),
-        warnings=(*warnings(driven, left["left_out"]), *solved.warnings, *rounding(solved.audits)),
+        warnings=(*warnings(driven, left["left_out"]), *solved.warnings, *audits.rounding(solved.audits)),
     )
 
 
@@ -122,3 +127,42 @@ def history(scene: Scene, finger: Finger[Patches], way: Way) -> History:
         slipping=np.array([1.0 - s.sticking if s.touching.any() else 0.0 for s in states]),
         responses=sed_alone(sed[:, 0]) if relaxing else finger.responses(states),
     )
+
+
+Answer = Prediction | SolveFailure
+Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # position, answer, finger, load path
+
+
+class Meshing(ABC):
+    """Solves scenes of one finger on meshes of any fineness, and keeps meshes for reuse."""
+
+    def __init__(self, depth: float, progress: Progress | None) -> None:
+        """Start without meshes. `depth` [mm] is the deepest indentation, an estimate where forces are given."""
+        self.depth, self.progress = depth, progress
+
+    @abstractmethod
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
+        """Return the prediction or the failure of each scene on meshes of a `fineness`.
+
+        Raises SceneError where the finger cannot be meshed, Cancelled where `progress` says so.
+        """
+
+
+def complete_audits(
+    scene: Scene, finger: Finger[Patches], solution: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
+) -> None:
+    """Complete the audits of a state and of its load path; raise SolveFailure where they fail.
+
+    `newton` belongs to the body that stores the energy of the load path. `settled_sed` returns the SED of the state
+    that was solved directly, with which a load path must end.
+    """
+    checks, state, way = solution.audits, solution.state, solution.way
+    audits.refuse_unsound(checks, state.load.depth)
+    audits.refuse_beyond_finger(finger, state, solution.displacement)
+    checks |= audits.force_residuals(scene, float(state.force[1]), float(state.force[0]))
+    if way is None:
+        return
+    relaxing = way.tissue is not None
+    checks |= audits.course_audits(newton, [instant.state for instant in way.instants], relaxing=relaxing)
+    if not relaxing or state.sticking == 0.0:  # stuck and relaxing, the end depends on the way
+        checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(solution.displacement) - 1.0)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver._kernels.contact_system import STEEP
+from solver.accuracy.adaptivity import refine_lines
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
-from solver.accuracy.refinement import refine_lines
 from solver.accuracy.residual_overstress import with_viscosity
 from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
@@ -18,7 +18,9 @@ from solver.mesh import Lines
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction
 from solver.progress import Progress, interruptible, report_progress
-from solver.response.answers import MESHINGS, Answer, Meshing, Watch
+from solver.response.answer import Answer, Meshing, Watch
+from solver.response.finite_answers import FiniteMeshing
+from solver.response.small_answers import SmallMeshing
 from solver.scene import Scene
 
 LIMIT_ACCURACY = 0.03  # relative, of a friction limit
@@ -33,6 +35,7 @@ DEFAULT_FINENESS = {"small": 8.0, "finite": 6.0}  # without a tolerance: error e
 FIRST_FINENESS = 4.0  # with a tolerance: from 3 and from 5 ten surfaces take as long to 1 %
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
 ASSUMED_ERROR = 4.0  # by the tolerance, where nothing is known of the error
+MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
 Rough = Callable[[Prediction], None]  # called with each answer that is to be refined, to be kept if work stops
 
 

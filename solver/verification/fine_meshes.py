@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.arrays import Array
 from solver.continuation.small_states import WIDE, expected_depth, settled_state
 from solver.equilibrium.finger import LinearFinger
@@ -14,6 +13,7 @@ from solver.equilibrium.load_path import end
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
+from solver.response.finite_answers import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.methods import Kinematics

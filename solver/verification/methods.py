@@ -8,7 +8,6 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from solver.accuracy.adaptivity import COARSE, MARGIN
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.continuation.existence import steady
@@ -19,6 +18,7 @@ from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settle
 from solver.equilibrium.load_stepping import sliding_load
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
+from solver.response.finite_answers import COARSE, MARGIN
 from solver.scene import Scene
 from solver.verification.request import clock
 

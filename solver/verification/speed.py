@@ -7,7 +7,7 @@ from statistics import median
 import numpy as np
 
 from solver.failures import SolveFailure
-from solver.response.answers import alike
+from solver.response.finite_answers import alike
 from solver.scene import Scene
 from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
 from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within

@@ -1,8 +1,10 @@
 """The accuracy page: what is measured is told as it is, whatever was met, missed, left out or stopped."""
 
+import ast
 import json
 import re
 import xml.etree.ElementTree as ET
+from pathlib import Path
 from time import perf_counter
 
 import pytest
@@ -13,7 +15,7 @@ from daq_app.child_process import interpreter
 from solver import solve
 from solver.response.solution import DEFAULT_FINENESS
 from solver.verification import estimates, targets
-from solver.verification.costs import Cost, shares
+from solver.verification.costs import PARTS, WHOLE, Cost, shares
 from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth, exponent
 from solver.verification.hard_cases import HardCase
@@ -284,6 +286,19 @@ def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_
     found = shares(type("Profile", (), {"__init__": lambda self: vars(self).update(stats=profile)})())
     assert found["mesh and tables"] == pytest.approx((2 + 4 * 4 / 7) / 7)
     assert found["contact"] == pytest.approx((1 + 4 * 3 / 7) / 7)
+
+
+def test_every_part_of_the_solver_whose_time_is_counted_is_there():
+    solver = Path(__file__).parents[2] / "solver"
+    defined = {
+        ".".join([*file.relative_to(solver).with_suffix("").parts, node.name]).replace(".__init__", "")
+        for file in solver.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef)
+    }
+    places = {".".join(name.split(".")[:n]) for name in defined for n in (1, 2, 3, 4)}
+    assert set(PARTS) - places == set()
+    assert set(WHOLE) - {name.split(".")[-1] for name in defined} == set()
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 from examples import SCENE
 
 from daq_app.cli.main import run
-from solver.accuracy import refinement
+from solver.accuracy import adaptivity
 
 
 def printed(capsys):
@@ -38,7 +38,7 @@ def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_pa
 def test_a_tolerance_that_no_mesh_meets_gives_the_best_answer_its_interval_a_warning_and_exit_code_3(
     tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 2000)
+    monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 2000)
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE + "[solve]\ntolerance = 0.0001\n")
     assert run(["solve", str(scene), "--json"]) == 3

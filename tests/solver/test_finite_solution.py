@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
-from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
-from solver.response import answers
+from solver.response import finite_answers
+from solver.response.finite_answers import Meshes, coarse_solution, refine
 from solver.response.solution import ERROR_UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.verification.methods import FiniteMethod
@@ -161,12 +161,12 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
 def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
     monkeypatch, lost_below, known
 ):
-    nested = answers.solve_nested
+    nested = finite_answers.solve_nested
 
     def lost(scene, top, *more):
         return (None, None) if top.finger.body.dofs < lost_below else nested(scene, top, *more)
 
-    monkeypatch.setattr(answers, "solve_nested", lost)
+    monkeypatch.setattr(finite_answers, "solve_nested", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
     assert (ERROR_UNKNOWN in found.warnings) == (not known)

@@ -7,7 +7,7 @@ import pytest
 from solver import Friction, Loading, Materials, NoSteadyState, NotConverged, Prediction, Scene, Solve, solve
 from solver.mesh import Lines
 from solver.response import solution
-from solver.response.answers import FiniteMeshing
+from solver.response.finite_answers import FiniteMeshing
 
 
 def stiffening(mu, tolerance=None):

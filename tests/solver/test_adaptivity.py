@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
-from solver.accuracy import adaptivity, refinement
-from solver.accuracy.refinement import MOST_UNKNOWNS, NestedGrid, adjoint, refine_lines
+from solver.accuracy import adaptivity
+from solver.accuracy.adaptivity import MOST_UNKNOWNS, NestedGrid, adjoint, refine_lines
 from solver.continuation.small_states import WIDE, settled_state
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
-from solver.response import solution
+from solver.response import finite_answers, solution
 from solver.scene.published import scenes
 
 SLIDES = {
@@ -99,7 +99,7 @@ def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
 
 
 def test_refinement_comes_to_an_end(monkeypatch):
-    monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 4000)
+    monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 4000)
     scene, dofs = scenes()[9], []
     asked = replace(scene, solve=replace(scene.solve, tolerance=1e-4, evidence="quick"))
     tight = solve(asked, rough=lambda rough: dofs.append(rough.dofs))
@@ -108,7 +108,7 @@ def test_refinement_comes_to_an_end(monkeypatch):
     assert dofs[:-1] == sorted(set(dofs))  # the last is the answer, before its evidence
     assert dofs[-1] <= 4000
     # elements so small that none may be divided
-    monkeypatch.setattr(refinement, "FINEST", 1.0)
+    monkeypatch.setattr(adaptivity, "FINEST", 1.0)
     assert (
         refine_lines(tight.geometry, np.full(len(tight.geometry.lines.arcs) - 1 + tight.geometry.lines.rows, 1e9))
         is None
@@ -116,7 +116,7 @@ def test_refinement_comes_to_an_end(monkeypatch):
 
 
 def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monkeypatch):
-    monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 3000)
+    monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 3000)
     asked = Solve("finite", contrast_tolerance=0.0005)
     surfaces = [Scene(friction=Friction(mu), loading=Loading(2.0, "+x"), solve=asked) for mu in (0.2, 0.25, 0.9)]
     rounds = []
@@ -131,7 +131,7 @@ def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monke
 
 def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
     scene = Scene(friction=Friction(3.0, 0.004), loading=Loading(1.0, "+x"), solve=Solve("finite", evidence="quick"))
-    settled, tried = adaptivity.settled_state, []
+    settled, tried = finite_answers.settled_state, []
 
     def none_on_the_first(finger, *more):
         tried.append(finger)
@@ -139,12 +139,12 @@ def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
             raise NotConverged("the last node is neither open nor touching")
         return settled(finger, *more)
 
-    monkeypatch.setattr(adaptivity, "settled_state", none_on_the_first)
-    meshes = adaptivity.Meshes()
-    low = adaptivity.coarse_solution(scene, 1.0, 4.0, meshes)
+    monkeypatch.setattr(finite_answers, "settled_state", none_on_the_first)
+    meshes = finite_answers.Meshes()
+    low = finite_answers.coarse_solution(scene, 1.0, 4.0, meshes)
     tried[:] = [low.finger]
     lines = refine_lines(low.finger.geometry, None)
-    top = adaptivity.solution_on(scene, replace(low.sizing, fineness=lines), low, meshes)
+    top = finite_answers.solution_on(scene, replace(low.sizing, fineness=lines), low, meshes)
     assert len(top.finger.geometry.lines.arcs) == 2 * len(lines.arcs) - 1
     assert top.finger.geometry.lines.rows == lines.rows
 

@@ -1,0 +1,328 @@
+"""Solve scenes at finite strain with error estimates, on finer and finer meshes that start from coarser solutions."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from solver.accuracy import audits
+from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
+from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state
+from solver.arrays import Array
+from solver.continuation.existence import doubts, folded, refuse_far_beyond, sound, steep
+from solver.continuation.finite_states import nearby, roughly, settled_state
+from solver.continuation.small_states import within_reach
+from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
+from solver.equilibrium.finger import FiniteFinger
+from solver.equilibrium.load_path import end, march
+from solver.equilibrium.load_stepping import forces_of, sliding_load
+from solver.equilibrium.relaxation import CondensedRelaxing
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.mesh import Lines
+from solver.mesh.mesher import Sizing
+from solver.prediction import Prediction
+from solver.progress import Progress, check_stop, interruptible, report_progress
+from solver.response.answer import Answer, Meshing, SceneSolution, Watch, complete_audits, prediction
+from solver.scene import Scene
+
+COARSE = (
+    4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again
+)
+OFFSET_FINENESS = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
+NEAR_SLIDE = 0.98  # of the friction limit, from which contact is where it is when the finger slides
+MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
+WIDER = 6.0  # the same where contact was met at the end of that skin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshSolution:
+    """A settled state on the mesh made for it."""
+
+    finger: FiniteFinger
+    sizing: Sizing
+    state: EquilibriumState
+    setup_s: float  # meshes and tables [s]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NestedSolution:
+    """The solutions of one scene on the coarse mesh and on the mesh that counts."""
+
+    coarse: MeshSolution
+    top: MeshSolution
+    steps: Steps | None = None  # those that the course takes, where the state depends on its way
+
+
+class Meshes:
+    """A cache of the meshes of one finger and of coarse solutions, for scenes that are pressed and slide alike."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._fingers: dict[Sizing, FiniteFinger] = {}
+        self._coarse: dict[tuple[Scene, Sizing], MeshSolution | SolveFailure] = {}
+        self._last: MeshSolution | None = None
+
+    def keep(self, fineness: float | Lines) -> None:
+        """Drop all meshes but the coarse one and those of this fineness."""
+        self._fingers = {sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (COARSE, fineness)}
+
+    def finger(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
+        """Return the finger on a mesh. Raises SceneError where it cannot be meshed."""
+        if sizing not in self._fingers:
+            self._fingers[sizing] = FiniteFinger.of(scene, sizing)
+        return self._fingers[sizing]
+
+    def coarse(self, scene: Scene, sizing: Sizing) -> MeshSolution:
+        """Return a scene's solution on a coarse mesh, started from the last solution there. Raises SolveFailure.
+
+        It is the settled state, or the full slip where a given drag is close to the friction limit.
+        """
+        is_new = (scene, sizing) not in self._coarse
+        if is_new:
+            start = perf_counter()
+            finger = self.finger(scene, sizing)
+            setup = perf_counter() - start
+            near = None if self._last is None or self._last.finger is not finger else self._last.state
+            try:
+                self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, near), setup)
+                self._coarse[scene, sizing] = self._last
+            except SolveFailure as failure:
+                self._coarse[scene, sizing] = failure
+        solution = self._coarse[scene, sizing]
+        if isinstance(solution, SolveFailure):
+            raise solution
+        return solution if is_new else replace(solution, setup_s=0.0)
+
+
+def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:
+    """Return the settled state on a coarse mesh, from which solutions on finer meshes start.
+
+    `expected` is the depth [mm], an estimate where forces are given. The friction limit differs a little between
+    meshes, so that for a drag near it the solution is full slip. Where the coarse state is unsound, as near a limit, a
+    mesh of `fineness` is solved directly. Raises NoSteadyState, NotConverged, Cancelled.
+    """
+    depth = expected if scene.normal_force is not None else scene.loading.depth
+    sizing = Sizing(COARSE if isinstance(fineness, Lines) else min(COARSE, fineness), depth, margin=MARGIN)
+    beyond_limit = False
+    try:
+        coarse = meshes.coarse(scene, sizing)
+        if coarse.state.reaches_end:
+            sizing = replace(sizing, margin=WIDER)
+            coarse = meshes.coarse(scene, sizing)
+        if sound(coarse.finger, coarse.state):
+            return coarse
+        beyond_limit = folded(coarse.finger, coarse.state)
+    except NoSteadyState:
+        if scene.normal_force is not None and not scene.loading.dragged:
+            raise  # decided on a mesh of its own, whatever this one is
+    except NotConverged:
+        beyond_limit = True
+    except SolveFailure:
+        pass
+    if beyond_limit and scene.normal_force is None and scene.loading.direction != 0:
+        refuse_far_beyond(scene, sliding_load(scene))
+    sizing = replace(sizing, fineness=fineness)
+    try:
+        return _solve_uniform(scene, sizing, meshes)
+    except NoSteadyState:
+        if not scene.loading.dragged:
+            raise
+        return _solve_uniform(scene.without_drag(), sizing, meshes)
+
+
+def _solve_uniform(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution:
+    start = perf_counter()
+    finger = meshes.finger(scene, sizing)
+    setup = perf_counter() - start
+    state = settled_state(finger, scene)
+    if sizing.margin < WIDER and state.reaches_end:
+        return _solve_uniform(scene, replace(sizing, margin=WIDER), meshes)
+    return MeshSolution(finger, sizing, state, setup)
+
+
+def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
+    """Return the state on the coarse mesh, or full slip where a given drag is close to the friction limit there."""
+    drag = scene.tangential_force
+    if drag is None:
+        return roughly(finger, scene, near)
+    try:
+        slide = roughly(finger, scene.without_drag(), near)
+    except SolveFailure:
+        return march(scene, finger).last  # the drag may be met before sliding would fold the skin
+    return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march(scene, finger).last
+
+
+def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: Meshes) -> NestedSolution:
+    """Return the settled state refined from `coarse`, the scene's coarse solution. Raises as `solution_on`."""
+    steps = choose_steps(scene, coarse.finger, coarse.state)
+    sizing = replace(coarse.sizing, fineness=fineness)
+    top = solution_on(scene, sizing, coarse, meshes, 1 if steps is None else steps.times)
+    if top.sizing.margin < WIDER and top.state.reaches_end:
+        wider = replace(sizing, margin=WIDER)
+        top = solution_on(scene, wider, coarse, meshes, 1 if steps is None else steps.times)
+    return NestedSolution(coarse, top, steps)
+
+
+def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes, times: int = 1) -> MeshSolution:
+    """Return the settled state on a mesh of `sizing`, started from the coarser solution `below`.
+
+    A load path takes so many `times` the usual steps. Under steep friction a mesh may have no state, because its last
+    node can be neither open nor in contact. Then a mesh with nodes at other places is solved. Raises NoSteadyState,
+    NotConverged, Cancelled.
+    """
+    start = _starting_solution(scene, sizing, below, meshes)
+    try:
+        return replace(start, state=settled_state(start.finger, scene, start.state, times))
+    except NotConverged:
+        if not steep(sliding_load(scene)):
+            raise
+    lines = sizing.fineness
+    if isinstance(lines, Lines):
+        offset = lines.divide(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
+    else:
+        offset = OFFSET_FINENESS * lines
+    start = _starting_solution(scene, replace(sizing, fineness=offset), below, meshes)
+    return replace(start, state=settled_state(start.finger, scene, start.state, times))
+
+
+def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
+    """Return a mesh of `sizing` with the solution `below` transferred to it, from which Newton starts."""
+    start = perf_counter()
+    finger = meshes.finger(scene, sizing)
+    if finger is below.finger:
+        return below
+    state = finger.transfer(below.state, below.finger)
+    return MeshSolution(finger, sizing, state, perf_counter() - start)
+
+
+def solve_nested(
+    scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
+) -> tuple[NestedState | None, Steps | None]:
+    """Return the state of a scene on the nested mesh of `top`, None where none exists there, and its load steps.
+
+    `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
+    """
+    start = _starting_solution(scene, replace(top.sizing, halved=True), top, meshes)
+    finger = start.finger
+    try:
+        if top.state.load.path_dependent:
+            if steps is None:  # since it slid on the coarse mesh
+                judged = choose_steps(scene, top.finger, top.state)
+                steps = None if judged is None else replace(judged, times=1)
+            state = end(scene, finger)
+        else:
+            steps = None
+            state = nearby(finger, scene, start.state) or settled_state(finger, scene, start.state)
+    except SolveFailure:
+        return None, steps
+    forces = None if scene.viscoelastic else forces_of(scene, state.load)
+    (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
+    return nested_state(finger, state, values, changes, steps), steps
+
+
+FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
+CORRECTIONS = 4  # of a state, at most
+LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
+
+
+class FiniteMeshing(Meshing):
+    """Finite strain: each scene starts on a coarse mesh and is refined on a mesh made for its contact.
+
+    Scenes that are pressed and move alike share meshes. They are solved by rising friction, each from the one before.
+    """
+
+    def __init__(self, depth: float, progress: Progress | None) -> None:
+        """Start without meshes."""
+        super().__init__(depth, progress)
+        self._meshes: dict[LoadingGroup, Meshes] = {}
+
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
+        """Do as `Meshing` says."""
+        answers: dict[int, Answer] = {}
+        with interruptible(self.progress, lambda: len(answers) / len(scenes)):
+            for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
+                check_stop()
+                start, scene = perf_counter(), scenes[number]
+                report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
+                meshes = self._meshes.setdefault(scene.loading_group, Meshes())
+                meshes.keep(fineness)
+                try:
+                    coarse = coarse_solution(scene, self.depth, fineness, meshes)
+                    answers[number] = _predict(scene, refine(scene, fineness, coarse, meshes), meshes, start)
+                except SolveFailure as failure:
+                    answers[number] = failure
+        return [answers[number] for number in range(len(scenes))]
+
+
+def alike(scene: Scene) -> tuple[LoadingGroup, float]:
+    """Return a key that sorts scenes by how they are pressed, then by friction, so that neighbours are similar."""
+    return scene.loading_group, float(scene.friction.mu)
+
+
+def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float) -> Prediction:
+    """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
+    top, steps = nested.top, nested.steps
+    finger, state, way = top.finger, top.state, None
+    setup = nested.coarse.setup_s + top.setup_s
+    if scene.solve.course == "history":
+        times = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.times
+        for leg in scene.earlier_slides():  # one that never settles is refused with its limits
+            settled_state(finger, leg)
+        way = march(scene, finger, times, relaxing=scene.materials.relax)
+        state = way.last
+    if not state.touching.any():
+        raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
+    within_reach(scene, state.load.depth)
+    newton = finger.newton if way is None else way.newton
+    state, checks = _balance(finger, newton, state)
+    solved = SceneSolution(scene, state, state.u, checks, steps, way)
+    complete_audits(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
+    numbers = finger.all_numbers([state])[0]
+    solved_at = perf_counter()
+    report_progress("estimating errors, on the nested mesh")
+    on_nested, steps = solve_nested(scene, top, steps, meshes)
+    nested_numbers = None if on_nested is None else with_shares(scene, numbers, on_nested, steps)
+    row = finger.row.average(state.u)
+    estimate_s = perf_counter() - solved_at
+    warnings, wall = doubts(finger, state), solved_at - start - setup
+    solved = replace(solved, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
+    return prediction(solved, finger, numbers, row, nested_numbers, estimate_s)
+
+
+def _balance(
+    finger: FiniteFinger, newton: Newton, state: EquilibriumState
+) -> tuple[EquilibriumState, dict[str, float]]:
+    """Return a state and its audits after further Newton steps that bring unbalanced forces down to round-off.
+
+    `newton` is that of the finger, or of its relaxing tissues. Under a light touch, errors of displacements far below a
+    nanometre leave a large part of the forces on nearly incompressible tissue unbalanced.
+    """
+    checks = _audits(finger, newton, state)
+    for _ in range(CORRECTIONS):
+        if audits.imbalance(checks) <= FINITE_IMBALANCE:
+            break
+        x = state.place(newton.condensed)[:, 0]
+        if not newton.linearise(state, state.load, x):
+            break
+        corrected, _, _ = newton.apply_step(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
+        corrected = replace(
+            corrected, state=state.state, sense=state.sense
+        )  # a step of nanometres changes no contact state
+        corrected_checks = _audits(finger, newton, corrected)
+        worse = _contradicting(corrected_checks) > max(_contradicting(checks), FINITE_IMBALANCE)
+        if worse or audits.imbalance(corrected_checks) >= audits.imbalance(checks):
+            break
+        state, checks = corrected, corrected_checks
+    return state, checks
+
+
+def _audits(finger: FiniteFinger, newton: Newton, state: EquilibriumState) -> dict[str, float]:
+    body = newton.condensed
+    over: Array | None = (
+        finger.body.mesh.assemble(body.excess(state.u)) if isinstance(body, CondensedRelaxing) else None
+    )
+    return audits.audits(finger, state, state.u, over)
+
+
+def _contradicting(checks: dict[str, float]) -> float:
+    return max(checks[name] for name in ("penetration", "tension", "cone_violation"))

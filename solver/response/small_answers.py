@@ -1,0 +1,187 @@
+"""Solve scenes of one finger at small strain on a mesh that they share, each with an error estimate.
+
+Settled sliding is solved directly, and refused where it does not exist. A load path is marched step by step, in time
+where tissues relax (`solver.equilibrium.relaxation`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from solver.accuracy import audits
+from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
+from solver.accuracy.error_estimate import Steps, edge_changes, nested_state
+from solver.arrays import Array
+from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, remove_round_off
+from solver.equilibrium import EquilibriumState
+from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium.load_path import end, march
+from solver.equilibrium.load_stepping import forces_of
+from solver.failures import NotConverged, SolveFailure
+from solver.mesh import Lines
+from solver.mesh.mesher import Sizing
+from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
+from solver.progress import Progress, report_part
+from solver.response.answer import Answer, Meshing, SceneSolution, Watch, complete_audits, prediction
+from solver.scene import Scene
+
+SMALL_IMBALANCE = 1e-10  # relative residual of the forces from which a state is refined [-]
+
+YIELDS = (
+    "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
+    "follows it down, this slide would not last; held at this depth, the finger slides under less force."
+)
+
+BEYOND_THE_SKIN = NotConverged(
+    "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
+    "for less friction, drag or depth."
+)
+
+
+class SmallMeshing(Meshing):
+    """Small strain: all scenes share one mesh and its nested mesh."""
+
+    def __init__(self, depth: float, progress: Progress | None) -> None:
+        """Start without meshes."""
+        super().__init__(depth, progress)
+        self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and what each took to make [s]
+
+    def _finger(self, scene: Scene, sizing: Sizing) -> tuple[LinearFinger, float]:
+        if sizing not in self._fingers:
+            start = perf_counter()
+            finger = LinearFinger.of(scene, sizing)
+            self._fingers[sizing] = finger, perf_counter() - start
+        return self._fingers[sizing]
+
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
+        """Do as `Meshing` says; where contact leaves the skin considered, solve all on a mesh with more of it."""
+        self._fingers = {sizing: kept for sizing, kept in self._fingers.items() if sizing.fineness == fineness}
+        most = max(self.depth, min(WIDE * self.depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
+        narrow, wide = (Sizing(fineness, depth, margin=WIDE) for depth in (self.depth, most))
+        try:
+            done = self._on_mesh(scenes, narrow, watch, last=False)
+            return self._on_mesh(scenes, wide, watch, last=True) if len(done) < len(scenes) else done
+        except NotConverged as failure:  # a mesh does not stand for a body
+            return [failure] * len(scenes)
+
+    def _on_mesh(self, scenes: list[Scene], sizing: Sizing, watch: Watch | None, *, last: bool) -> list[Answer]:
+        """Return the answers on one mesh; an empty list where contact leaves the skin that this mesh considers.
+
+        Settled slides are solved by falling friction, since the steepest has the longest contact. On the `last` mesh a
+        scene whose contact leaves that skin gets a failure.
+        """
+        finger, setup_s = self._finger(scenes[0], sizing)
+        answers: dict[int, Answer] = {}
+        # Settled slides take milliseconds and share one estimate; a load path is watched as soon as it is marched.
+        every = range(len(scenes))
+        steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
+        marched = any(scene.solve.course == "history" for scene in scenes)
+        for batch in [[number] for number in every] if marched else [steepest_first]:
+            states: dict[int, SceneSolution] = {}
+            for number in batch:
+                position = len(answers) + len(states)
+                report_part(self.progress, position / len(scenes))
+                try:
+                    solved = self._solve_state(scenes[number], finger, position, len(scenes))
+                except SolveFailure as failure:
+                    answers[number] = failure.in_a_sentence()
+                    continue
+                if solved is not None:
+                    states[number] = replace(solved, setup_s=setup_s - finger.solve_s)
+                elif last:
+                    answers[number] = BEYOND_THE_SKIN
+                else:
+                    return []
+            if states:
+                answers |= zip(states, self._predict(list(states.values()), finger, sizing), strict=True)
+            if watch is not None:
+                for number in batch:
+                    if answers[number] is not BEYOND_THE_SKIN:
+                        watch(number, answers[number], finger, states[number].elastic_way if number in states else None)
+        return [answers[number] for number in every]
+
+    def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
+        """Return the state of one of `count` scenes; None where contact leaves the skin that the mesh considers.
+
+        Where the load path is asked for, an earlier slide that never settles is refused with its limits. Raises
+        SolveFailure.
+        """
+        start = perf_counter()
+        history = scene.solve.course == "history"
+        for leg in scene.earlier_slides() if history else ():
+            direct(leg, finger)
+        steady = direct(scene, finger)
+        try:
+            steps = choose_steps(scene, finger, settled=steady)
+            times = steps_of_press(scene, finger) if steps is None else steps.times
+        except SolveFailure:
+            steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
+        if times > 1 and steps is not None:
+            steady = direct(scene, finger, times)
+        way, state, relaxing = None, steady, history and scene.materials.relax
+        if history:
+            progress = self.progress
+
+            def report(_: str, part: float) -> None:
+                report_part(progress, (position + part) / count)
+
+            way = march(scene, finger, times, relaxing=relaxing, report=report)
+            state = way.last
+            if relaxing:
+                state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
+        displacement = finger.displacement(state)
+        in_tissue(scene, finger, state.load.depth)
+        if finger.reaches_out(state, displacement, state.load.depth):
+            return None
+        directly_refinable = way is None and scene.normal_force is None and not state.load.path_dependent
+        if directly_refinable:  # other states lose their round-off only where audits show it
+            state, displacement = remove_round_off(scene, finger, state, displacement)
+        checks = audits.audits(finger, state, displacement)
+        if not relaxing and audits.imbalance(checks) > SMALL_IMBALANCE:
+            state, displacement = remove_round_off(scene, finger, state, displacement)
+            checks = audits.audits(finger, state, displacement)
+        solved = SceneSolution(scene, state, displacement, checks, steps, way)
+        complete_audits(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
+        warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
+        return replace(solved, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
+
+    def _predict(self, solved: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
+        """Return the prediction of each state with its error estimate; the numbers of all are computed together."""
+        start = perf_counter()
+        numbers = finger.all_numbers([one.state for one in solved])
+        displacements = np.stack([one.displacement for one in solved], axis=2)
+        numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
+        numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
+        rows = finger.row.average(displacements)
+        nested = nested_numbers_of_all(self._finger(solved[0].scene, replace(sizing, halved=True))[0], solved, numbers)
+        estimate_s = (perf_counter() - start) / len(solved)
+        return [
+            prediction(one, finger, numbers[number], rows[:, number], nested[number], estimate_s)
+            for number, one in enumerate(solved)
+        ]
+
+
+def nested_numbers_of_all(
+    mesh: LinearFinger, solved: Sequence[SceneSolution], numbers: Array
+) -> list[NestedNumbers | None]:
+    """Return the numbers of solved scenes on the nested `mesh`, None for a scene without a state there.
+
+    `numbers` (c, COUNT) are those on the mesh of the answers.
+    """
+    states: dict[int, EquilibriumState] = {}
+    for number, one in enumerate(solved):
+        try:
+            states[number] = nearest(one.scene, mesh) if one.steps is None else end(one.scene, mesh)
+        except SolveFailure:
+            continue
+    out: list[NestedNumbers | None] = [None] * len(solved)
+    if states:
+        forced = [(state, forces_of(solved[number].scene, state.load)) for number, state in states.items()]
+        values, changes = edge_changes(mesh.newton, forced, mesh.numbers_and_row)
+        for (number, state), value, change in zip(states.items(), values, changes, strict=True):
+            one = solved[number]
+            there = nested_state(mesh, state, value, change, one.steps)
+            out[number] = None if there is None else with_shares(one.scene, numbers[number], there, one.steps)
+    return out
