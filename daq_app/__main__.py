@@ -2,17 +2,23 @@
 
 import gc
 import os
+import signal
 import sys
-
-from daq_app.child_process import keep_current_folder_out, use_one_thread
 
 
 def main() -> None:
     """Run the command line, or without one open the window, and leave with the exit code."""
+    answered = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if answered:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # until there is somebody to answer Ctrl-C with a sentence
+    from daq_app.child_process import keep_current_folder_out, use_one_thread
+
     keep_current_folder_out()
     use_one_thread()
     from daq_app.cli.main import run
 
+    if answered:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     first = sys.argv[1] if len(sys.argv) > 1 else "window"
     if first == "window" or first.startswith("--subject-"):
         from daq_app.qt.start import window  # the command line runs where Qt is not installed

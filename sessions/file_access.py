@@ -9,7 +9,7 @@ import re
 import shutil
 import sqlite3
 from collections.abc import Generator, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn, TypeVar, cast
 
@@ -25,6 +25,9 @@ MOST_PACKED = 300  # how many times a packed table may grow [-]: readings grow t
 DATABASE_FAILURES = (sqlite3.Error, UnicodeDecodeError, OSError)
 
 _DAMAGED = "restore it from a copy"
+_OF_NEW = dict.fromkeys((errno.ENOENT, errno.EISDIR, errno.ENOTDIR, errno.EEXIST), "check its name") | {
+    errno.EFBIG: "raise the limit of the size of files"
+}
 _OTHER = "check its name, its disk and who may use it"
 _REMEDIES: tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...] = (  # for what the system and SQLite tell
     ("free space on the disk", (errno.ENOSPC, errno.EDQUOT), (sqlite3.SQLITE_FULL,)),
@@ -35,7 +38,7 @@ _REMEDIES: tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...] = (  # for w
     ),
     ("check the disk and its cable", (errno.EIO,), (sqlite3.SQLITE_IOERR,)),
     ("end the program that uses it", (errno.EBUSY,), (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)),
-    ("give the file that was meant", (errno.EFBIG,), ()),
+    ("give the file that was meant", (errno.EFBIG, errno.EISDIR, errno.ENOTDIR, errno.EEXIST), ()),
     ("restore it from a copy, or give another name", (errno.ENOENT,), ()),
     (_OTHER, (), (sqlite3.SQLITE_CANTOPEN,)),
 )
@@ -80,8 +83,8 @@ def _text(content: bytes) -> str:
     return content.decode(errors="surrogateescape")
 
 
-def remedy(error: Exception) -> str:
-    """Say what mends a file that could not be read or written.
+def remedy(error: Exception, *, new: bool = False) -> str:
+    """Say what mends a file that could not be read or written, or a `new` one that could not be made.
 
     >>> remedy(OSError(errno.EIO, "")), remedy(PermissionError(errno.EACCES, ""))
     ('check the disk and its cable', 'permit reading and writing there')
@@ -92,7 +95,7 @@ def remedy(error: Exception) -> str:
     number: int | None = getattr(error, "errno", None)
     if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
         number = int(match.group(1))
-    return _BY_ERRNO.get(number or 0, _OTHER)
+    return (_BY_ERRNO | _OF_NEW if new else _BY_ERRNO).get(number or 0, _OTHER)
 
 
 @contextmanager
@@ -123,8 +126,10 @@ def write_whole(path: Path, content: bytes) -> None:
         with open_new(new) as file:
             file.write(content)
         put_in_place(new, path)
-    except OSError:  # a full disk, on which a part of the file would only take room
-        new.unlink(missing_ok=True)
+    except OSError as error:  # a full disk, on which a part of the file would only take room
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
+        error.filename, error.filename2 = str(path), None  # people know no other name of it
         raise
 
 
@@ -146,6 +151,18 @@ def whole_folder(folder: Path) -> Generator[Path]:
         part.replace(folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def whole_or_nothing(folder: Path) -> Generator[None]:
+    """Remove a new folder again where what is done inside fails: all that it holds stands elsewhere too."""
+    new = not holds_something(folder)
+    try:
+        yield
+    except BaseException:
+        if new:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def put_in_place(new: Path, path: Path) -> None:

@@ -19,7 +19,7 @@ from typing import Any, cast
 
 from daq_app.child_process import process_pool
 from daq_app.console import Console
-from sessions.file_access import as_type, write_whole
+from sessions.file_access import as_type, remedy, write_whole
 from sessions.prediction.sealed_predictions import SEAL
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import GAIN_ERROR, UNBLINDING
@@ -233,8 +233,8 @@ class Shelf:
             self._folder.mkdir(parents=True, exist_ok=True)
             write_whole(self.file(key), text.encode() + b"\n")
         except OSError as error:
-            why = f"{self._folder} cannot be written ({error.strerror}): make room on its disk"
-            raise RecordingError(f"{why} and run this again: what is done is kept") from error
+            why = f"{self._folder} cannot be written ({error.strerror}): {remedy(error, new=True)}"
+            raise RecordingError(f"{why}, and run this again: what is done is kept") from error
 
 
 def _digest(result: Mapping[str, Any]) -> str:

@@ -154,9 +154,11 @@ def _failure(error: Exception) -> tuple[str, int]:
     if isinstance(error, _exceptions(_FAILED)):
         return sentence, FAILED
     if isinstance(error, OSError):
+        from sessions.file_access import remedy  # here: a verb that is well needs none
+
         if error.filename is None or error.strerror is None:
             return sentence, FAILED
-        return f"{error.filename}: {error.strerror.lower()}", FAILED
+        return f"{error.filename}: {error.strerror.lower()}; {remedy(error, new=True)}", FAILED
     if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in _OUR_OWN:
         package = error.name.partition(".")[0]
         return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED

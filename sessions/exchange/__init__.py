@@ -50,7 +50,7 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress | N
             importlib.import_module(FORMATS[name]).write(source, part, progress or _unseen)
     except OSError as error:
         raise ExportError(
-            f"{folder} cannot be written ({error.strerror or error}); {remedy(error)}, or give another"
+            f"{folder} cannot be written ({error.strerror or error}); {remedy(error, new=True)}, or give another"
         ) from error
     return folder
 

@@ -70,7 +70,7 @@ def content_of(path: Path) -> bytes:
     try:
         return read_within_limit(path, LARGEST_TABLE)
     except OSError as error:
-        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
+        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:

@@ -5,6 +5,7 @@ import errno
 import importlib
 import zlib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,7 +15,7 @@ from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS
 from sessions.exchange.csv_text import ImportRefused
-from sessions.file_access import as_type, holds_something, remedy, whole_folder, write_whole
+from sessions.file_access import as_type, holds_something, name_failure, remedy, whole_folder, write_whole
 from sessions.plan.plan import SessionPlan
 from sessions.recording.derived import GAIN_ERROR, bytes_of
 from sessions.recording.head import info_from_dict, software_versions
@@ -145,6 +146,8 @@ def read_export(path: Path) -> ExportedSession | None:
     """Return the session in an export of ours; None for anything else, such as a CSV file. Raises ImportRefused."""
     if (path / LIVE_FILE).exists():
         raise ImportRefused(f"{path} is a session folder already: every verb takes it as it is")
+    if path.name == LIVE_FILE:
+        raise ImportRefused(f"{path} is the live file of a session: every verb takes its folder, {path.parent}")
     for module in map(importlib.import_module, FORMATS.values()):
         file = module.find(path) if hasattr(module, "find") else None
         if file is not None:
@@ -166,7 +169,9 @@ def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
     if holds_something(folder):
         raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
     try:
-        with whole_folder(folder) as part:
+        with ExitStack() as stack:
+            with name_failure(RecordingError, f"{folder} cannot be made"):
+                part = stack.enter_context(whole_folder(folder))
             differences = restore(source, part)
     except _DAMAGED as error:
         raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error

@@ -22,6 +22,7 @@ import numpy as np
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, event_columns, tables
 from sessions.recording import Recording
+from sessions.recording.hdf5_file import new_hdf5
 from sessions.recording.head import json_text
 from sessions.recording.manifest import description
 
@@ -88,7 +89,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         for table in numbers:
             module.add(table)
     progress(0.5)
-    with pynwb.NWBHDF5IO(folder / FILE, "w") as io:
+    with new_hdf5(folder / FILE) as hdf5, pynwb.NWBHDF5IO(file=hdf5, mode="w") as io:
         io.write(file)
     progress(1.0)
 

@@ -10,7 +10,7 @@ import json
 import secrets
 import sqlite3
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import count
@@ -210,9 +210,12 @@ def is_study(folder: Path) -> bool:
     return (folder / STUDY_FILE).is_file()
 
 
-def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool) -> Study:
-    """Make the folder of a new study, whose protocol is fixed from now on. Raises StudyError, SettingsError."""
-    protocol = from_toml(protocol_text, Protocol, "the protocol")
+def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, where: str = "the protocol") -> Study:
+    """Make the folder of a new study, whose protocol is fixed from now on. Raises StudyError, SettingsError.
+
+    `where` names the file of the protocol in a sentence on what is wrong with it.
+    """
+    protocol = from_toml(protocol_text, Protocol, where)
     check_code("the name of the study's folder", folder.name)
     if is_study(folder):
         raise StudyError(f"{folder} is a study already, and its protocol is fixed: enrol without --protocol")
@@ -227,14 +230,24 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool) 
         "seed": str(seed),
         "key_sha256": "" if key is None else key.sha256,
     }
-    with _changing(folder) as connection:
-        for table in TABLES:
-            connection.execute(table)
-        connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
-        if key is not None:  # before the study counts as made: without its key it would be lost
-            document = {"what": "which stimulus bears which code; 'daq-app unblind' opens it", "sealed": key.seal()}
-            write_whole(folder / KEY_FILE, json.dumps(document, indent=1).encode() + b"\n")
-        _tell(connection, "created", "", {"protocol": protocol.name, "blinded": blinded})
+    try:
+        with _changing(folder) as connection:
+            for table in TABLES:
+                connection.execute(table)
+            connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
+            if key is not None:  # before the study counts as made: without its key it would be lost
+                document = {
+                    "what": "which stimulus bears which code; 'daq-app unblind' opens it",
+                    "sealed": key.seal(),
+                }
+                write_whole(folder / KEY_FILE, json.dumps(document, indent=1).encode() + b"\n")
+            _tell(connection, "created", "", {"protocol": protocol.name, "blinded": blinded})
+    except BaseException:  # half a study would stand in the way of the next try
+        for name in (STUDY_FILE, KEY_FILE):
+            (folder / name).unlink(missing_ok=True)
+        with suppress(OSError):  # where something else lies in it
+            folder.rmdir()
+        raise
     return open_study(folder)
 
 

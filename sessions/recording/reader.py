@@ -62,9 +62,12 @@ class Recording:
         """
         path = folder / schema.LIVE_FILE
         if not path.is_file():
-            raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; give a session folder")
+            what = f"give a session folder{_copy_of(folder)}"
+            if folder.is_file() and (folder.parent / schema.LIVE_FILE).is_file():
+                what = f"give the folder that it lies in, {folder.parent}"
+            raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; {what}")
         losses: list[str] = []
-        with name_failure(RecordingError, f"{path} cannot be read", failures=DATABASE_FAILURES):
+        with name_failure(RecordingError, f"{path} cannot be read", _copy_of(folder), DATABASE_FAILURES):
             losses += torn_log(path)
             with _connect(path) as connection:
                 head = _head(path, connection)
@@ -77,7 +80,8 @@ class Recording:
             info = info_from_dict(head["transducer"]) if head["transducer"] else None
             as_type(head["provenance"], Provenance)
         except (ValueError, KeyError, TypeError) as error:
-            raise RecordingError(f"{path}: its head is damaged ({error}); restore it from a copy") from error
+            what = f"its head is damaged ({error}); restore it from a copy{_copy_of(folder)}"
+            raise RecordingError(f"{path}: {what}") from error
         simulated = None if head["simulated"] == "no" else head["simulated"]
         trials = trial_records(plan, events)
         return Recording(folder, plan, info, simulated, head["provenance"], events, trials, head, tuple(losses))
@@ -206,6 +210,12 @@ class Recording:
                 yield from _blocks(connection, damaged, between)
         except DATABASE_FAILURES as error:
             damaged.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
+
+
+def _copy_of(folder: Path) -> str:
+    """Return where else all of a session is, for a sentence on its live file; empty where it was not sealed."""
+    copy = folder / schema.SEALED_FILE
+    return f", or make it again of its sealed copy: 'daq-app import {copy}'" if copy.is_file() else ""
 
 
 def _end(events: Iterable[LoggedEvent]) -> Mapping[str, Any] | None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from sessions.file_access import sync_folder
+from sessions.file_access import remedy, sync_folder
 from sessions.recording.log import LoggedEvent
 from sessions.recording.schema import LIVE_FILE, RecordingError, event_row
 
@@ -195,6 +195,11 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
                 connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
             connection.execute("PRAGMA journal_mode=DELETE")
     except sqlite3.Error as error:
+        if error.sqlite_errorcode & 0xFF not in (
+            sqlite3.SQLITE_BUSY,
+            sqlite3.SQLITE_LOCKED,
+        ):  # the low byte is the kind
+            raise RecordingError(f"{live} cannot take its log in ({error}); {remedy(error)}") from error
         raise RecordingError(
             f"{live} is in use ({error}); end the program that still writes it, or reads it"
         ) from error

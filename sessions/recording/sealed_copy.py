@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from sessions.recording.hdf5_file import new_hdf5
 from sessions.recording.head import calibration_hash
 from sessions.recording.log import OUTCOMES
 from sessions.recording.reader import Recording
@@ -94,7 +95,7 @@ def write_copy(
 ) -> None:
     """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
     expected = recording.expected_readings or 1
-    with h5py.File(path, "x", libver=LIBVER) as file:
+    with new_hdf5(path, libver=LIBVER) as file:
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
         file.attrs["format"] = _attribute(FORMAT)

@@ -94,8 +94,11 @@ class SessionWriter:
             path.touch(exist_ok=False)
         except OSError as error:
             release_reserve(folder)
+            with suppress(OSError):  # where something lies in it
+                folder.rmdir()
             raise RecordingError(
-                f"{folder} cannot hold a recording ({error.strerror}); {remedy(error)}, or give another folder"
+                f"{folder} cannot hold a recording ({error.strerror}); "
+                f"{remedy(error, new=True)}, or give another folder"
             ) from error
         connection = sqlite3.connect(path, isolation_level=None)
         try:

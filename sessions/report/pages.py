@@ -1,7 +1,9 @@
 """The pages of a session and of a study, each self-contained, with figures and trials as files of their own."""
 
 import base64
+import errno
 import io
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
@@ -86,7 +88,8 @@ def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = 
 
 
 def check_replaceable(path: Path) -> None:
-    """Raise ReportError where `path` holds something other than a page of ours, which a new page would replace."""
+    """Raise ReportError where a page would replace something that is none of ours, or has no place."""
+    make_place(path.parent)
     if not path.exists():
         return
     try:
@@ -159,13 +162,24 @@ def panel_csv(panel: Panel, head: str) -> str:
     return (f"# {head}\n" if head else "") + _csv([panel.header, *panel.rows])
 
 
+def make_place(folder: Path) -> None:
+    """Make a folder where there is none. Raises ReportError, also where nothing can be written into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        why = f"{folder} cannot be written into ({error.strerror}): {remedy(error, new=True)}, or choose another folder"
+        raise ReportError(why) from error
+
+
 def swap_in(path: Path, text: str) -> None:
     """Replace the file at `path` in one step. Raises ReportError."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_place(path.parent)
         write_whole(path, text.encode())
     except OSError as error:
-        why = f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"
+        why = f"{path} cannot be written ({error.strerror}): {remedy(error, new=True)}, or choose another folder"
         raise ReportError(why) from error
 
 

@@ -1,4 +1,8 @@
 import importlib
+import os
+import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -94,3 +98,23 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
 def test_every_failure_the_command_line_tells_of_exists_where_it_is_looked_for(name):
     module, kind = name.rsplit(".", 1)
     assert issubclass(getattr(importlib.import_module(module), kind), Exception)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no process dies of a signal there")
+def test_ctrl_c_before_the_command_line_is_loaded_ends_the_program_without_a_traceback():
+    code = """
+import os, signal, sys
+from daq_app.__main__ import main
+
+class Stop:
+    def find_spec(self, name, *_):
+        if name == "daq_app.cli.main":
+            os.kill(os.getpid(), signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start what runs in the background without one
+sys.meta_path.insert(0, Stop())
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code, "solve"], capture_output=True, timeout=60, check=False)
+    assert done.returncode == -signal.SIGINT  # which shells tell as 130
+    assert done.stderr == b""

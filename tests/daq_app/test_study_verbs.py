@@ -94,6 +94,7 @@ def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
         (["enrol", "nowhere", "--subject", "P01", "--blind"], 2, "give --protocol"),
         (["unblind", "nowhere", "--by", "Jane Doe"], 2, "never a name"),
         (["unblind", "nowhere", "--by", "E01"], 1, "holds no recording"),
+        (["study", "--depths", "1.5"], 2, "give --power too"),
     ],
 )
 def test_what_is_wrong_with_a_command_about_studies_is_said_in_a_sentence(words, code, named, capsys):

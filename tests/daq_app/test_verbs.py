@@ -1,7 +1,10 @@
 """Verbs that record, check and carry a session, as met at a command line: what they print, files, exit codes."""
 
+import errno
 import hashlib
 import json
+import os
+import re
 import shutil
 import sqlite3
 import stat
@@ -9,10 +12,12 @@ import zlib
 from contextlib import closing
 from dataclasses import fields
 
+import numpy as np
 import pytest
 from examples import short_protocol
 
 from daq_app.cli.main import run
+from sessions.recording import Recording, archive
 from sessions.recording.schema import COLUMNS
 from sessions.strokes import forces
 from sessions.strokes.settings import FilterSettings
@@ -213,6 +218,56 @@ def test_a_csv_that_cannot_be_taken_is_one_sentence_and_leaves_no_folder(text, c
     assert named in said
     assert said.count("\n") == 1
     assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("damage", [lambda live: live.unlink(), lambda live: os.truncate(live, 5000)])
+def test_a_live_file_that_is_gone_or_torn_is_made_again_of_the_sealed_copy_as_the_sentence_says(
+    session, tmp_path, capsys, damage
+):
+    readings = Recording.open(session).readings()
+    (session / "session.sqlite").chmod(0o644)
+    damage(session / "session.sqlite")
+    assert run(["analyse", str(session)]) == 1
+    command = re.search(r"'daq-app (import [^']*session[.]h5)'", capsys.readouterr().err)
+    assert run([*command.group(1).split(), "--out", str(tmp_path / "again")]) == 0
+    again = Recording.open(tmp_path / "again").readings()
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(again, name), getattr(readings, name))
+
+
+def test_an_import_that_cannot_be_sealed_leaves_no_folder(session, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(archive, "write_copy", full)
+    csv = tmp_path / "strokes.csv"
+    csv.write_text("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,3,4,5,6\n")
+    for source in (session / "session.h5", csv):
+        assert run(["import", str(source), "--out", str(tmp_path / "again")]) == 1
+        assert "free space on the disk" in capsys.readouterr().err
+        assert not (tmp_path / "again").exists()
+
+
+def test_a_report_takes_no_scores_twice(session, tmp_path, capsys):
+    words = ["report", str(session), "-o", str(tmp_path / "page.html"), "--scores", str(session)]
+    assert run(words) == 2
+    assert "in the report already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["-o", "taken/page.html"], ["--figures", "taken"]])
+def test_a_report_that_has_no_place_is_refused_before_it_is_made(session, tmp_path, capsys, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("a file")
+    assert run(["report", str(session), *words]) == 1
+    assert "taken cannot be written into" in capsys.readouterr().err
+    assert not (session / "prediction.json").exists()
+
+
+def test_a_demonstration_is_written_over_nothing(tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("mine")
+    assert run(["demo", "--out", str(tmp_path)]) == 1
+    assert "is not empty" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
 @pytest.mark.parametrize("verb", ["analyse", "predict", "report", "study"])

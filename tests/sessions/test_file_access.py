@@ -27,6 +27,14 @@ def test_a_failing_disk_a_denied_permission_and_a_full_disk_have_each_their_own_
     )
 
 
+def test_a_new_file_in_a_folder_that_is_not_there_is_named_as_it_was_asked_for_and_nothing_is_to_be_restored(tmp_path):
+    with pytest.raises(FileNotFoundError) as failed:
+        write_whole(tmp_path / "none" / "labels.txt", b"K1")
+    assert failed.value.filename == str(tmp_path / "none" / "labels.txt")
+    assert remedy(failed.value, new=True) == "check its name"
+    assert "copy" in remedy(failed.value)
+
+
 @pytest.mark.parametrize(
     ("code", "advice"),
     [

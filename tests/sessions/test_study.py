@@ -1,5 +1,6 @@
 """Enrolment, blinding and visits of a study."""
 
+import errno
 import json
 import multiprocessing
 import shutil
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stand_ins import Hands, SimulatedClock
 
+from sessions.plan import study
 from sessions.plan.plan import Blinded, Finger
 from sessions.plan.protocols import Body, design_rows, plan
 from sessions.plan.protocols.protocol import FOLDER
@@ -132,6 +134,18 @@ def test_a_study_keeps_the_protocol_it_was_made_with(folder):
     assert design_rows(open_study(folder).protocol) == 10
     with pytest.raises(StudyError, match="a study already"):
         create_study(folder, TEXT, 1, blinded=False)
+
+
+def test_a_study_that_could_not_be_made_is_none(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(study, "write_whole", full)  # of the sealed key
+        with pytest.raises(OSError, match="No space"):
+            create_study(tmp_path / "friction", TEXT, 1, blinded=True)
+    assert not (tmp_path / "friction").exists()
+    create_study(tmp_path / "friction", TEXT, 1, blinded=True)
 
 
 @pytest.mark.parametrize(

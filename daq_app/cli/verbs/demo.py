@@ -16,8 +16,9 @@ from daq_app.cli.options import add_flag, add_seed
 from daq_app.console import DONE, FLAWED, Console, number, table
 from daq_app.simulation.synthetic import Study, StudyCutShort, simulated_study
 from drivers.clock import LONGEST_STEP, clock_at
+from sessions.file_access import holds_something
 from sessions.prediction import PredictionOptions, SessionPrediction
-from sessions.recording import Recording
+from sessions.recording import Recording, RecordingError
 from sessions.statistics.scores import mean_scores
 from sessions.strokes import Analysis
 
@@ -34,6 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     began = time.monotonic()
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    if holds_something(out):
+        raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
     clock = clock_at(1.0 if options.real_time else PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:

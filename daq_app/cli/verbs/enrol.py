@@ -49,9 +49,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _refuse_mixtures(options)
     body = body_of(options)
     if options.protocol is not None:
-        text = text_of(protocol_file(options.protocol))
+        file = protocol_file(options.protocol)
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed
-        create_study(folder, text, seed, blinded=options.blind)
+        create_study(folder, text_of(file), seed, blinded=options.blind, where=str(file))
     member = None
     if options.withdraw is not None:
         member = withdraw(folder, options.subject, options.withdraw)

@@ -44,14 +44,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _restore_export(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
     """Make a session of an export of ours again."""
     from sessions.exchange.exported import import_session
+    from sessions.file_access import whole_or_nothing
     from sessions.recording.archive import seal
 
     stated = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
     if stated:
         raise WrongValue(f"--{stated[0]} says nothing of an export, which holds all that is known: leave it out")
     folder = options.out or Path("recordings") / options.file.stem
-    imported = import_session(session, folder)
-    seal(folder)
+    with whole_or_nothing(folder):
+        imported = import_session(session, folder)
+        seal(folder)
     console.result({"session": str(folder), "format": session.form, **asdict(imported)})
     outcome = "with the above" if imported.differences else "as they were"
     console.say(*imported.differences, f"{folder}: {imported.readings} readings, {imported.events} events, {outcome}")
@@ -61,6 +63,7 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
 def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     """Import a CSV file of somebody else's."""
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
+    from sessions.file_access import whole_or_nothing
     from sessions.recording.archive import seal
     from sessions.recording.manifest import list_in_manifest
 
@@ -77,9 +80,10 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
         subject=options.subject or "unknown",
     )
     folder = options.out or Path("recordings") / options.file.stem
-    imported = import_csv(options.file, folder, stated)
-    seal(imported.folder)
-    list_in_manifest(imported.folder, (ORIGINAL_FILE,))
+    with whole_or_nothing(folder):
+        imported = import_csv(options.file, folder, stated)
+        seal(imported.folder)
+        list_in_manifest(imported.folder, (ORIGINAL_FILE,))
     console.result({"session": str(imported.folder), **{k: v for k, v in asdict(imported).items() if k != "folder"}})
     console.say(
         f"{imported.folder}: {imported.readings} readings at {number(imported.rate, 4)} a second",

@@ -106,7 +106,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(
         table(rows, head=[*head, "model N [N]", "measured [N]", "match [mm]"])
         if rows
-        else "nothing to predict: no forces were recorded"
+        else f"nothing to predict: no {'forces were recorded' if recording.info is None else 'stroke was found'}"
     )
     _print_variants(prediction, console)
     if choices.intervals:

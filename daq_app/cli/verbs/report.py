@@ -18,7 +18,7 @@ from daq_app.cli.options import (
     area_law,
     calibration_error,
 )
-from daq_app.console import DONE, FLAWED, Console
+from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.plan.plan import Blinded
 from sessions.plan.study import is_study
 from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
@@ -60,6 +60,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     score_only = [reveal(Recording.open(folder)) for folder in options.scores]
     if is_study(options.session):
         score_only += score_visits(options.session, besides=recording)
+    folders = [one.folder.resolve() for one in (recording, *score_only)]
+    if twice := next((folder for at, folder in enumerate(folders) if folder in folders[:at]), None):
+        raise WrongValue(f"--scores {twice} is not allowed: its scores are in the report already")
     for one in (recording, *score_only):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
@@ -67,6 +70,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     if options.out is not None:
         pages.check_replaceable(options.out)
+    if options.figures is not None:
+        pages.make_place(options.figures)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):

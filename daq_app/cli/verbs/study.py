@@ -193,6 +193,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Pool the study, write page, table and numbers, and print what it says in short; or print the power of designs."""
     if options.power is not None:
         return print_power(options, console)
+    if options.depths is not None:
+        raise WrongValue("--depths are those of simulated studies: give --power too")
     folder, out = _places(options, console)
     sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
     if not sessions:

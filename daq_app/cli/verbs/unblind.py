@@ -31,9 +31,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     whole = is_study(path)
     folder = path if whole else options.study or path.resolve().parent
     sessions = sessions_of(path) if whole else (Recording.open(path),)
-    key = study_key(folder)
+    key = study_key(folder) if whole or sessions[0].plan.blinded else None
     if key is None:
-        raise StudyError(f"{folder} is not blinded: there is nothing to open")
+        raise StudyError(f"{path} is not blinded: there is nothing to open")
     chosen, refused = _select(sessions, key)
     if not whole and refused:
         raise RecordingError(refused[0])
