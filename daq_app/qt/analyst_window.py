@@ -289,8 +289,11 @@ class TrialsColumn(QWidget):
         self.points: Any = pg.ScatterPlotItem()
         self.points.sigClicked.connect(self._point_clicked)
         self.relation.addItem(self.points)
+        self.none = label(tr("No trial has both a score and an answer of the model."), wrap=True)
+        self.none.setAlignment(Qt.AlignmentFlag.AlignTop)
         head, below = label(tr("Trials"), "section"), label(tr("At the plan's depth, against the score"), "section")
-        vbox(head, (self.list, 3), below, self.responses, self.errors, (self.relation, 2), on=self)
+        plot = (self.relation, 2), (self.none, 2)
+        vbox(head, (self.list, 3), below, self.responses, self.errors, *plot, on=self)
 
     def show_state(self, state: AnalystState) -> None:
         listed = tuple(words_of(row) for row in rows(state))
@@ -312,8 +315,10 @@ class TrialsColumn(QWidget):
         self.errors.show_text(greatest_errors(state.report, state.response))
         marks = {True: {"size": 18, "symbol": "s"}, False: {"size": 11, "symbol": "o"}}
         alike = {"brush": MODEL, "pen": pg.mkPen(QColor(self._tokens.text))}
-        shown = ({"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state))
+        shown = [{"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state)]
         self.points.setData([spot | alike for spot in shown])
+        self.relation.setVisible(bool(shown))
+        self.none.setVisible(not shown)
 
     def _choose(self, row: int) -> None:
         if row >= 0:

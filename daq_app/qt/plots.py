@@ -82,6 +82,11 @@ class ZoomedPlot(pg.PlotWidget):
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
         axis.setHeight(round(above + axis.label.boundingRect().height()))
 
+    def show_numbers(self, *, shown: bool) -> None:
+        """Show the numbers along both axes, or none: a plot of nothing has no scale."""
+        for side in ("left", "bottom"):
+            self.getPlotItem().getAxis(side).setStyle(showValues=shown)
+
     def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
         """Name curves, each beside a piece of its line; `corner` is where, from 0, 0 at the top left to 1, 1."""
         if self._names is not None:
@@ -177,6 +182,7 @@ class FieldPlot(QWidget):
             self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
         self._here.setVisible(source != LINE)
         self.plot.name_across(f"{axis}<br>{words}" if len(place) else words)
+        self.plot.show_numbers(shown=len(place) > 0)
         self.plot.setAccessibleName(f"{axis}: {words}")
         self._unit = "kPa" if source == RECEPTORS else field.unit.removesuffix("-")
 

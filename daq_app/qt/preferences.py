@@ -3,6 +3,7 @@
 import json
 import os
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize, Qt
@@ -43,8 +44,14 @@ def chosen_tokens() -> Tokens:
     return {"light": LIGHT, "dark": DARK}.get(theme()) or current_tokens()
 
 
+@cache
 def type_scale() -> float:
-    """Return how much larger than usual the type is [-]: as it was chosen, or as the system asks for."""
+    """Return how much larger than usual the type of this run is [-]: a choice holds from the next start on."""
+    return chosen_scale()
+
+
+def chosen_scale() -> float:
+    """Return how much larger than usual type is to be [-]: as it was chosen, or as the system asks for."""
     try:
         chosen = float(str(settings().value(SCALE)))
     except ValueError:

@@ -111,7 +111,7 @@ class Menus:
         themes = {name: name for name in preferences.THEMES}
         self._choices(view.addMenu(tr("Theme")), preferences.THEME, themes, preferences.theme())
         sizes = {f"{100 * scale:.0f} %": scale for scale in preferences.SCALES}
-        self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.type_scale())
+        self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.chosen_scale())
         codes = {name_of(code): code for code in languages(EXPERIMENTER)}
         menu, language = view.addMenu(tr("Language")), preferences.language()
         self.languages = self._choices(menu, preferences.LANGUAGE, codes, language)

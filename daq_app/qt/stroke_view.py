@@ -148,6 +148,9 @@ class StrokeView(QWidget):
         values = ((), (), ()) if trace is None else (trace.normal, trace.tangential, trace.mu)
         self._time = np.array(() if trace is None else trace.time, np.float64)
         self._columns = [np.array([np.nan if v is None else v for v in column], np.float64) for column in values]
+        for plot in self._plots:
+            plot.show_numbers(shown=len(self._time) > 0)
+        self._plots[1].setLabel("bottom", tr("time since contact [s]") if len(self._time) else word)
         self.show_edges()
         if other:
             self._raw = None
@@ -248,5 +251,4 @@ def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no t
     item = plot.getPlotItem()
     item.showGrid(x=False, y=True, alpha=0.15)
     item.setLabel("left", name)
-    item.setLabel("bottom", tr("time since contact [s]"))
     return plot

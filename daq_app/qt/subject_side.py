@@ -124,6 +124,7 @@ class SubjectSide(QObject):
         self.keyboard = Keyboard(window, course.plan, subject, act)
         self.keyboard.free.connect(self._bring)
         subject.answered.connect(self._send_answer)
+        subject.ruler.done.connect(lambda: subject.scoring or self.come_back())
         subject.screen_changed.connect(self.line_changed)
         if tablet is not None:
             tablet.answered.connect(bridge.send)

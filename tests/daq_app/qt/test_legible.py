@@ -278,8 +278,13 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
 @pytest.fixture
 def type_size():
     """Return what chooses a size of type; the usual one comes back."""
-    yield lambda scale: preferences.choose(preferences.SCALE, scale)
-    preferences.choose(preferences.SCALE, None)
+
+    def started_anew(scale):
+        preferences.choose(preferences.SCALE, scale)
+        preferences.type_scale.cache_clear()
+
+    yield started_anew
+    started_anew(None)
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,8 @@ def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
         assert page._picture.toImage().pixelColor(2, 2).name() == tokens.DARK.ground
         assert preferences.chosen_tokens() == tokens.DARK
         found["150 %"].trigger()
-        assert preferences.type_scale() == 1.5
+        assert preferences.chosen_scale() == 1.5
+        assert preferences.type_scale() == 1.0  # until the next start: no part of a window is larger than the rest
         assert "next start" in window.notice._words.text()
     finally:
         found["System"].trigger()

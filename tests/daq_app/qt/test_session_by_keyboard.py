@@ -200,6 +200,16 @@ def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_th
     driver.until(window.subject.isVisible, "the page for an answer")
 
 
+def test_after_the_ruler_the_experimenters_window_is_in_front_on_one_screen(driver):
+    window = driver.window
+    QTest.keyClick(window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
+    assert window.subject.isVisible()
+    assert window.subject.measuring
+    window.subject.ruler.done.emit()
+    assert not window.subject.isVisible()
+    assert QApplication.activeWindow() is window
+
+
 def test_what_is_below_the_sentence_stays_in_place_when_a_shorter_one_comes(driver):
     window, to_do = driver.window, driver.window.to_do
     window.resize(1100, 900)

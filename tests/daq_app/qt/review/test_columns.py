@@ -113,6 +113,20 @@ def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model
     assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
 
 
+def test_a_plot_of_nothing_has_no_scale_and_a_sentence_says_so(application, window):
+    def scales():
+        plots = *window.stroke.stroke._plots, window.model.plot.plot
+        return [plot.getPlotItem().getAxis(side).style["showValues"] for plot in plots for side in ("left", "bottom")]
+
+    window.take(m.ReportReady("predicted", example()))
+    assert scales()[:4] == [True] * 4
+    assert window.trials.relation.isVisibleTo(window)
+    window.take(m.ReportReady("predicted", replace(example(), strokes=(), predictions=())))
+    assert scales() == [False] * 6
+    assert not window.trials.relation.isVisibleTo(window)
+    assert window.trials.none.isVisibleTo(window)
+
+
 def test_the_wheel_zooms_a_stroke_and_home_or_a_double_click_shows_all_of_it_again(application, window):
     view = window.stroke.stroke
     plot = view._plots[0]
