@@ -93,7 +93,7 @@ class SubjectWindow(QWidget):
         self._place_next(view.hand)
         self.press.setVisible(view.force)
         if view.asks:
-            if before is None or (before.kind, before.key) != (view.kind, view.key):
+            if before is None or _asked(before) != _asked(view):
                 self._begin(view)
             say(self._question, view.title)
             say(self._hint, view.text)
@@ -342,6 +342,11 @@ class RulerCheck(QWidget):
             say(self._wrong, words)
             return
         self.done.emit()
+
+
+def _asked(view: SubjectView) -> tuple[object, ...]:
+    """Return what an answer is to: with another of these it begins anew."""
+    return view.kind, view.key, view.ends, view.ticks
 
 
 def _set_type(widget: QLabel, size: float, scale: float, *, bold: bool = False) -> None:

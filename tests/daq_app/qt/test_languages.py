@@ -53,6 +53,15 @@ def test_no_text_of_the_page_is_clipped_however_large_the_type(shown, language, 
                     assert part.height() >= part.heightForWidth(part.width()), part.text()
 
 
+def test_a_page_that_changes_its_language_has_every_word_in_the_new_one(shown):
+    english = protocol("sensotact-friction").blocks[0]
+    page = shown(SubjectView("line", "How sticky was it?", "", english.scale_ends, 0, (1, 1), "right", "en"))
+    german = protocol("sensotact-friction").in_language("de").blocks[0]
+    page.show_view(SubjectView("line", german.question, "", german.scale_ends, 0, (1, 1), "right", "de"), None)
+    texts = [part.text() for part in page.findChildren(QLabel) if part.isVisible() and part.text()]
+    assert sorted(texts) == sorted([german.question, *german.scale_ends])
+
+
 def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(shown):
     page = shown(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
     line = page.line

@@ -113,7 +113,7 @@ def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model
     assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
 
 
-def test_a_plot_of_nothing_has_no_scale_and_a_sentence_says_so(application, window):
+def test_a_plot_of_nothing_has_no_scale_and_a_sentence_says_so(window):
     def scales():
         plots = *window.stroke.stroke._plots, window.model.plot.plot
         return [plot.getPlotItem().getAxis(side).style["showValues"] for plot in plots for side in ("left", "bottom")]
