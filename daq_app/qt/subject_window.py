@@ -93,7 +93,7 @@ class SubjectWindow(QWidget):
         self._place_next(view.hand)
         self.press.setVisible(view.force)
         if view.asks:
-            if before is None or _asked(before) != _asked(view):
+            if before is None or _question_of(before) != _question_of(view):
                 self._begin(view)
             say(self._question, view.title)
             say(self._hint, view.text)
@@ -344,7 +344,7 @@ class RulerCheck(QWidget):
         self.done.emit()
 
 
-def _asked(view: SubjectView) -> tuple[object, ...]:
+def _question_of(view: SubjectView) -> tuple[object, ...]:
     """Return what an answer is to: with another of these it begins anew."""
     return view.kind, view.key, view.ends, view.ticks
 

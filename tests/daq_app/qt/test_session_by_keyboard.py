@@ -207,7 +207,7 @@ def test_after_the_ruler_the_experimenters_window_is_in_front_on_one_screen(driv
     assert window.subject.measuring
     window.subject.ruler.done.emit()
     assert not window.subject.isVisible()
-    assert QApplication.activeWindow() is window
+    driver.until(window.isActiveWindow, "the experimenter's window")
 
 
 def test_what_is_below_the_sentence_stays_in_place_when_a_shorter_one_comes(driver):
