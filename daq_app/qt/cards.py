@@ -123,6 +123,7 @@ class ScreenFields(QWidget):
         self._line_words = ""
         self._size = QSize(1000, 640)  # of the subject's window
         self.language = choice(tr("language that the subject reads"))
+        self._wish = ENGLISH  # language that somebody chose, also while a protocol does not have it
         self.thumbnail = Thumbnail(scale)
         name = tr("check the subject's line with a ruler")
         self._ruler = button(tr("Check with a ruler  Ctrl+M"), name, lambda: act("ruler"))
@@ -153,14 +154,15 @@ class ScreenFields(QWidget):
         self._new_code.show()
 
     def offer_languages(self, form: SessionForm) -> None:
-        """Offer the languages of a form's protocol, keeping the chosen one where it is among them."""
+        """Offer the languages of a form's protocol, and choose the one that was wished for where it is among them."""
         offered, _ = subject_texts(form)
         if list(offered) != [self.language.itemData(at) for at in range(self.language.count())]:
-            before = self.language.currentData()
+            if self.language.findData(self._wish) >= 0:
+                self._wish = self.language.currentData()
             self.language.clear()
             for code in offered:
                 self.language.addItem(name_of(code), code)
-            self.language.setCurrentIndex(max(self.language.findData(before), 0))
+            self.language.setCurrentIndex(max(self.language.findData(self._wish), 0))
 
     def show_form(self, form: SessionForm) -> None:
         """Show the page of a form, and say which of its characters no font here has."""

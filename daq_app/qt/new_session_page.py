@@ -53,7 +53,8 @@ class NewSessionPage(Panel):
         words = tr("take the proposed code")
         self._proposal = button("", words, lambda: self.subject.setText(self._proposal.text()), "small")
         self.protocol = choice(tr("protocol"), (*protocol_names(), tr("choose a file …")))
-        self.protocol.setCurrentText(SessionForm().protocol)
+        self._protocol = SessionForm().protocol  # the last that is none of a file yet to be chosen
+        self.protocol.setCurrentText(self._protocol)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = entry(tr("study, a folder of its own; may be empty"))
         self.studies = choice(self.study.accessibleName())
@@ -217,19 +218,19 @@ class NewSessionPage(Panel):
             self.frames["Subject"].show_card(Card("Subject", ready=False, words=refused, field="subject"))
 
     def _choose_protocol(self, at: int) -> None:
-        if at != self.protocol.count() - 1:
-            self.changed.emit()
-        else:
+        if at == self.protocol.count() - 1:
+            self.protocol.setCurrentText(self._protocol)  # until a file is chosen, and where none is
             self.add_protocol(QFileDialog.getOpenFileName(self, tr("Protocol"), "", "Protocol (*.toml)")[0])
+        self._protocol = self.protocol.currentText()
+        self.changed.emit()
 
     def add_protocol(self, path: str) -> None:
-        """Choose the protocol in a file; none where the path is empty."""
+        """Choose the protocol in a file; where the path is empty the one that was chosen stays."""
         if path:
             self.protocol.insertItem(self.protocol.count() - 1, path)
             self.protocol.setCurrentIndex(self.protocol.count() - 2)
-        else:
-            self.protocol.setCurrentIndex(0)
-        self.changed.emit()
+            self._protocol = path
+            self.changed.emit()
 
     def _choose_folder(self) -> None:
         name = QFileDialog.getExistingDirectory(self, tr("Folder of sessions"), self.folder.text() or str(Path.cwd()))

@@ -6,7 +6,7 @@ import pytest
 from protocol_texts import OWN
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QLabel
+from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 from qt_events import wheel
 
 from daq_app.qt.answer_fields import NumberField
@@ -140,6 +140,28 @@ def test_a_protocol_is_piloted_by_key_without_a_subject_and_apart_from_every_ses
     assert [trial.outcome for trial in driver.session.trials] == ["done", "done"]
     assert all(trial.answer.startswith("score") for trial in driver.session.trials)
     assert "SIMULATED" in driver.view.simulated
+
+
+def test_where_no_file_is_chosen_after_all_protocol_and_language_stay_as_they_were(driver, monkeypatch):
+    page = driver.window.page
+    page.protocol.setCurrentText("magnitude-estimation")
+    page.protocol.activated.emit(page.protocol.currentIndex())
+    language = page.screen_fields.language
+    language.setCurrentIndex(language.findData("de"))
+    meanwhile = []
+
+    def nothing(*_):
+        meanwhile.append(page.protocol.currentText())
+        return "", ""
+
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", nothing)
+    last = page.protocol.count() - 1
+    page.protocol.setCurrentIndex(last)  # as a click on the row does
+    assert language.currentData() is None  # a file yet to be chosen has no languages
+    page.protocol.activated.emit(last)
+    assert [*meanwhile, page.protocol.currentText()] == ["magnitude-estimation"] * 2
+    assert language.currentData() == "de"
+    language.setCurrentIndex(language.findData("en"))
 
 
 def test_a_pilot_of_a_protocol_that_cannot_be_read_says_why(driver, tmp_path):
