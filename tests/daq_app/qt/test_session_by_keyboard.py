@@ -216,8 +216,9 @@ def test_what_is_below_the_sentence_stays_in_place_when_a_shorter_one_comes(driv
     long = "Mount sample K50, its arrow away from the subject. Then press Space to zero. " * 2
     places = []
     for sentence in (long, "Stroke on K50 is being recorded."):
-        to_do.show_what(sentence, None, 1)
-        driver.application.processEvents()
+        for _ in range(5):  # the layout follows in steps
+            to_do.show_what(sentence, None, 1)
+            driver.application.processEvents()
         places.append(window.middle.mapTo(window, window.middle.rect().topLeft()).y())
     assert places[0] == places[1]
     window.resize(1440, 900)
