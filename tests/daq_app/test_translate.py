@@ -69,3 +69,6 @@ def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
         assert run(["translate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("daq-app: ")
     assert there.read_text() == "kept"
+    capsys.readouterr()
+    assert run(["translate", "--program", "--language", "nl", "--out", str(tmp_path / "none" / "nl.xlf")]) == 1
+    assert "check its name" in capsys.readouterr().err

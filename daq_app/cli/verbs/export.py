@@ -35,7 +35,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     losses = list(recording.losses)
     console.result({"folder": str(folder), "files": [str(path) for path in files], "losses": losses})
     size = sum(path.stat().st_size for path in files) / 1e6
-    console.say(recording.simulated_sentence, *losses, f"{folder}: {len(files)} files, {size:.1f} MB")
+    console.say(
+        recording.simulated_sentence, *losses, f"{folder}: {len(files)} file{'s' * (len(files) > 1)}, {size:.1f} MB"
+    )
     return FLAWED if losses else DONE
 
 

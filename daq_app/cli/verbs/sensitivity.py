@@ -54,7 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_seed(parser, "of the samples (0)", largest=math.inf)
     add_quantity(parser, "whose signs are shown")
     add_kinematics(parser, "strain of every finger but the one change that takes the other")
-    parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, written as they come: another run goes on")
+    parser.add_argument(
+        "--keep", type=Path, metavar="FILE", help="answers of many fingers, written as they come: another run goes on"
+    )
     add_workers(parser)
 
 

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from daq_app.console import DONE, Console, WrongValue
 from daq_app.window.subject import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
-from sessions.file_access import write_whole
+from sessions.file_access import remedy, write_whole
 from sessions.plan.protocols import protocol
 from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
 from sessions.plan.protocols.protocol import Protocol
@@ -59,7 +59,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         try:
             write_whole(options.out, text.encode())
         except OSError as error:
-            raise RecordingError(f"{options.out} cannot be written ({error.strerror})") from error
+            raise RecordingError(
+                f"{options.out} cannot be written ({error.strerror}); {remedy(error, new=True)}"
+            ) from error
     console.result({"language": options.language, "missing": missing, "out": options.out and str(options.out)})
     console.note(f"{missing} texts are yet to be translated" if missing else "every text is translated")
     return DONE
