@@ -135,6 +135,19 @@ def test_nothing_is_shown_before_it_is_safe(tmp_path):
 # ---- visits without forces
 
 
+def test_a_visit_for_scores_only_asks_the_disk_every_second_while_nobody_does_anything(tmp_path):
+    session = Session(tmp_path / "s", forces=False, instead={AskMount: lambda _: []})
+    ages = []
+
+    def told(status):
+        ages.append((session.clock.now_ns() - status.safe.time_ns) * 1e-9)
+
+    begun = session.clock.now_ns()
+    session.run(progress=told, stop=lambda: ("aborted", "") if session.clock.now_ns() - begun > 20e9 else None)
+    assert len(ages) > 15
+    assert max(ages) < 1.5  # the lamp says NOT RECORDING after 3 s
+
+
 def test_a_visit_for_scores_only_has_no_readings_and_no_zero(tmp_path):
     recording = Session(tmp_path / "s", forces=False).run()
     assert recording.info is None
