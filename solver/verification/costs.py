@@ -33,9 +33,7 @@ PARTS = {
     "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "proof of existence",
 }  # fmt: skip
 # The calls of these functions count here, on any mesh.
-WHOLE = {
-    "nested_numbers_of_all": "error estimate", "solve_nested": "error estimate", "with_viscosity": "evidence",
-}  # fmt: skip
+WHOLE = {"nested_numbers_of_all": "error estimate", "solve_nested": "error estimate", "with_viscosity": "evidence"}
 OTHER = "the rest"
 Function = tuple[str, int, str]  # file, line, name
 # calls, own and total time, callers
