@@ -32,8 +32,7 @@ PARTS = {
     "_kernels.elements": "assembly", "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
     "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "proof of existence",
 }  # fmt: skip
-# The calls of these functions count here, on any mesh.
-WHOLE = {"nested_numbers_of_all": "error estimate", "solve_nested": "error estimate", "with_viscosity": "evidence"}
+ENTIRE = {"nested_numbers_of_all": "error estimate", "solve_nested": "error estimate", "with_viscosity": "evidence"}
 OTHER = "the rest"
 Function = tuple[str, int, str]  # file, line, name
 # calls, own and total time, callers
@@ -88,8 +87,8 @@ def shares(profile: pstats.Stats) -> dict[str, float]:
 
     def parts(function: Function, above: frozenset[Function] = frozenset()) -> dict[str, float]:
         """Return the parts that a function works for, as shares that sum to 1."""
-        if function[2] in WHOLE:
-            return {WHOLE[function[2]]: 1.0}
+        if function[2] in ENTIRE:
+            return {ENTIRE[function[2]]: 1.0}
         if function in cache:
             return cache[function]
         callers = {caller: spent[3] for caller, spent in raw[function][4].items() if caller not in above}
@@ -98,7 +97,7 @@ def shares(profile: pstats.Stats) -> dict[str, float]:
             for name, share in parts(caller, above | {function}).items():
                 out[name] = out.get(name, 0.0) + share * (spent / total if total > 0.0 else 1.0 / len(callers))
         if (own := _part(function)) is not None:
-            out = {name: share for name, share in out.items() if name in WHOLE.values()}
+            out = {name: share for name, share in out.items() if name in ENTIRE.values()}
             out[own] = 1.0 - sum(out.values())
         cache[function] = out or {OTHER: 1.0}
         return cache[function]

@@ -15,7 +15,7 @@ from daq_app.child_process import interpreter
 from solver import solve
 from solver.response.solution import DEFAULT_FINENESS
 from solver.verification import estimates, targets
-from solver.verification.costs import PARTS, WHOLE, Cost, shares
+from solver.verification.costs import ENTIRE, PARTS, Cost, shares
 from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth, exponent
 from solver.verification.hard_cases import HardCase
@@ -298,7 +298,7 @@ def test_every_part_of_the_solver_whose_time_is_counted_is_there():
     }
     places = {".".join(name.split(".")[:n]) for name in defined for n in (1, 2, 3, 4)}
     assert set(PARTS) - places == set()
-    assert set(WHOLE) - {name.split(".")[-1] for name in defined} == set()
+    assert set(ENTIRE) - {name.split(".")[-1] for name in defined} == set()
 
 
 @pytest.mark.slow
