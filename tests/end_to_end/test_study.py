@@ -109,7 +109,7 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
 
     shelf = Shelf(tmp_path, STEADY)
     monkeypatch.setattr(file_access, "open_new", full)
-    with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): make room"):
+    with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): free space"):
         shelf.keep("key", {})
     assert list(tmp_path.iterdir()) == []
     assert shelf.load("key") is None
