@@ -18,9 +18,10 @@ NEAR = 1e-12
 # A mean, its spread and its interval, or an effect and its interval, are one quantity: each counts against the largest.
 ONE_QUANTITY = ("estimate", "mean", "sd", "low", "high")
 SPREAD_OF = {"between_sd": 0, "slope_sd": 1}  # in a mixed model: of which term, whose spread between subjects it is
-# Probabilities, correlations, differences in units of their own errors (z), and estimated errors of SEDs and forces as
-# parts of them: counted against 1.
+# Probabilities, correlations, differences of two of these, also in units of their own errors (z), and estimated errors
+# of SEDs and forces as parts of them: counted against 1.
 AGAINST_ONE = (
+    "difference",
     "error_estimate",
     "friedman_p",
     "model_normal_force_error",
