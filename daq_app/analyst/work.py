@@ -70,16 +70,9 @@ class Work:
 
     def go_on(self) -> None:
         """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
-        progress = self.progress_listener(tr("predicting"))
-        options = _options(self._recording)
-        self._prediction = predict(
-            self._analysis,
-            self._recording.plan,
-            options,
-            progress=progress,
-            watch=self._take_answer,
-            first=self._first(),
-        )
+        options, progress = _options(self._recording), self.progress_listener(tr("predicting"))
+        plan, first = self._recording.plan, self._first()
+        self._prediction = predict(self._analysis, plan, options, progress, self._take_answer, first)
         self._report = findings(self._recording, self._analysis, self._prediction)
         self._say(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
 

@@ -48,7 +48,7 @@ def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
 
 
 def join(one: Endings, other: Endings) -> Endings:
-    """Return the endings of both."""
+    """Return the endings of `one`, then those of `other`."""
     probes = (np.concatenate([getattr(e.probes, f.name) for e in (one, other)]) for f in fields(Probes))
     weights, tangent = (np.concatenate(pair) for pair in ((one.weights, other.weights), (one.tangent, other.tangent)))
     patch = np.concatenate([one.patch, one.count + other.patch])
