@@ -28,6 +28,7 @@ class ThreadedTransducer(ABC):
         self.news = threading.Event()  # something is pending, or the stream has ended
         self.stopping = threading.Event()
         self._thread: threading.Thread | None = None
+        self._last_thread: threading.Thread | None = None  # the thread that was stopped last, which a device may hold
         self.ended: Exception | None = None  # why the stream ended, when nobody had stopped it
         self._ready: list[ReadingBlock] = []
         self._received = 0
@@ -60,8 +61,8 @@ class ThreadedTransducer(ABC):
         waiting, self.begin_by = Deadline(patience), Deadline(patience, self.stopping)
         name = f"{self.info.driver} {self.info.serial}".strip()
         thread = self._thread = threading.Thread(target=self.run, name=name, daemon=True)
-        thread.start()
         try:
+            thread.start()
             while not self.has_come() and self.ended is None and thread.is_alive():
                 if waiting.remaining <= 0.0:
                     self.ended = LinkLost(self.never_came(waiting.spent))
@@ -98,9 +99,11 @@ class ThreadedTransducer(ABC):
             self.news.wait(min(remaining, self.longest_wait))
 
     def reset(self) -> None:
-        """Forget what an earlier stream left. Raises SetupError while one runs."""
+        """Forget what an earlier stream left. Raises SetupError while one runs, or has not let go of the device."""
         if self._thread is not None:
             raise SetupError(f"{self.info.uri} is streaming already; stop it before starting it again")
+        if self._last_thread is not None and self._last_thread.is_alive():
+            raise SetupError(f"{self.info.uri} still holds up the stream before; open it anew, or pull its plug")
         self.news.clear()
         self.stopping.clear()
         self.ended = None
@@ -113,8 +116,8 @@ class ThreadedTransducer(ABC):
         """End streaming; what had arrived can still be read. Harmless when repeated."""
         self.stopping.set()
         if self._thread is not None:
-            self._thread.join(_LEAVING)
-            self._thread = None
+            self._last_thread, self._thread = self._thread, None
+            _await_end(self._last_thread, Deadline(_LEAVING))
 
     def close(self) -> None:
         """Stop; port and thread are given back. Harmless when repeated."""
@@ -135,3 +138,14 @@ class ThreadedTransducer(ABC):
     @abstractmethod
     def digest(self, *, end: bool = False) -> None:
         """Turn what the thread has taken into readings that are ready; nothing more comes at the `end`. Lock held."""
+
+
+def _await_end(thread: threading.Thread, limit: Deadline) -> None:
+    """Wait for a thread to end, also where its start was broken off and it has not begun to run."""
+    while limit.remaining > 0.0:
+        try:
+            thread.join(limit.remaining)
+        except RuntimeError:  # join takes no thread that has not begun
+            time.sleep(deadline.TICK)
+        else:
+            return

@@ -112,7 +112,7 @@ class ServedBox:
     def serve(self, work: Callable[[], None], name: str) -> None:
         """Let time begin, and a thread work until `closing` is set."""
         self._origin_ns = self.clock.now_ns()
-        self._thread = threading.Thread(target=work, name=f"simulated {name}")
+        self._thread = threading.Thread(target=work, name=f"simulated {name}", daemon=True)
         self._thread.start()
 
     def close(self) -> None:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -63,14 +64,23 @@ def recording():
     return RunningSimulator(f"replay:{RECORDED}", Bench(SEED), lambda: 0.0, lambda: None)
 
 
-def started(name, faults, clock, folder, monkeypatch):
-    match name:
-        case "sim":
-            return simulated_bench(faults, monkeypatch)
-        case "replay":
-            return recording()
-        case _:
-            return SIMULATORS[name].start(Bench(SEED), clock, faults, folder)
+@contextmanager
+def started(name, faults, clock, folder):
+    """Let the device of a driver run inside, and the driver wait no longer than a test needs."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        quickened(monkeypatch)
+        match name:
+            case "sim":
+                device = simulated_bench(faults, monkeypatch)
+            case "replay":
+                device = recording()
+            case _:
+                device = SIMULATORS[name].start(Bench(SEED), clock, faults, folder)
+        try:
+            yield device
+        finally:
+            device.close()
+            device.forget()
 
 
 def simulator(name):
@@ -198,9 +208,7 @@ def undisturbed_course(name, folder):
 def undisturbed_run(name, folder):
     """Go through the undisturbed course with one driver, once."""
     clock, threads = PacedClock(simulator(name).factor), set(threading.enumerate())
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        quickened(monkeypatch)
-        device = started(name, Faults(), clock, folder, monkeypatch)
+    with started(name, Faults(), clock, folder) as device:
         before = handles(device)
         course = Undisturbed(device.uri, device.bench)
         course.found = identified(name, device.uri)
@@ -242,9 +250,7 @@ def undisturbed_run(name, folder):
             transducer.close()
         course.found_after = identified(name, device.uri)
         course.handles_left = handles(device, before)
-        device.close()
-        device.forget()
-        course.threads_left = set(threading.enumerate()) - threads
+    course.threads_left = set(threading.enumerate()) - threads
     return course
 
 
@@ -259,9 +265,7 @@ def refusal(transducer):
 def disturbed_course(name, folder):
     """Go through all that can go wrong with one driver, and lose the device at the end."""
     clock, faults, threads = PacedClock(simulator(name).factor), Faults(seed=1), set(threading.enumerate())
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        quickened(monkeypatch)
-        device = started(name, faults, clock, folder, monkeypatch)
+    with started(name, faults, clock, folder) as device:
         before = handles(device)
         told, blocks, sentence = {}, [], ""
         with connect(device.uri, clock) as opened:
@@ -282,7 +286,6 @@ def disturbed_course(name, folder):
                 sentence = lost(transducer, blocks)
             health, info = transducer.health, transducer.info
         left = handles(device, before)
-        device.forget()
     return Disturbed(
         told,
         info,
@@ -298,32 +301,25 @@ def disturbed_course(name, folder):
 def planted_statuses_course(name, folder):
     """Plant each status that the maker lists, one after the other; return who it is, and what health said of each."""
     clock, faults, said = PacedClock(1.0), Faults(), {}
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        quickened(monkeypatch)
-        device = started(name, faults, clock, folder, monkeypatch)
-        try:
-            with connect(device.uri, clock) as opened:
-                transducer, now = opened.transducer, opened.bench_now or device.now
-                transducer.start()
-                for status in simulator(name).statuses:
-                    if simulator(name).at_start:
-                        transducer.stop()
-                    before = transducer.health
-                    faults.put(Fault("status", now(), now() + 1e6, status=status))
-                    if simulator(name).at_start:
-                        transducer.start()
-                        before = Health()
-                    since = time.monotonic()
-                    while transducer.health.flagged == before.flagged and time.monotonic() - since < PATIENCE:
-                        transducer.read(0.02)
-                    said[status] = before, transducer.health, time.monotonic() - since
-                    faults.put()
-                    while (block := transducer.read(0.1)) is not None and len(block) and block.status[-1]:
-                        pass
+    with started(name, faults, clock, folder) as device, connect(device.uri, clock) as opened:
+        transducer, now = opened.transducer, opened.bench_now or device.now
+        transducer.start()
+        for status in simulator(name).statuses:
+            if simulator(name).at_start:
                 transducer.stop()
-        finally:
-            device.close()
-            device.forget()
+            before = transducer.health
+            faults.put(Fault("status", now(), now() + 1e6, status=status))
+            if simulator(name).at_start:
+                transducer.start()
+                before = Health()
+            since = time.monotonic()
+            while transducer.health.flagged == before.flagged and time.monotonic() - since < PATIENCE:
+                transducer.read(0.02)
+            said[status] = before, transducer.health, time.monotonic() - since
+            faults.put()
+            while (block := transducer.read(0.1)) is not None and len(block) and block.status[-1]:
+                pass
+        transducer.stop()
     return opened.transducer.info, said
 
 

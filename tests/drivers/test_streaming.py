@@ -1,15 +1,19 @@
-"""What a stream on a line does when this computer, and not the device, was away."""
+"""What a stream on a line does when this computer, or the thread that reads it, was away."""
 
+import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from drivers import threaded
 from drivers.calibration import Calibration
 from drivers.clock import RealClock
 from drivers.clock_recovery import ClockRecovery
 from drivers.readings import Records
 from drivers.streaming import StreamingTransducer
-from drivers.transducer import TransducerInfo
+from drivers.transducer import SetupError, TransducerInfo
 
 RATE = 200.0
 BUSY = 1.0  # for how long the computer does something else, well beyond what a device may be quiet [real s]
@@ -40,13 +44,14 @@ class PlainConversation:
         return ClockRecovery(rate, factor)
 
 
-class LineOfABusyComputer:
-    """A device that sends all the time; one wait of its reader lasts far longer than it was to."""
+class Line:
+    """A device that sends all the time; the tenth wait of its reader is `busy`."""
 
-    def __init__(self):
+    def __init__(self, busy=lambda: None):
         self.began = time.monotonic()
         self.taken = 0
         self.waits = 0
+        self.busy = busy
 
     def send(self, data):
         pass
@@ -54,7 +59,7 @@ class LineOfABusyComputer:
     def receive(self, timeout):
         self.waits += 1
         if self.waits == 10:
-            time.sleep(BUSY)
+            self.busy()
             return None  # as where the wait was over before the computer was busy
         time.sleep(min(timeout, 0.01))
         due = int((time.monotonic() - self.began) * RATE)
@@ -65,11 +70,15 @@ class LineOfABusyComputer:
         pass
 
 
-def test_a_device_is_not_taken_to_be_silent_while_this_computer_was_busy():
-    line = LineOfABusyComputer()
+def opened(line):
     calibration = Calibration("FT1", "counts", np.eye(6), np.full(6, np.nan), "a test")
     info = TransducerInfo("test://line", "test", "Test", "FT1", False, RATE, np.nan, calibration)
-    transducer = StreamingTransducer(info, lambda _: line, PlainConversation(), RealClock())
+    return StreamingTransducer(info, lambda _: line, PlainConversation(), RealClock())
+
+
+def test_a_device_is_not_taken_to_be_silent_while_this_computer_was_busy():
+    line = Line(lambda: time.sleep(BUSY))
+    transducer = opened(line)
     transducer.start()
     received = 0
     while received < 2.0 * BUSY * RATE:
@@ -77,3 +86,40 @@ def test_a_device_is_not_taken_to_be_silent_while_this_computer_was_busy():
     transducer.stop()
     assert line.waits > 10
     assert transducer.health.restarted == 0
+
+
+class LateThread(threading.Thread):
+    """A thread that begins to run only after its start was broken off, as on a busy computer."""
+
+    def start(self):
+        threading.Timer(0.05, super().start).start()
+        raise KeyboardInterrupt
+
+
+def test_a_start_that_was_broken_off_can_be_made_again(monkeypatch):
+    transducer = opened(Line())
+    with monkeypatch.context() as patch:
+        patch.setattr(threaded, "threading", SimpleNamespace(Thread=LateThread))
+        with pytest.raises(KeyboardInterrupt):
+            transducer.start()
+    transducer.start()
+    assert len(transducer.read(1.0))
+    transducer.close()
+
+
+def test_a_stream_that_its_device_holds_up_beyond_a_stop_does_not_come_back_with_the_next_start(monkeypatch):
+    monkeypatch.setattr(threaded, "_LEAVING", 0.05)
+    released = threading.Event()
+    line = Line(lambda: released.wait(10.0))
+    transducer = opened(line)
+    transducer.start()
+    while line.waits < 10:
+        time.sleep(0.001)
+    transducer.stop()
+    with pytest.raises(SetupError, match="test://line still holds up the stream before"):
+        transducer.start()
+    released.set()
+    while transducer._last_thread.is_alive():
+        time.sleep(0.001)
+    transducer.start()
+    transducer.close()

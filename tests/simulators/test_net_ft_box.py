@@ -4,6 +4,8 @@ import contextlib
 import re
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 import urllib.error
@@ -321,6 +323,14 @@ def test_a_closed_box_gives_its_ports_back(box):
     one.close()
     one.close()
     box(ports=tuple(held[name] for name in ("rdt", "tcp", "http")))
+
+
+def test_a_box_does_not_keep_a_program_alive_that_fails():
+    program = (
+        "from drivers.clock import RealClock; from simulators.bench import Bench; import simulators.net_ft_box as box\n"
+        "box.NetFtBox(Bench(1), RealClock()).start(); raise SystemExit(7)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], timeout=60, check=False).returncode == 7
 
 
 def test_the_same_seed_sends_the_same_bytes_whenever_it_is_asked(box):
