@@ -78,7 +78,9 @@ def read(path: Path) -> ExportedSession:
         raise ValueError(f"it holds the events of {len(event_files)} sessions, and one is needed")
     (event_file,) = event_files
     head = head_of(json_object(read_within_limit(event_file.with_suffix(".json")))["DaqAppSession"])
-    header, *lines = (line.split("\t") for line in read_within_limit(event_file).decode().splitlines())
+    # Unlike `splitlines`, which takes a line separator that somebody typed for a line's end.
+    text = io.StringIO(read_within_limit(event_file).decode(), newline=None)
+    header, *lines = (line.removesuffix("\n").split("\t") for line in text)
     rows_read = (
         {name: "" if cell == MISSING else cell for name, cell in zip(header, line, strict=True)} for line in lines
     )

@@ -1,6 +1,7 @@
 """A session as CSV: a file for each table, a README that describes every column, and the session's own description."""
 
 import csv
+import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
@@ -85,8 +86,8 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
 
 
 def _rows_of(path: Path) -> list[dict[str, str]]:
-    lines = read_within_limit(path).decode().splitlines(keepends=True)
-    return [{name: plain(text) for name, text in row.items()} for row in csv.DictReader(lines)]
+    text = io.StringIO(read_within_limit(path).decode(), newline="")
+    return [{name: plain(cell) for name, cell in row.items()} for row in csv.DictReader(text)]
 
 
 def _readme(recording: Recording, contents: Sequence[tuple[str, str, Sequence[Column]]]) -> str:

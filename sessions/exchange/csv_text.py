@@ -6,6 +6,7 @@ Text that begins like a formula has an apostrophe before it; numbers stay as the
 """
 
 import csv
+import io
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -79,7 +80,7 @@ def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ImportRefused(f"{path}: byte {error.start} is no UTF-8 text; save the file as CSV in UTF-8") from error
-    lines = text.splitlines(keepends=True)
+    lines = list(io.StringIO(text, newline=""))
     first_line = next((line for line in lines if not line.startswith(COMMENT)), "")
     delimiter = next((mark for mark in _DELIMITERS if mark in first_line), ",")
     empty: int | None = None

@@ -157,6 +157,7 @@ RATE_TOLERANCE = 0.01  # a stated rate may differ so much from the one the file'
 UNEVEN = 0.05  # time steps that spread more than this hold no one rate [-]
 NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _FEWEST = 2
+LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
 GREATEST = 1e18  # of a time, force or torque: a thousand times the microseconds since 1970, and no product overflows
 _SIMULATED = "SIMULATED"  # at the head of whatever came from a simulator
 
@@ -207,6 +208,11 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     content = content_of(path)
     layout, rows, lines = _table(path, content, stated)
     time, rate, rate_origin = _times(path, layout, rows, lines, stated)
+    if time[-1] > LONGEST:
+        raise ImportRefused(
+            f"{path}: its readings span {time[-1]:.3g} s, more than a session can ({LONGEST:g} s); name the time's "
+            f"unit in the header ({', '.join(TIME_UNITS)}), or give a higher --rate"
+        )
     raw = rows[:, list(layout.axes)]
     block = _block(time, raw)
     digest = hashlib.sha256(content).hexdigest()

@@ -34,6 +34,19 @@ def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back
         assert made.differences == named
 
 
+@pytest.mark.parametrize("form", ["csv", "bids", "hdf5"])
+def test_a_remark_with_a_line_separator_in_it_comes_back_as_it_was_typed(tmp_path, form):
+    typed = "one\u2028two\x85three\u2029four"  # each ends a line for Python's splitlines, and none ends one in a file
+    writer = begun(tmp_path / "s")
+    writer.event("told", data={"sentence": typed})
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    out = export(ExportSource(Recording.open(tmp_path / "s"), BARE, None), form, tmp_path / "out")
+    assert import_session(read_export(out), tmp_path / "again").differences == ()
+    (event,) = [one for one in Recording.open(tmp_path / "again").events if one.kind == "told"]
+    assert event.data == {"sentence": typed}
+
+
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinded(tmp_path, form):
     hidden = replace(TRIAL, stimulus=replace(TRIAL.stimulus, index=None))

@@ -254,6 +254,17 @@ def test_what_is_no_csv_is_refused(tmp_path, content):
         import_csv(path, tmp_path / "session")
 
 
+def test_a_separator_that_ends_no_line_of_a_file_ends_none_here(tmp_path):
+    made, _ = taken(tmp_path, header=f"{HEADER},note", rows=[f"{row},one\u2028two\x0bthree\x85four" for row in ROWS])
+    assert made.readings == len(ROWS)
+
+
+@pytest.mark.parametrize(("header", "rate"), [(HEADER, None), (HEADER.replace("t_s", "n"), 1e-12)])
+def test_readings_over_more_years_than_a_session_s_clock_counts_are_refused(tmp_path, header, rate):
+    rows = [f"{1e10 * i!r},0,0,-1,0,0,0" for i in range(3)]
+    assert "more than a session can" in refusal(tmp_path, options=ImportOptions(rate=rate), header=header, rows=rows)
+
+
 def test_a_header_alone_is_refused(tmp_path):
     assert "holds 0 readings" in refusal(tmp_path, rows=[])
 
