@@ -16,7 +16,6 @@ from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
 from sessions.report.contents import (
-    Answers,
     Experiment,
     Fact,
     GroundTruth,
@@ -99,6 +98,7 @@ def findings(
         ),
         scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,
+        width_origin="" if prediction is None else prediction.width_origin,
         interval_kind=analysis.bootstrap.kind,
         interval_kinds=dict(analysis.bootstrap.kinds),
         afferent=more.afferent,
@@ -117,7 +117,8 @@ def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:
     if recording.simulated_sentence is not None:
         return recording.simulated_sentence
     simulated = sum(table.simulated for table in tables)
-    return f"SIMULATED: {simulated} of the sessions whose scores are used here are simulated" if simulated else ""
+    are = "is" if simulated == 1 else "are"
+    return f"SIMULATED: {simulated} of the sessions whose scores are used here {are} simulated" if simulated else ""
 
 
 Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` -> block and index -> number
@@ -212,7 +213,7 @@ def experiments(
                 descriptor=descriptor,
                 indices=indices,
                 scores=means,
-                answers=tuple(Answers(subject, tuple(map(row.get, indices))) for subject, row in rows.items()),
+                answers={subject: tuple(map(row.get, indices)) for subject, row in rows.items()},
                 score_relation=_relation(score_of, predicted),
                 index_relation=_relation({index: float(index) for index in indices}, predicted),
                 own_relation=_relation(own, predicted),

@@ -44,14 +44,6 @@ class TextFile:
 
 
 @dataclass(frozen=True, slots=True)
-class Answers:
-    """The scores of one subject, one for each index of its experiment; None where it gave none."""
-
-    subject: str
-    scores: tuple[float | None, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Experiment:
     """One block: stimuli of one descriptor, stroked one way."""
 
@@ -63,7 +55,7 @@ class Experiment:
     scale_ends: tuple[str, str]
     indices: tuple[int, ...]  # of its stimuli, rising
     scores: tuple[MeanScore, ...]
-    answers: tuple[Answers, ...]
+    answers: Mapping[str, tuple[float | None, ...]]  # of each subject, one for each index; None where it gave none
     score_relation: Relation | None  # `response` [MPa or -] against mean score; None where one of the two is missing
     index_relation: Relation | None  # `response` against index
     own_relation: Relation | None = None  # `response` against the scores of whoever made the strokes, one of several
@@ -189,6 +181,7 @@ class Report:
     again: tuple[Fact, ...]  # everything needed to do it again ...
     commands: tuple[str, ...]  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
+    width_origin: str = ""  # "set" or "assumed"
     other_signs: tuple[str, ...] = ()  # where the SED goes another way on this finger than on the published one
     response: str = "sed"  # the quantity at the ending that is held against scores, one of `solver.quantities`
     model: str = ""  # which model the SEDs are of, in a few words

@@ -146,12 +146,13 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
 
 def _block(block: Block) -> str:
     way = "proximal to distal" if block.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
-    indices = ", ".join(str(i) for i in sorted({trial.stimulus.known_index for trial in block.trials}))
+    indices = sorted({trial.stimulus.known_index for trial in block.trials})
+    stimuli = f"{'Stimulus' if len(indices) == 1 else 'Stimuli'} {', '.join(map(str, indices))}"
     low, high = block.scale_ends
     ticks = f", {block.ticks} marks" if block.ticks else ""
     task = f"scale: 0 “{low}”, 100 “{high}”{ticks}" if low else f"asked: “{block.question}”"
     depth = f"; depth {block.indentation:g} mm, measured" if block.indentation_origin == "measured" else ""
-    return f"{block.instruction} Stimuli {indices}, stroked {way}; {task}{depth}."
+    return f"{block.instruction} {stimuli}, stroked {way}; {task}{depth}."
 
 
 def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
@@ -205,9 +206,10 @@ def exclusion_sentences(
             sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
         sentences += [f"Trial {number} was skipped."] if record.outcome == "skipped" else []
     for name, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):
-        without = ", ".join(str(stroke.number) for stroke in strokes if getattr(stroke, name) is None)
+        without = [str(stroke.number) for stroke in strokes if getattr(stroke, name) is None]
         if without:
-            sentences.append(f"No {words} is given for stroke {without}: the flaws below and the tables say why.")
+            which = f"stroke{'s' if len(without) > 1 else ''} {', '.join(without)}"
+            sentences.append(f"No {words} is given for {which}: the flaws below and the tables say why.")
     return tuple(sentences)
 
 

@@ -1,8 +1,10 @@
 """What a report says in sentences: its question, its answer in short, and what would change the sign of r."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import takewhile
 from typing import Literal
+
+import numpy as np
 
 from sessions.prediction.stored import Variant
 from sessions.report.contents import Experiment, PredictionFinding, Report
@@ -20,6 +22,7 @@ from sessions.report.wording import (
     spread_share,
 )
 from sessions.statistics.correlations import Relation, relation
+from sessions.statistics.scores import by_key
 
 REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
 OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."
@@ -56,8 +59,11 @@ def _in_variant(report: Report, variant: Variant, opening: str, untried: str) ->
         return next((alternative.sed for alternative in one.alternatives if alternative.variant == variant), None)
 
     tried = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
+    doubted = by_key(
+        (p.experiment, any(one.doubt for one in p.alternatives if one.variant == variant)) for p in report.predictions
+    )
     parts = [
-        f"{experiment.name} {words}, n = {plural(related.n, 'stimulus', 'stimuli')}"
+        f"{experiment.name} {words}, n = {plural(related.n, 'stimulus', 'stimuli')}{_doubt(doubted[experiment.name])}"
         for experiment in report.experiments
         if experiment.name in tried
         for related in [_relation(report, experiment, sed)]
@@ -67,12 +73,22 @@ def _in_variant(report: Report, variant: Variant, opening: str, untried: str) ->
     return f"{opening}: {'; '.join(parts)}." if parts else untried
 
 
+def _doubt(doubted: Sequence[bool]) -> str:
+    """Return how many trials are in a state that no finger can be in, as the end of a sentence; "" where none is."""
+    of = f"{sum(doubted)} of {plural(len(doubted), 'trial')}"
+    return f" ({of} in a state that no finger can be in)" if any(doubted) else ""
+
+
 def _relation(report: Report, experiment: Experiment, value: _Value) -> Relation:
+    """Return how a number goes with mean scores, over the stimuli that have both; repetitions are averaged."""
     means = {mean.index: mean.mean for mean in experiment.scores}
-    scored = [(p.index, value(p)) for p in report.predictions if p.experiment == experiment.name and p.index in means]
-    known = [(index, number) for index, number in scored if number is not None]
-    indices = [index for index, _ in known]
-    return relation([number for _, number in known], [means[index] for index in indices], indices)
+    known = by_key(
+        (p.index, number)
+        for p in report.predictions
+        if p.experiment == experiment.name and p.index in means and (number := value(p)) is not None
+    )
+    numbers = [float(np.mean(repeats)) for repeats in known.values()]
+    return relation(numbers, [means[index] for index in known], list(known))
 
 
 def _by_place(report: Report) -> str:
@@ -90,8 +106,8 @@ def _by_place(report: Report) -> str:
     if not ranges:
         return "How the sign of r depends on the place of the ending is not known here."
     return (
-        f"The sign of r stays the same if the ending is moved along the skin (tried up to {REACH:g} mm to each side, "
-        f"positive towards the tip): in {' and in '.join(ranges)}."
+        "The sign of r of the SED stays the same if the ending is moved along the skin (tried up to "
+        f"{REACH:g} mm to each side, positive towards the tip): in {' and in '.join(ranges)}."
     )
 
 
@@ -114,26 +130,25 @@ def _alike(known: Mapping[float, float]) -> tuple[float, float]:
 
 def question(report: Report) -> str:
     """Return what the session asks, as far as what it holds can answer it."""
-    judged = " and ".join(e.descriptor for e in report.experiments)
+    judged = " and ".join(dict.fromkeys(e.descriptor for e in report.experiments))
     if not report.experiments:
         return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
     if not report.predictions:
         return f"How do people scale {judged}, and with what friction do fingers stroke the same surfaces?"
     return (
-        f"People scale the {judged} of surfaces they stroke. Does the strain-energy density that a finger model "
-        "predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow their scores?"
+        f"People scale the {judged} of surfaces they stroke. Does the {shown_response(report.response).in_full} that a "
+        "finger model predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow "
+        "their scores?"
     )
 
 
 def summary(report: Report) -> tuple[str, ...]:
     """Return the findings in short, a sentence each."""
     sentences: list[str] = []
-    subjects = {answers.subject for e in report.experiments for answers in e.answers}
+    subjects = {subject for e in report.experiments for subject in e.answers}
     if subjects:
-        stimuli = sum(len(e.scores) for e in report.experiments)
-        sentences.append(
-            f"{capital(plural(len(subjects), 'subject'))} scored {plural(stimuli, 'stimulus', 'stimuli')}."
-        )
+        stimuli = len({(mean.descriptor, mean.index) for e in report.experiments for mean in e.scores})
+        sentences.append(f"{plural(len(subjects), 'subject')} scored {plural(stimuli, 'stimulus', 'stimuli')}.")
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
     for judged in session_functions(report):
@@ -148,9 +163,14 @@ def summary(report: Report) -> tuple[str, ...]:
             )
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
+    noun = "trial" if any(p.trial is not None for p in report.predictions) else "stroke"
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
-        sentences.append(f"{capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
+        sentences.append(f"{plural(missing, noun)} got no prediction; the tables say why.")
+    doubted = sum(bool(p.doubt) for p in report.predictions)
+    if doubted:
+        are = "is" if doubted == 1 else "are"
+        sentences.append(f"{plural(doubted, noun)} {are} in a state that no finger can be in; the tables mark each.")
     excluded, flaws = len(report.excluded) or "nothing", len(report.flaws) or "none"
     sentences.append(f"Excluded: {excluded}; flaws found: {flaws}; the appendix names each.")
     return tuple(sentences)
@@ -167,7 +187,7 @@ def _strokes(report: Report) -> str:
     if n == 0:
         return "No stroke was found in the recording; the flaws below say why."
     values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
-    words = f"{capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {len(values)} gave a dynamic friction"
+    words = f"{plural(n, 'stroke')} {'was' if n == 1 else 'were'} found; {len(values)} gave a dynamic friction"
     if len(values) < 2:
         return words + (f", µ = {digits(values[0], 2)}." if values else ".")
     return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."

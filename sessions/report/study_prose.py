@@ -16,12 +16,20 @@ from sessions.report.prose import OTHER_FINGERS
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
 from sessions.report.tables.session import paths_sentence
-from sessions.report.wording import capital, correlation, digits, full_stop, plural, significant
+from sessions.report.wording import capital, correlation, digits, full_stop, plural, shown_response, significant
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scores import by_key
 from sessions.statistics.visit import Exclusion
 
 _FEW = 12  # trials named one by one
+
+
+def question(study: StudyFindings) -> str:
+    """Return what the study asks."""
+    return (
+        f"People stroke surfaces and scale what they feel. Does the {shown_response(study.response).in_full} that a "
+        "finger model predicts at a receptor, from the friction of the same people's own strokes, follow their scores?"
+    )
 
 
 def summary(study: StudyFindings) -> list[str]:
@@ -136,8 +144,8 @@ def remarks(study: StudyFindings) -> list[str]:
     ]
     sentences += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
     sentences += [
-        f"The answers of session {visit.session} are {choices} choices of one of two: they stand in the table "
-        "of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
+        f"The answers of session {visit.session} are {plural(choices, 'choice')} of one of two: they stand in the "
+        "table of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
         for visit in study.visits
         if (choices := sum(row.choice is not None for row in visit.rows))
     ]
@@ -222,7 +230,7 @@ def seal_sentence(study: StudyFindings) -> str:
     alike = by_key((visit.sealed, visit.session) for visit in study.visits if visit.sealed)
     if len(alike) == 1:
         ((sentence, sessions),) = alike.items()
-        return f"In {'each' if len(sessions) > 1 else 'the one'} of {plural(len(sessions), 'session')}: {sentence}"
+        return sentence if len(sessions) == 1 else f"In each of {len(sessions)} sessions: {sentence}"
     return " ".join(f"{', '.join(sessions)}: {sentence}" for sentence, sessions in alike.items())
 
 

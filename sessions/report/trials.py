@@ -15,6 +15,7 @@ from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.scenes import doubt_of
 from sessions.recording.reader import Recording
 from sessions.report.contents import Course, Fact, Field, History, PredictionFinding, StrokeFinding, Trace, same_fields
+from sessions.report.wording import plural
 from sessions.statistics.scores import by_key
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.bootstrap import NUMBERS
@@ -76,10 +77,10 @@ def course(recording: Recording) -> Course | None:
     steps = np.diff(block.time)
     shortest = max((block.time[-1] - block.time[0]) / STRETCHES, GAP * np.median(steps)) if len(steps) else 0.0
     gaps = np.flatnonzero(steps > shortest)
-    kept = np.union1d(_extremes(-wrench[:, 2]), [gaps, gaps + 1])
-    drag = np.hypot(wrench[kept, 0], wrench[kept, 1])
+    forces = -wrench[:, 2], np.hypot(wrench[:, 0], wrench[:, 1])
+    kept = np.union1d(np.union1d(*map(_extremes, forces)), [gaps, gaps + 1])
     behind = np.searchsorted(kept, gaps) + 1
-    normal, tangential = (np.insert(force, behind, np.nan) for force in (-wrench[kept, 2], drag))
+    normal, tangential = (np.insert(force[kept], behind, np.nan) for force in forces)
     return Course(
         _numbers(np.insert(block.time[kept], behind, block.time[gaps])),
         _none_for_nan(normal),
@@ -214,7 +215,10 @@ def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
     warned = by_key((_NUMBER.sub("#", sentence), sentence) for prediction in solved for sentence in prediction.warnings)
     return (
         *(Fact(name, _share(entries), entries[0]["how"]) for name, entries in by_effect.items()),
-        *(Fact("warning", same[0], f"the first of {len(same)} trials with this warning") for same in warned.values()),
+        *(
+            Fact("warning", same[0], f"the first of {plural(len(same), 'trial')} with this warning")
+            for same in warned.values()
+        ),
     )
 
 

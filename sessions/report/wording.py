@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from sessions.prediction import BY_NAME, SED, shown_unit
+from sessions.prediction.stored import Ends
 from sessions.report.contents import Numbers, PredictionFinding
 from sessions.statistics.correlations import Relation
+from sessions.statistics.scores import bounds
 
 NONE = "–"
 
@@ -18,7 +20,7 @@ def digits(value: float, places: int) -> str:
     >>> digits(-0.25, 2)
     '−0.25'
     """
-    return f"{value:.{places}f}".replace("-", "−")
+    return f"{value:z.{places}f}".replace("-", "−")
 
 
 def significant(value: float, figures: int) -> str:
@@ -51,10 +53,14 @@ def between(low: float, high: float, written: Callable[[float], str], unit: floa
 
     >>> between(0.5, 1.25, places(1)), between(-178.12, -178.09, places(0)), between(2.0, 2.0, places(1))
     ('0.5 to 1.2', '−178.12 to −178.09', '2.0 to 2.0')
+    >>> between(0.001, 0.003, correlation)
+    '+0.001 to +0.003'
     """
     if written(low) == written(high) and low != high:
         decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
-        return f"{digits(unit * low, decimals)} to {digits(unit * high, decimals)}"
+        sign = "+" if written(1.0).startswith("+") else ""
+        low_text, high_text = (f"{unit * end:{sign}.{decimals}f}".replace("-", "−") for end in (low, high))
+        return f"{low_text} to {high_text}"
     return f"{written(low)} to {written(high)}"
 
 
@@ -91,10 +97,10 @@ def tau(megapascal: float) -> str:
 def correlation(r: float) -> str:
     """Return a coefficient with two decimals, or three where two would make it perfect.
 
-    >>> correlation(-0.5), correlation(0.997)
-    ('−0.50', '+0.997')
+    >>> correlation(-0.5), correlation(0.997), correlation(-0.004)
+    ('−0.50', '+0.997', '+0.00')
     """
-    text = f"{r:+.2f}" if abs(r) < 0.995 or abs(r) > 0.9995 else f"{r:+.3f}"
+    text = f"{r:+z.2f}" if abs(r) < 0.995 or abs(r) > 0.9995 else f"{r:+.3f}"
     return text.replace("-", "−")
 
 
@@ -178,6 +184,11 @@ class ShownResponse:
     places: int  # decimals of a number shown
     step: str  # unit of a slope on scores or indices, which is a millionth of the kept one
 
+    @property
+    def in_full(self) -> str:
+        """The label, an abbreviation with what it stands for."""
+        return "strain-energy density (SED)" if self.name == SED.name else self.label
+
     def text(self, shown: float) -> str:
         """Return a number of the shown unit with that unit.
 
@@ -197,6 +208,13 @@ class ShownResponse:
             return None
         value, error = prediction.responses[self.name]
         return (value, error) if math.isfinite(error) else (value,)
+
+    def ends(self, prediction: PredictionFinding) -> Ends | None:
+        """Return the 95 % interval that friction makes of a prediction, in the kept unit; None where there is none."""
+        interval = prediction.interval
+        if self.name != SED.name or interval is None or prediction.doubt:
+            return None
+        return bounds(interval.low, interval.high)
 
 
 def shown_response(name: str) -> ShownResponse:

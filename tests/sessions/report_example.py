@@ -7,7 +7,6 @@ import numpy as np
 
 from sessions.prediction.stored import Alternative, SedInterval, variants
 from sessions.report.contents import (
-    Answers,
     Course,
     Experiment,
     Fact,
@@ -75,10 +74,10 @@ def experiment(descriptor, score_tables):
         scale_ends=("not at all", "as much as I can imagine"),
         indices=tuple(rows),
         scores=means,
-        answers=tuple(
-            Answers(subject, tuple(given.get(i) for i in rows))
+        answers={
+            subject: tuple(given.get(i) for i in rows)
             for subject, given in score_matrix(score_tables, descriptor).items()
-        ),
+        },
         score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
         index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
         rivals=rivals_of_means({m.index: m.mean for m in means}, _series(rows)),

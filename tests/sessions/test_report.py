@@ -105,7 +105,7 @@ def test_scores_of_other_visits_are_joined_by_subject(session):
     given_here = next(s.score for s in own.scores if (s.descriptor, s.index) == ("stickiness", 50))
     assert mean.n == 3
     assert mean.mean == pytest.approx((given_here / 2 + 40 + 60) / 3)
-    assert [a.subject for a in made.experiments[0].answers] == ["P01", "P02", "P03"]
+    assert list(made.experiments[0].answers) == ["P01", "P02", "P03"]
 
 
 def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(session, predicted):
@@ -137,7 +137,7 @@ def test_one_simulated_visit_among_the_scores_makes_the_report_simulated(tmp_pat
     mixed = findings(recording, analyse(recording), scores=[visit("P02", 40.0), visit("P03", 50.0, simulated=True)])
     assert (real.simulated, real.head) == (False, "")
     assert mixed.simulated
-    assert mixed.head.startswith("SIMULATED: 1 of the sessions")
+    assert mixed.head == "SIMULATED: 1 of the sessions whose scores are used here is simulated"
 
 
 def test_a_recording_without_a_plan_gives_a_report_of_its_strokes(tmp_path):
@@ -281,6 +281,30 @@ def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing
     assert [made.normal.count(None), made.tangential.count(None), made.tangential.index(None)] == [1, 1, missing]
     ends = made.time[missing - 1], made.time[missing + 1]
     assert ends == pytest.approx([(before - 1) * 0.005, after * 0.005], abs=1e-9)
+
+
+def test_a_short_pull_sideways_is_in_the_picture_of_the_whole_recording_though_the_normal_force_stays(tmp_path):
+    foreign(tmp_path / "whole")
+    recording = Recording.open(tmp_path / "whole")
+
+    class Pulled:
+        info, plan = recording.info, recording.plan
+
+        def readings(self):
+            time = np.arange(20_000) / 200.0
+            raw = np.zeros((len(time), 6))
+            raw[:, 2] = -2.0 + 0.1 * np.sin(7.0 * time)
+            raw[12_345, 0] = 5.0
+            count = np.arange(len(time))
+            return ReadingBlock(count, count, 0 * count, time, (time * 1e9).astype(np.int64), raw)
+
+    assert max(course(Pulled()).tangential) == 5.0
+
+
+def test_one_stroke_without_friction_is_one_stroke_and_several_are_strokes(tmp_path):
+    recording = foreign(tmp_path / "light", press=0.2)
+    excluded = findings(recording, analyse(recording)).excluded
+    assert any(sentence.startswith("No dynamic friction is given for strokes 1, 2:") for sentence in excluded)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))

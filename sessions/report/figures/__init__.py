@@ -15,7 +15,7 @@ from sessions.report.figures.courses import (
     stroke_panel,
 )
 from sessions.report.figures.finger import common_levels, finger_panels
-from sessions.report.figures.relation import PATHS_CAPTION, paths_panel, relation_panel, score_panel
+from sessions.report.figures.relation import PATHS_CAPTION, SCORES_CAPTION, paths_panel, relation_panel, score_panel
 from sessions.report.figures.style import Panel, Plate, look
 from sessions.report.wording import shown_response
 
@@ -91,7 +91,8 @@ def _relations(report: Report) -> Panels:
 
 
 def _paths(report: Report) -> Panels:
-    return (paths_panel(e.name, e.paths, simulated=report.simulated) for e in report.experiments if e.paths)
+    label = shown_response(report.response).label
+    return (paths_panel(e.name, e.paths, label, simulated=report.simulated) for e in report.experiments if e.paths)
 
 
 _PANELS: Mapping[str, Callable[[Report], Panels]] = {
@@ -112,11 +113,7 @@ _CAPTIONS: Mapping[str, str] = {
         " greatest value. Curves break where readings are missing. Grey: the strokes that were found, with their"
         " numbers; discarded takes are not searched."
     ),
-    "scores": (
-        "Scores against the index its maker gave each stimulus. Large dots: mean over subjects; bars: 95 % interval "
-        "of the mean, mean ± t(0.975, n − 1) s / √n with n subjects. Small dots, moved left: each subject's own score"
-        " (the mean of its repeats). Grey line: score equal to index."
-    ),
+    "scores": SCORES_CAPTION,
     "friction": (
         "Ratio of tangential to normal force from contact onset on. Thick: the steady window, over which the dynamic "
         "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
@@ -144,8 +141,9 @@ _CAPTIONS: Mapping[str, str] = {
     ),
     "relation": (
         "Predicted {response} against mean score, with the stimulus's index. Circles: scores of whoever made the "
-        "strokes. Across: 95 % t interval. Upright: error of the mesh. Line: least squares. r: Pearson's, Fisher's z "
-        "interval. Range: greatest less least, and its share of their middle."
+        "strokes. Across: 95 % t interval. Upright: thick, error of the mesh; thin, 95 % interval of friction. "
+        "Line: least squares. r: Pearson's, Fisher's z interval. Range: greatest less least, and its share of their "
+        "middle."
     ),
     "paths": PATHS_CAPTION,
 }

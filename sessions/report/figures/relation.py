@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from sessions.report.contents import Answers, Experiment, Numbers, PredictionFinding
+from sessions.prediction.stored import Ends
+from sessions.report.contents import Experiment, Numbers, PredictionFinding
 from sessions.report.figures.style import (
     GREEN,
     GREY,
@@ -29,83 +30,40 @@ from sessions.report.figures.style import (
 )
 from sessions.report.tables.rivals import rival_words
 from sessions.report.tables.study_models import study_model
-from sessions.report.wording import ShownResponse, correlation, shown_response, spread_share
+from sessions.report.wording import ShownResponse, correlation, plural, shown_response, spread_share
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import CHOICE_LABELS, CHOICES, PathFinding, by_choice, correlations
 from sessions.statistics.scores import MeanScore
 
 _TICKS = [0, 20, 40, 60, 80, 100]  # of a scale of scores
-_LONG, _HIGH = 22.0, 6.0  # of the words along the line and across it [points of either axis]
-_AWAY = 3.0  # that no dot may come nearer [points]
 
 
-def _free_place(experiment: Experiment) -> tuple[float, bool] | None:
-    """Return where on the line of equal score and index its words may begin, and whether above it; None: nowhere.
-
-    That is where dots and bars lie farthest from them.
-    """
-    dots = [dot for answers in experiment.answers for dot in _dots(experiment, answers)]
-    for mean in experiment.scores:
-        low, high = (mean.mean if end is None else end for end in (mean.low, mean.high))
-        dots += [(mean.index, y) for y in np.linspace(low, high, 9).tolist()]
-    along = np.array([(x + y) / 2.0 for x, y in dots])
-    across = np.array([y - x for x, y in dots])
-
-    def room(start: float, *, above: bool) -> float:
-        along_bar = np.maximum(np.maximum(start - along, along - start - _LONG), 0.0)
-        low, high = (1.0, 2.0 * _HIGH) if above else (-2.0 * _HIGH, -1.0)  # y - x grows twice as fast as the way across
-        over = np.maximum(np.maximum(low - across, across - high), 0.0) / 2.0
-        return float(np.hypot(along_bar, over).min(initial=np.inf))
-
-    places = [(start, above) for start in range(2, 70) for above in (True, False)]
-    best = max(places, key=lambda place: room(float(place[0]), above=place[1]))
-    return (float(best[0]), best[1]) if room(float(best[0]), above=best[1]) >= _AWAY else None
-
-
-def _dots(experiment: Experiment, answers: Answers) -> list[tuple[float, float]]:
-    """Return where the scores of one subject are drawn, left of their index."""
-    pairs = zip(experiment.indices, answers.scores, strict=True)
-    return [(index - 3.0, score) for index, score in pairs if score is not None]
-
-
-def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
+def score_panel(judged: Experiment | DescriptorFindings, *, simulated: bool) -> Panel:
     """Return mean score against index, with 95 % t intervals and every subject's answer beside them."""
+    name = judged.name if isinstance(judged, Experiment) else judged.descriptor
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
-    _draw_identity(axes, _free_place(experiment))
-    for answers in experiment.answers:
-        own = _dots(experiment, answers)
-        axes.plot([x for x, _ in own], [y for _, y in own], "o", ms=2, color=GREY, alpha=0.55, mew=0)
-    for mean in experiment.scores:
-        _draw_mean(drawn, axes, mean)
-    low = min([-4.0, *(m.low - 2 for m in experiment.scores if m.low is not None)])
-    axes.set(xlim=(-9, 106), ylim=(low, 109), xticks=experiment.indices, yticks=_TICKS, title=experiment.name)
-    axes.set(xlabel=f"index of {experiment.descriptor} [–]", ylabel=f"score of {experiment.descriptor} [0–100]")
-    name, title = f"scores-{experiment.name}", f"Scores of {experiment.descriptor} against the stimuli's index"
-    header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
-    header += tuple(f"score of {answers.subject}" for answers in experiment.answers)
-    by_index = dict(
-        zip(experiment.indices, zip(*(one.scores for one in experiment.answers), strict=True), strict=False)
-    )
-    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in experiment.scores)
-    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
-
-
-def _draw_identity(axes: Axes, place: tuple[float, bool] | None) -> None:
-    """Draw the line on which score and index are equal, with its words where there is a place for them."""
     axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
-    if place is None:
-        return
-    start, above = place
-    off = 1.5 if above else -1.5
-    turn: dict[str, Any] = {"rotation": 45, "rotation_mode": "anchor", "transform_rotates_text": True}
-    side = "bottom" if above else "top"
-    axes.text(start - off, start + off, "score = index", color=GREY, va=side, fontsize=7.5, **turn)
+    places = [index - 3.0 for index in judged.indices]
+    for scores in judged.answers.values():
+        own = [math.nan if score is None else score for score in scores]
+        axes.plot(places, own, "o", ms=2, color=GREY, alpha=0.55, mew=0)
+    for mean in judged.scores:
+        _draw_mean(drawn, axes, mean)
+    low = min([-4.0, *(m.low - 2 for m in judged.scores if m.low is not None)])
+    axes.set(xlim=(-9, 106), ylim=(low, 109), xticks=judged.indices, yticks=_TICKS, title=name)
+    axes.set(xlabel=f"index of {judged.descriptor} [–]", ylabel=f"score of {judged.descriptor} [0–100]")
+    title = f"Scores of {judged.descriptor} against the stimuli's index"
+    header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
+    header += tuple(f"score of {subject}" for subject in judged.answers)
+    by_index = dict(zip(judged.indices, zip(*judged.answers.values(), strict=True), strict=False))
+    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in judged.scores)
+    return Panel(f"scores-{name}", title, svg(drawn, f"scores-{name}", title, simulated=simulated), header, rows)
 
 
 def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
-    text = f"index {mean.index}: mean {mean.mean:.1f}, {mean.n} subjects"
+    text = f"index {mean.index}: mean {mean.mean:.1f}, {plural(mean.n, 'subject')}"
     if mean.low is not None and mean.high is not None:
         text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
         ends = [[mean.mean - mean.low], [mean.high - mean.mean]]
@@ -117,38 +75,29 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     """Return the figures a study has numbers for, in their order."""
     simulated, shown = bool(study.simulated), shown_response(study.response)
     with look():
-        scores = tuple(score_panel(_experiment(one), simulated=simulated) for one in study.descriptors if one.scores)
+        scores = tuple(score_panel(one, simulated=simulated) for one in study.descriptors if one.scores)
         relations = tuple(_relation(one, shown, simulated=simulated) for one in study.descriptors if one.points)
-    along = (paths_panel(one.descriptor, one.paths, simulated=simulated) for one in study.descriptors if one.paths)
-    paths = tuple(panel for panel in along if panel is not None)
-    caption = f"Score against the {shown.label} {RELATION} Model: {study_model(study)}."
+    of_paths = [one for one in study.descriptors if one.paths]
+    along = (paths_panel(one.descriptor, one.paths, shown.label, simulated=simulated) for one in of_paths)
+    caption = (
+        f"Score against the {shown.label} predicted from the same subject's own stroke. Small dots and thin lines: "
+        "each subject; large dots: means over subjects with the surface's index, bars their 95 % t intervals. "
+        f"Model: {study_model(study)}."
+    )
     plates = (
         Plate("relation", caption, relations),
-        Plate("scores", SCORES, scores),
-        Plate("paths", PATHS_CAPTION, paths),
+        Plate("scores", SCORES_CAPTION, scores),
+        Plate("paths", PATHS_CAPTION, tuple(panel for panel in along if panel is not None)),
     )
     return tuple(plate for plate in plates if plate.panels)
 
 
-SCORES = (
+SCORES_CAPTION = (
     "Scores against the index its maker gave each surface. Large dots: mean over subjects; bars: 95 % interval of the "
-    "mean, mean ± t(0.975, n − 1) s / √n with n subjects. Small dots, moved left: each subject's own score. Grey line: "
-    "score equal to index."
+    "mean, mean ± t(0.975, n − 1) s / √n with n subjects. Small dots, moved left: each subject's own score (the mean "
+    "of its repeats). Grey line: score equal to index."
 )
-RELATION = (
-    "predicted from the same subject's own stroke. Small dots and thin lines: each subject; "
-    "large dots: means over subjects with the surface's index, bars their 95 % t intervals."
-)
-
-
 MOST = 400  # points that tell their values each on their own
-
-
-def _experiment(one: DescriptorFindings) -> Experiment:
-    """Return the scores of a descriptor as a session's figure takes them."""
-    answers = tuple(Answers(subject, scores) for subject, scores in one.answers.items())
-    name = one.descriptor
-    return Experiment(name, name, "", 0, 0.0, ("", ""), one.indices, one.scores, answers, None, None)
 
 
 def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool) -> Panel:
@@ -193,40 +142,43 @@ def relation_panel(
     means = {mean.index: mean for mean in experiment.scores}
     shown = shown_response(experiment.response)
     pairs = [(p, shown.of(p)) for p in predictions]
-    points = [(means[p.index], numbers) for p, numbers in pairs if numbers is not None and p.index in means]
+    points = [(means[p.index], n, shown.ends(p)) for p, n in pairs if n is not None and p.index in means]
     if len(points) < 2:
         return None
     figure_sheet = _two_columns()
     axes, from_zero = figure_sheet.axes
     related = experiment.score_relation
     rising = related is not None and (related.slope or 0.0) > 0.0
-    for mean, numbers in points:
+    for mean, numbers, friction in points:
         expected = shown.factor * (numbers[0] if related is None else _on_line(related, mean.mean))
-        _point(figure_sheet, mean, numbers, shown, above=shown.factor * numbers[0] >= expected, rising=rising)
+        _point(figure_sheet, mean, numbers, friction, shown, above=shown.factor * numbers[0] >= expected, rising=rising)
         own = experiment.own_scores.get(mean.index)
         if own is not None:
             text = f"index {mean.index}: own score {own:.1f}, {shown.label} {shown.text(shown.factor * numbers[0])}"
             axes.plot(own, shown.factor * numbers[0], "o", color=GREEN, mfc="none", ms=4, gid=figure_sheet.note(text))
     if related is not None:
-        ends = [min(m.mean for m, _ in points), max(m.mean for m, _ in points)]
+        ends = [min(m.mean for m, *_ in points), max(m.mean for m, *_ in points)]
         axes.plot(ends, [shown.factor * _on_line(related, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
-    values = [shown.factor * numbers[0] for _, numbers in points]
+    values = [shown.factor * numbers[0] for _, numbers, _ in points]
     low, high = min(values), max(values)
     room = 0.18 * (high - low or abs(high))
-    axes.set(xlim=(-6, 106), ylim=(low - room, high + room), xticks=_TICKS)
+    drawn = [*(shown.factor * end for *_, friction in points for end in friction or ()), low - room, high + room]
+    axes.set(xlim=(-6, 106), ylim=(min(drawn), max(drawn)), xticks=_TICKS)
     axes.set(xlabel=f"mean score of {experiment.descriptor} [0–100]", ylabel=f"predicted {shown.label} [{shown.unit}]")
     title = f"range of {shown.label}: {shown.text(high - low)} ({spread_share(low, high)})"
     axes.set_title(f"{relation_words(experiment)}\n{title}\n{rival_words(experiment.rivals)}".strip())
     from_zero.plot([0.0] * len(values), values, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
-    from_zero.set(xlim=(-1, 1), ylim=(min(0.0, 1.15 * low), max(0.0, 1.15 * high)), xticks=[], xlabel="from 0")
+    from_zero.set(xlim=(-1, 1), ylim=(min(0.0, 1.15 * low), max(0.0, 1.15 * high)), xticks=[])
+    from_zero.set_xlabel(f"from 0\n[{shown.unit}]")
     from_zero.spines["bottom"].set_visible(False)
     name, title = f"relation-{experiment.name}", f"Predicted {shown.label} against score of {experiment.descriptor}"
     header = ("index", "mean score", "95 % interval low", "95 % interval high", "own score")
     header += (f"{shown.label} [{shown.kept_unit}]", f"error estimate of {shown.label} [-]")
-    relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n in points]
+    header += tuple(f"95 % interval of {shown.label} by friction, {end} [{shown.kept_unit}]" for end in ("low", "high"))
+    relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n, _ in points]
     rows = tuple(
-        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), numbers[0], error)
-        for (m, numbers), error in zip(points, relative, strict=True)
+        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), n[0], error, *(friction or (None, None)))
+        for (m, n, friction), error in zip(points, relative, strict=True)
     )
     return Panel(name, title, svg(figure_sheet, name, title, simulated=simulated), header, rows)
 
@@ -256,15 +208,25 @@ def _on_line(related: Relation, score: float) -> float:
     return related.intercept + related.slope * score
 
 
-def _point(drawn: Sheet, mean: MeanScore, numbers: Numbers, shown: ShownResponse, *, above: bool, rising: bool) -> None:
-    """Draw one stimulus with both errors, its index on the side away from the line."""
+def _point(
+    drawn: Sheet,
+    mean: MeanScore,
+    numbers: Numbers,
+    friction: Ends | None,
+    shown: ShownResponse,
+    *,
+    above: bool,
+    rising: bool,
+) -> None:
+    """Draw one stimulus with its errors, its index on the side away from the line."""
     axes = drawn.axes[0]
     value = shown.factor * numbers[0]
     text = f"index {mean.index}: score {mean.mean:.1f}, {shown.label} {shown.text(value)}"
     if mean.low is not None and mean.high is not None:
         axes.plot([mean.low, mean.high], [value, value], color=GREY, linewidth=0.8, zorder=2)
-    for error in (shown.factor * one for one in numbers[1:]):
-        axes.plot([mean.mean] * 2, [value - error, value + error], color=GREY, linewidth=0.8, zorder=2)
+    mesh = [(numbers[0] - error, numbers[0] + error, 2.4) for error in numbers[1:]]
+    for low, high, width in [*mesh, *([] if friction is None else [(*friction, 0.8)])]:
+        axes.plot([mean.mean] * 2, [shown.factor * low, shown.factor * high], color=GREY, linewidth=width, zorder=2)
     axes.plot(mean.mean, value, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(text))
     right = above != rising  # away from the line
     off = (5 if right else -5, 4 if above else -4)
@@ -281,8 +243,8 @@ PATHS_CAPTION = (
 _BINS = 24
 
 
-def paths_panel(descriptor: str, findings: Sequence[PathFinding], *, simulated: bool) -> Panel | None:
-    """Return the distribution of the correlation over all paths; None where no path has one."""
+def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str, *, simulated: bool) -> Panel | None:
+    """Return the distribution of the correlation of the quantity `label` over all paths; None where none has one."""
     values = correlations(findings)
     numbers = [value for value in values if value is not None]
     if not numbers:
@@ -311,7 +273,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], *, simulated: 
         for before in range(1, len(choices)):
             if choices[before][0] != choices[before - 1][0]:
                 below.axhline(before - 0.5, color=PALE, linewidth=0.6)
-        below.set_xlabel("correlation of SED with score [–]")
+        below.set_xlabel(f"correlation of {label} with score [–]")
         for axes in drawn.axes:
             axes.set_xlim(low - 0.04 * (high - low), high)
             if usual is not None:

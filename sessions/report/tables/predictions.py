@@ -225,9 +225,10 @@ def force_table(report: Report) -> Table | None:
             cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
         )
 
-    width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm"
+    origin = f" ({report.width_origin})" if report.width_origin else ""
+    width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm{origin}"
     caption = (
-        f"Forces of the model, per mm and times {width} (assumed), beside the means measured over the steady window. "
+        f"Forces of the model, per mm and times {width}, beside the means measured over the steady window. "
         "Depth to match: indentation at which the model would press as hard as the subject did. ±: the solver's "
         "estimate of its error, from the mesh. Under each number of the model: the 95 % interval that the uncertainty "
         "of friction makes, and of the measured force where that is to be matched, by derivatives; the width is taken "

@@ -23,10 +23,11 @@ def rivals_table(compared: Compared, quantity: str, model: str) -> Table | None:
 
     The model's other quantities stand in `responses_table`.
     """
+    within = "Steiger (1980), within subjects by bootstrap" if _weighed(compared) else "Steiger (1980)"
     caption = (
         f"r of scores with the {quantity} ({model}) and with what was measured. Differences: with both r made "
-        "positive; Zou (2007), Steiger (1980), within subjects by bootstrap. Left-out error: root mean "
-        "square over surfaces left out. AIC: crossed mixed models. Exploratory, not corrected."
+        f"positive; Zou (2007), {within}. Left-out error: root mean square over surfaces left out. "
+        f"{'AIC: crossed mixed models. ' if _weighed(compared) else ''}Exploratory, not corrected."
     )
     return _table("table-rivals", caption, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
 
@@ -37,16 +38,22 @@ def responses_table(compared: Compared, quantity: str, model: str) -> Table | No
     return _table("table-responses", caption, compared, quantity, lambda name: name != quantity and name in RESPONSES)
 
 
+def _weighed(compared: Compared) -> bool:
+    """Say whether mixed models weigh the rivals, as they do within the subjects of a study."""
+    return any(one.weight is not None or "weight" in one.reasons for _, rivals in compared for one in rivals)
+
+
 def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: Callable[[str], bool]) -> Table | None:
     notes = Notes()
-    groups = [
-        (name, tuple(_row(rival, quantity, notes) for rival in rivals if shown(rival.name)))
-        for name, rivals in compared
-    ]
     columns = (
         f"quantity | n | r | r of {quantity} minus this | Steiger's Z | p | r given the model's µ | "
-        "left-out error [0–100] | AIC weight"
+        f"left-out error [0–100]{' | AIC weight' if _weighed(compared) else ''}"
     )
+    width = columns.count("|") + 1
+    groups = [
+        (name, tuple(_row(rival, quantity, notes)[:width] for rival in rivals if shown(rival.name)))
+        for name, rivals in compared
+    ]
     return table(anchor, caption, columns, groups, notes)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from sessions.report.contents import Report
 from sessions.report.tables import Cell, Notes, Row, Rows, Table, table
-from sessions.report.wording import NONE, capital, digits, p_value, places
+from sessions.report.wording import NONE, capital, digits, p_value, places, plural
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.scales import JUDGEMENTS, Judgement, PairedScale
@@ -91,8 +91,8 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
         zeta = [exponent.zeta for exponent in one.consistence.values()]
         orders = sum(value == CONSISTENT for value in zeta)
         sentences.append(
-            f"{name}: {orders} of {len(zeta)} subjects chose by one order without a circle; mean coefficient of "
-            f"consistence {digits(float(np.mean(zeta)), 2)}."
+            f"{name}: {orders} of {plural(len(zeta), 'subject')} chose by one order without a circle; mean "
+            f"coefficient of consistence {digits(float(np.mean(zeta)), 2)}."
         )
     exponent = one.exponent
     if exponent is not None and exponent.plain is not None:
@@ -163,7 +163,8 @@ def psychometric_sentences(judged: Judged) -> list[str]:
         sentences.append(f"{title}: no subject's answers give a psychometric function; the table says why.")
     falling = sum(not one.rises for one in fitted)
     if falling:
-        sentences.append(f"{title}: {falling} of {len(fitted)} subjects chose the surface of less µ more often.")
+        of = f"{falling} of {plural(len(fitted), 'subject')}"
+        sentences.append(f"{title}: {of} chose the surface of less µ more often.")
     return sentences
 
 

@@ -27,6 +27,7 @@ from sessions.report.wording import (
     correlation,
     digits,
     identifier,
+    p_value,
     places,
     shown_response,
     significant,
@@ -146,9 +147,9 @@ def planted_table(report: Report) -> Table | None:
     )
 
     def row(p: GroundTruth) -> Row:
-        stroke = strokes_by_trial.get(p.trial)
-        cells: list[Cell | str | int] = [p.trial, NONE if stroke is None or stroke.index is None else str(stroke.index)]
-        prediction = predictions.get(p.trial)
+        stroke, prediction = strokes_by_trial.get(p.trial), predictions.get(p.trial)
+        first = stroke or prediction
+        cells: list[Cell | str | int] = [p.trial, NONE if first is None or first.index is None else str(first.index)]
         name, mu = of_predictions.model_mu(stroke, prediction)
         quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
             (name, p.mu, mu, places(3), 1.0),
@@ -165,7 +166,7 @@ def planted_table(report: Report) -> Table | None:
         cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
 
-    names = {p.trial: s.experiment for p in report.planted if (s := strokes_by_trial.get(p.trial)) is not None}
+    names = {trial: one.experiment for trial, one in {**predictions, **strokes_by_trial}.items()}
     groups = group_by_experiment(report, report.planted, lambda p: names.get(p.trial, ""), row)
     caption = (
         "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
@@ -209,7 +210,7 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
     tables: list[Table | None] = []
     for e in report.experiments:
         notes = Notes()
-        rows = [(a.subject, *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers]
+        rows = [(who, *(notes.number(s, places(1), "no score") for s in own)) for who, own in e.answers.items()]
         columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
         caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
         tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)], notes))
@@ -254,7 +255,7 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
         notes.interval(related.low, related.high, correlation, related.reason),
         notes.number(related.spearman, correlation, related.reason),
         rank_interval(related, notes),
-        notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
+        notes.number(related.spearman_p, p_value, related.reason or "too many orders to count"),
         notes.estimate(
             related.slope,
             lambda v: significant(1e6 * v, 3),

@@ -1,0 +1,143 @@
+"""A report's words say no more than its numbers do, and name what they are of."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from report_example import TABLES, example
+from study_example import study
+
+from sessions.prediction.stored import Variant
+from sessions.report import study_prose
+from sessions.report.figures.relation import paths_panel, relation_panel
+from sessions.report.prose import doubts, question, summary
+from sessions.report.tables import predictions as of_predictions
+from sessions.report.tables.session import planted_table, relation_table
+from sessions.report.tables.session import tables as session_tables
+from sessions.report.tables.study import study_tables
+from sessions.report.wording import correlation
+
+FORCE = Variant("small", "computed", "force")
+DOUBT = "Tissue is turned inside out somewhere."
+
+
+@pytest.fixture(scope="module")
+def report():
+    return replace(example(), model="small strain, settled sliding")
+
+
+def under_force(report):
+    """Return the sentence on the measured force."""
+    (sentence,) = [one for one in doubts(report) if "measured normal force" in one]
+    return sentence
+
+
+def with_doubt(one, variant):
+    return replace(
+        one, alternatives=tuple(replace(a, doubt=DOUBT if a.variant == variant else a.doubt) for a in one.alternatives)
+    )
+
+
+def test_a_stimulus_stroked_twice_is_one_point_of_a_correlation_and_not_two(report):
+    twice = replace(report, predictions=(*report.predictions, *report.predictions))
+    assert under_force(twice) == under_force(report)
+    assert "n = 5 stimuli" in under_force(report)
+
+
+def test_a_correlation_over_states_that_no_finger_can_be_in_says_how_many_there_are(report):
+    assert "no finger" not in under_force(report)
+    doubted = tuple(with_doubt(p, FORCE) if p.trial in (7, 8, 9) else p for p in report.predictions)
+    assert re.search(
+        r"slipperiness r = .*n = 5 stimuli \(3 of 5 trials in a state that no finger can be in\)",
+        under_force(replace(report, predictions=doubted)),
+    )
+
+
+def test_the_summary_counts_predictions_in_doubt(report):
+    one, *others = report.predictions
+    words = " ".join(summary(replace(report, predictions=(replace(one, doubt=DOUBT), *others))))
+    assert "1 trial is in a state that no finger can be in" in words
+
+
+def test_what_got_no_prediction_is_a_trial_of_a_plan_or_a_stroke_without_one(report):
+    missing = tuple(replace(p, sed=None) for p in report.predictions[:2])
+    assert "2 trials got no prediction" in " ".join(summary(replace(report, predictions=missing)))
+    unplanned = tuple(replace(p, trial=None) for p in missing)
+    assert "2 strokes got no prediction" in " ".join(summary(replace(report, predictions=unplanned)))
+
+
+def test_two_blocks_of_one_descriptor_are_one_kind_of_judgement_of_the_same_stimuli(report):
+    sticky, _ = report.experiments
+    again = replace(report, experiments=(sticky, replace(sticky, name="stickiness again")))
+    assert question(again).startswith("People scale the stickiness of surfaces")
+    assert "10 subjects scored 5 stimuli." in summary(again)
+
+
+def test_the_question_is_of_the_quantity_that_is_held_against_scores(report):
+    assert "strain-energy density (SED) that a finger model" in question(report)
+    assert "Does the pressure that a finger model" in question(replace(report, response="pressure"))
+    made = study()
+    assert "strain-energy density (SED) that a finger model" in study_prose.question(made)
+    assert "Does the pressure that a finger model" in study_prose.question(replace(made, response="pressure"))
+
+
+def test_the_axis_of_many_paths_names_the_quantity_that_they_are_of(report):
+    panel = paths_panel("stickiness", report.experiments[0].paths, "pressure", simulated=True)
+    assert "correlation of pressure with score [–]" in panel.svg
+
+
+def test_a_width_that_was_set_is_not_called_assumed(report):
+    for origin in ("set", "assumed"):
+        caption = of_predictions.force_table(replace(report, width_origin=origin)).caption
+        assert f"times a width of 15 mm ({origin})" in caption
+
+
+def test_an_exact_p_below_a_thousandth_is_not_shown_as_zero(report):
+    sticky = report.experiments[0]
+    small = replace(sticky.score_relation, spearman_p=2.0 / 3_628_800)  # ten surfaces in perfect order: 2 of 10!
+    table = relation_table(replace(report, experiments=(replace(sticky, score_relation=small),)))
+    assert [row[6].text for row in table.groups[0].rows if row[0].text == "mean score"] == ["< 0.001"]
+
+
+def test_a_trial_whose_planted_stroke_was_not_found_stands_among_its_experiment_s(report):
+    without = replace(
+        report,
+        strokes=report.strokes[1:],
+        predictions=(replace(report.predictions[0], stroke=None), *report.predictions[1:]),
+    )
+    groups = {group.name: [row[:2] for row in group.rows] for group in planted_table(without).groups}
+    assert list(groups) == ["stickiness", "slipperiness"]
+    assert [cell.text for cell in groups["stickiness"][0]] == ["1", "0"]
+
+
+def test_the_error_bars_of_prediction_against_score_hold_what_the_uncertainty_of_friction_makes(report):
+    own = [p for p in report.predictions if p.experiment == "stickiness"]
+    panel = relation_panel(report.experiments[0], own, simulated=True)
+    low, high = (panel.header.index(f"95 % interval of SED by friction, {end} [MPa]") for end in ("low", "high"))
+    seds = np.array([row[3] for row in TABLES["stickiness"].values()])
+    assert [row[low] for row in panel.rows] == pytest.approx(0.995 * seds)  # as the example's intervals are
+    assert [row[high] for row in panel.rows] == pytest.approx(1.005 * seds)
+    doubted = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own], simulated=True)
+    assert {row[low] for row in doubted.rows} == {None}
+
+
+def test_a_difference_of_correlations_that_rounds_to_zero_has_no_minus_sign():
+    assert correlation(-0.004) == "+0.00"
+    assert correlation(-0.006) == "−0.01"
+
+
+def test_one_session_of_a_study_is_no_each():
+    made = study()
+    one = replace(made, visits=made.visits[:1])
+    assert study_prose.seal_sentence(one) == made.visits[0].sealed
+    assert study_prose.seal_sentence(made).startswith("In each of 10 sessions: The predictions")
+
+
+def test_the_table_of_rivals_names_the_weights_of_mixed_models_only_where_there_are_some(report):
+    of_session = session_tables(report)["rivals"][0]
+    of_study = study_tables(study())["rivals"][0]
+    for table, weighed in ((of_session, False), (of_study, True)):
+        assert ("AIC weight" in [column.name for column in table.columns]) == weighed
+        assert ("AIC" in table.caption + " ".join(words for _, words in table.notes)) == weighed
+        assert {len(row) for group in table.groups for row in group.rows} == {len(table.columns)}
