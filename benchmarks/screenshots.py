@@ -126,7 +126,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--setting", help="one setting alone, such as 1366x768-1.5-dark-de_DE")
-    parser.add_argument("--session", type=Path, help="a session folder: then the analyst's places too")
+    parser.add_argument("--session", type=Path, help="a session folder: then Review's places with it too")
     parser.add_argument("--take", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.take:
@@ -168,7 +168,7 @@ def _take(setting: str, out: Path, session: Path | None) -> None:
     camera = _Camera(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
     _Places(camera).all()
     if session is not None:
-        _take_analyst(camera, session)
+        _take_review(camera, session)
 
 
 class _Camera:
@@ -195,45 +195,47 @@ class _Camera:
         widget.grab().save(str(self.path(name)))
 
 
-def _take_analyst(camera: _Camera, session: Path) -> None:
-    """Take a picture of each of the analyst's places, on a copy of a session."""
+def _take_review(camera: _Camera, session: Path) -> None:
+    """Take a picture of each of Review's places, on a copy of a session."""
     from daq_app.analyst import state
-    from daq_app.qt.analyst_window import AnalystWindow
+
+    places = _Places(camera)
+    places.play(*OPEN, until=3.0)
+    folder = Path(tempfile.mkdtemp()) / session.name
+    shutil.copytree(session, folder)
+    places.window.rooms.open(folder)
+    window = places.window.rooms.analyst
 
     def picture(name: str, page: int) -> None:
         camera.wait(lambda: window.state.step is None)
         window._pages.setCurrentIndex(page)
-        camera.picture(name, window)
+        places.picture(name)
 
-    folder = Path(tempfile.mkdtemp()) / session.name
-    shutil.copytree(session, folder)
-    window = AnalystWindow(folder, camera.theme)
-    window.resize(*camera.size)
-    window.show()
-    picture("19-opening", 0)
+    places.picture("19-review-opening")
     camera.wait(lambda: window.state.stage == "predicted")
-    picture("20-analyst-trials", 0)
-    picture("21-analyst-finger", 2)
+    picture("20-review-trials", 0)
+    picture("21-review-finger", 2)
     steady = window.state.report.strokes[0].steady
     window.ask(state.Move(1, "steady begin", steady[0] + 0.1, "E02", "the finger still stuck there"))
-    picture("22-analyst-window-moved", 1)
+    picture("22-review-window-moved", 1)
     window._follow("readings")
     window.stroke.player.step(-300)
-    picture("23-analyst-replay", 1)
+    picture("23-review-replay", 1)
     window.model.near.click()
     window.model.history.click()
     camera.wait(lambda: window.state.film is not None)
     window.model.player.seek(30)
-    picture("24-analyst-history", 2)
+    picture("24-review-history", 2)
     window.model.tabs.setCurrentIndex(1)
     camera.wait(lambda: window.state.drawn)
-    picture("25-analyst-session", 2)
+    picture("25-review-session", 2)
     window.ask(state.Compare(str(session)))
     camera.wait(lambda: "compared" in window.state.drawn)
-    picture("26-analyst-comparison", 2)
+    picture("26-review-comparison", 2)
     window.keys.toggle()
-    picture("27-analyst-keys", 2)
-    window.close()
+    picture("27-review-keys", 2)
+    places.window.rooms.review.leave()
+    places.window.bridge.end()
     shutil.rmtree(folder.parent)
 
 
@@ -257,6 +259,9 @@ class _Places:
         trial, second, other = PLAN.trials[0], PLAN.trials[1], PLAN.trials[5]
         self.play(*OPEN, until=3.0)
         self.picture("01-new-session")
+        self.window.go_to("review")
+        self.picture("01-review-empty")
+        self.window.go_to("prepare")
         self.window.page.subject.setText("Ada Lovelace")
         self.window.page.seed.setText("seven")
         self.window.act("primary")

@@ -265,14 +265,17 @@ def _on_request(state: AnalystState, request: Ask) -> AnalystState:
 
 
 def rows(state: AnalystState) -> tuple[Row, ...]:
-    """Return the list: every stroke in order of time, then trials that have a prediction or a reason but no stroke."""
+    """Return the list: every stroke in order of time, and a trial without one before the strokes of later trials."""
     report = state.report
     if report is None:
         return ()
     by_stroke = {p.stroke: p for p in report.predictions if p.stroke is not None}
     listed = [Row(s.trial, s, by_stroke.get(s.number)) for s in report.strokes]
-    without = [Row(p.trial, None, p) for p in report.predictions if p.stroke is None]
-    return (*listed, *without)
+    for p in report.predictions:
+        if p.stroke is None:
+            later = (at for at, row in enumerate(listed) if (row.trial or 0) > (p.trial or 0))
+            listed.insert(next(later, len(listed)), Row(p.trial, None, p))
+    return tuple(listed)
 
 
 def selected_row(state: AnalystState) -> Row | None:
@@ -295,7 +298,15 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
     after = replace(
         state, stage=message.stage, report=report, history=history, version=version, fingers=fingers, drawn={}
     )
-    return replace(after, row=max(0, min(state.row, len(rows(after)) - 1)))
+    return _at_the_same_row(state, after)
+
+
+def _at_the_same_row(before: AnalystState, after: AnalystState) -> AnalystState:
+    """Return the state after with the row that was chosen before, wherever it stands now."""
+    chosen, keys = selected_row(before), [row.key for row in rows(after)]
+    if chosen is not None and chosen.key in keys:
+        return replace(after, row=keys.index(chosen.key))
+    return replace(after, row=max(0, min(before.row, len(keys) - 1)))
 
 
 def _model_input(stroke: StrokeFinding) -> tuple[int, object]:
@@ -312,4 +323,5 @@ def _fold_answer(state: AnalystState, answered: Answered) -> AnalystState:
     fingers = {key: finger for key, finger in state.fingers.items() if key != (finding.trial, finding.stroke)}
     if answered.finger is not None:
         fingers[finding.trial, finding.stroke] = answered.finger
-    return replace(state, report=replace(report, predictions=(*rest, finding)), fingers=fingers)
+    after = replace(state, report=replace(report, predictions=(*rest, finding)), fingers=fingers)
+    return _at_the_same_row(state, after)

@@ -263,7 +263,7 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
         except (RecordingError, OSError):
             continue
         subject, trials = recording.plan.subject, recording.trials
-        done = sum(record.outcome != "open" for record in trials)
+        done = sum(record.outcome not in ("open", "skipped") for record in trials)
         words = tr("{subject}: trials done {done} of {count}", subject=subject, done=done, count=len(trials))
         unfinished.append(UnfinishedSession(place.parent, words))
     return tuple(unfinished)

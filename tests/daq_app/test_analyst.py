@@ -56,6 +56,19 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
         assert row.trial is None or words.startswith(str(row.trial))
 
 
+def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state):
+    second = state.report.strokes[1]
+    bare = replace(state.report, strokes=tuple(s for s in state.report.strokes if s is not second), predictions=())
+    opened = fold(fold(AnalystState(Path("x")), m.ReportReady("analysed", bare)), m.Choose(1))
+    assert selected_row(opened).trial == 3
+    said = replace(state.report.predictions[1], stroke=None, sed=None)
+    for message in (m.Answered(said, None), m.ReportReady("predicted", replace(bare, predictions=(said,)))):
+        after = fold(opened, message)
+        assert [row.trial for row in rows(after)] == list(range(1, 11))
+        assert rows(after)[1].stroke is None
+        assert selected_row(after).trial == 3
+
+
 def test_a_point_of_prediction_against_score_chooses_its_trial_everywhere(state):
     found = points(state)
     assert found

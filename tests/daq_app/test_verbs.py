@@ -10,17 +10,21 @@ import sqlite3
 import stat
 import zlib
 from contextlib import closing
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from examples import short_protocol
+from recordings import PLAN, TRIAL, begun, ended
 
 from daq_app.cli.main import run
+from sessions.plan.plan import Stimulus
 from sessions.recording import Recording, archive
 from sessions.recording.schema import COLUMNS
 from sessions.strokes import forces
 from sessions.strokes.settings import FilterSettings
+
+ROUGH = replace(TRIAL, stimulus=Stimulus("roughness", 20, "R1"))
 
 
 @pytest.fixture(scope="session")
@@ -252,6 +256,20 @@ def test_a_report_takes_no_scores_twice(session, tmp_path, capsys):
     words = ["report", str(session), "-o", str(tmp_path / "page.html"), "--scores", str(session)]
     assert run(words) == 2
     assert "in the report already" in capsys.readouterr().err
+
+
+def test_a_report_takes_no_visit_that_adds_no_score(session, tmp_path, capsys):
+    skipped = tmp_path / "P08"
+    writer = begun(skipped)
+    writer.event("skip", 1)
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    foreign = ended(tmp_path / "P09", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(ROUGH,)),)))
+    for visit, why in ((skipped, "no score of any stimulus"), (foreign, "no score of a stimulus of this session")):
+        assert run(["report", str(session), "-o", str(tmp_path / "page.html"), "--scores", str(visit)]) == 2
+        sentence = capsys.readouterr().err
+        assert str(visit) in sentence
+        assert why in sentence
 
 
 @pytest.mark.parametrize("words", [["-o", "taken/page.html"], ["--figures", "taken"]])

@@ -28,6 +28,7 @@ from sessions.recording.derived import reveal, score_visits, store_page
 from sessions.report import Further
 from sessions.report.trials import afferent_facts
 from sessions.statistics.multiverse import trial_paths
+from sessions.statistics.scores import score_table
 
 PAGE = "report.html"
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
@@ -66,6 +67,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for one in (recording, *score_only):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
+    for one in score_only[: len(options.scores)]:
+        _check_scores(one, recording)
     from sessions.report import pages
 
     if options.out is not None:
@@ -78,7 +81,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         afferent = usual_settings(options.quantity)
     prediction = predict_session(recording, analysis, console, _prediction_options(recording, options), afferent)
     from sessions.report import findings
-    from sessions.statistics.scores import score_table
 
     further = _further(recording, prediction, afferent, options, console)
     report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)
@@ -93,6 +95,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return FLAWED if analysis.flawed else DONE
+
+
+def _check_scores(visit: Recording, recording: Recording) -> None:
+    """Raise WrongValue where a visit named by --scores adds nothing to a report, not even a sentence."""
+    judged = {(trial.stimulus.descriptor, trial.stimulus.index) for trial in recording.plan.trials}
+    table = score_table(visit)
+    if not table.left_out and judged.isdisjoint((score.descriptor, score.index) for score in table.scores):
+        which = "a stimulus of this session" if table.scores else "any stimulus"
+        raise WrongValue(f"--scores {visit.folder} is not allowed: it holds no score of {which}; leave it out")
 
 
 def _prediction_options(recording: Recording, options: argparse.Namespace) -> PredictionOptions:

@@ -3,6 +3,7 @@ from datetime import datetime
 from pathlib import Path
 
 import pytest
+from recordings import PLAN, TRIAL, begun
 
 from daq_app.recorder.messages import People, StartSession
 from daq_app.window.new_session import (
@@ -14,6 +15,7 @@ from daq_app.window.new_session import (
     enrolment,
     optional_phases,
     pilot_form,
+    unfinished_sessions,
 )
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import Body, protocol_file, protocol_names
@@ -181,3 +183,15 @@ def test_a_pilot_in_a_study_runs_the_studys_protocol_and_leaves_nothing_in_it(tm
     assert made.plan.protocol == "paired-comparison"
     assert Path(made.folder).parent == tmp_path / "pilots"
     assert not any(setting.name == "study" for setting in made.settings)
+
+
+def test_a_skipped_trial_of_a_session_that_was_cut_short_is_not_done(tmp_path):
+    trials = tuple(replace(TRIAL, number=number) for number in (1, 2, 3))
+    writer = begun(tmp_path / "cut", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=trials),)))
+    writer.event("take_started", 1, {"take": 1})
+    writer.event("scored", 1, {"score": 50.0})
+    writer.event("take_kept", 1, {"take": 1})
+    writer.event("skip", 2)
+    writer.close()
+    (cut,) = unfinished_sessions(tmp_path)
+    assert cut.words == "S01: trials done 1 of 3"
