@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,12 +40,13 @@ def _breakable(uri: str) -> Generator[None]:
 
 
 class Tap(WrappedTransducer):
-    """A transducer whose readings are shown on their way into a session."""
+    """A transducer whose readings are shown on their way into a session, which may have a clock that goes on."""
 
-    def __init__(self, inner: Transducer, display: Display) -> None:
-        """Show what `inner` gives on `display`."""
+    def __init__(self, inner: Transducer, display: Display, clock_offset_ns: int) -> None:
+        """Show what `inner` gives on `display`; the session's clock is so far ahead of the transducer's [ns]."""
         super().__init__(inner)
         self._display = display
+        self._clock_offset_ns = clock_offset_ns
 
     def start(self) -> None:
         """Begin to stream."""
@@ -54,6 +56,7 @@ class Tap(WrappedTransducer):
     def read(self, timeout: float) -> ReadingBlock:
         """Return the next readings, and show them."""
         block = super().read(timeout)
+        block = replace(block, received_ns=block.received_ns + self._clock_offset_ns)
         self._display.take(block)
         return block
 
@@ -78,7 +81,7 @@ class Bench:
         """Return the transducer's totals; none where there is none."""
         return Health() if self.connected is None else self.connected.transducer.health
 
-    def connect(self, uri: str, clock: Clock | None = None, *, streaming: bool = True) -> None:
+    def connect(self, uri: str, *, streaming: bool = True) -> None:
         """Open the transducer at `uri` in place of any other, and begin to show what it measures where `streaming`.
 
         Raises what opening and starting raise, NotNow when a stop broke it off; then none is open.
@@ -86,7 +89,7 @@ class Bench:
         self.disconnect()
         try:
             with _breakable(uri):
-                self._open(uri, clock or self._clock)
+                self._open(uri)
                 if streaming:
                     self._start()
         except BaseException:
@@ -130,14 +133,14 @@ class Bench:
                 self.disconnect()
                 raise
 
-    def lent(self) -> Tap | None:
-        """Return the transducer for a session, not streaming; None where there is none."""
+    def lent(self, clock_offset_ns: int) -> Tap | None:
+        """Return the transducer for a session whose clock is so far ahead, not streaming; None where there is none."""
         self._tare = None
         if self.connected is None:
             return None
         self.connected.transducer.stop()
         self._streaming = False
-        return Tap(self.connected.transducer, self._display)
+        return Tap(self.connected.transducer, self._display, clock_offset_ns)
 
     def look(self) -> None:
         """Take what was measured, or try to find a lost transducer again. Raises NotNow when a tare is refused."""
@@ -167,9 +170,9 @@ class Bench:
         self._streaming = True
         self.connected.transducer.start()
 
-    def _open(self, uri: str, clock: Clock) -> None:
+    def _open(self, uri: str) -> None:
         with ExitStack() as stack:
-            opened = stack.enter_context(connect(uri, clock))
+            opened = stack.enter_context(connect(uri, self._clock))
             self._stack = stack.pop_all()
         self.connected, self.uri = opened, uri
         self._display.device(opened.transducer.info)
@@ -195,7 +198,7 @@ class Bench:
         self._again = time.monotonic() + TRY_AGAIN
         try:
             with _breakable(self.uri):
-                self._open(self.uri, self._clock)
+                self._open(self.uri)
         except (LinkLost, DeviceFault, SetupError, NotNow):
             return
         assert self.connected is not None

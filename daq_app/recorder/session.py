@@ -44,8 +44,10 @@ def awake() -> Generator[bool]:
     What is asked for ends with this process, however it ends. A lid that is closed or an empty battery wins.
     """
     if sys.platform == "win32":
-        yield _windows(CONTINUOUS | SYSTEM_REQUIRED)
-        _windows(CONTINUOUS)
+        try:
+            yield _windows(CONTINUOUS | SYSTEM_REQUIRED)
+        finally:
+            _windows(CONTINUOUS)
         return
     command = holder(os.getpid(), sys.platform)
     if command is None or shutil.which(command[0]) is None:
@@ -132,7 +134,7 @@ def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
 
 
 def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup:
-    """Go on with a session that was cut short; its transducer is opened again, on the session's clock.
+    """Go on with a session that was cut short; its transducer is opened again.
 
     Raises RecordingError, NotNow, and what opening the transducer raises.
     """
@@ -152,7 +154,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     people = _recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
         people = replace(request.people, planted=people.planted)
-    info = _reopen(request, recording, bench, going_on)
+    info = _reopen(request, recording, bench)
     _check_people(people, recording.plan, bench, folder)
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
@@ -183,7 +185,7 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
             prepared.plan,
             writer,
             operator,
-            bench.lent() if prepared.plan.forces else None,
+            bench.lent(prepared.clock_offset_ns) if prepared.plan.forces else None,
             resumed=prepared.resumed,
             stop=operator.stop,
             progress=operator.progress,
@@ -339,16 +341,14 @@ def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
     return [Setting(ANY_FOLDER, sentence.partition(";")[0].replace(str(folder.resolve()), "the folder"), "", "set")]
 
 
-def _reopen(
-    request: m.ResumeSession, recording: Recording, bench: Bench, clock: resuming.ContinuedClock
-) -> TransducerInfo | None:
+def _reopen(request: m.ResumeSession, recording: Recording, bench: Bench) -> TransducerInfo | None:
     """Open the transducer of the session anew, and return who it is; None for a visit that only scores."""
     if recording.info is None:
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")
         return None
     uri = request.uri or _recorded_settings(recording).get("device") or recording.info.uri
-    bench.connect(uri, clock, streaming=False)
+    bench.connect(uri, streaming=False)
     info = _transducer_info(bench)
     resuming.check_same_transducer(recording.info, info)
     return info

@@ -42,3 +42,12 @@ def test_what_holds_the_computer_awake_on_linux_ends_with_the_process_it_watches
     watched.communicate(b"\n")
     holding.wait(60)
     assert holder(7, "plan9") is None
+
+
+def test_windows_may_sleep_again_after_a_session_that_failed(monkeypatch):
+    asked = []
+    monkeypatch.setattr(module.sys, "platform", "win32")
+    monkeypatch.setattr(module, "_windows", asked.append)
+    with pytest.raises(OSError, match="full"), awake():
+        raise OSError("full")
+    assert asked == [0x8000_0001, 0x8000_0000]  # ES_CONTINUOUS | ES_SYSTEM_REQUIRED, then ES_CONTINUOUS alone

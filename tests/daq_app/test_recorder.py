@@ -199,6 +199,25 @@ def test_a_client_that_goes_leaves_a_session_recorded_until_the_lift_which_a_new
     assert after.events[: len(before.events)] == before.events
 
 
+def test_a_session_begun_after_one_that_was_resumed_has_readings_and_events_by_one_clock(tmp_path):
+    first = Recorder.start(PACE)
+    started(Desk(first), tmp_path / "s")
+    first.leave()
+    wait_for(tmp_path / "s", lambda recording: recording.end is not None)
+    with Recorder.start(PACE) as second:
+        desk = Desk(second)
+        second.send(ResumeSession(str(tmp_path / "s")))
+        desk.until(AskMount)
+        second.send(Stop())
+        desk.until(Sealed)
+        second.send(StartSession(SHORT, str(tmp_path / "next"), People("simulated hand", 7)))
+        desk.until(Sealed)
+    recording = Recording.open(tmp_path / "next")
+    arrived = recording.readings().received_ns
+    assert recording.events[0].time_ns <= arrived[0]
+    assert arrived[-1] <= recording.events[-1].time_ns
+
+
 @pytest.mark.skipif(os.name != "posix", reason="kill -9 needs POSIX")
 def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_goes_on(tmp_path):
     folder = tmp_path / "s"
