@@ -70,7 +70,7 @@ def _add(info: TransducerInfo, kind: Kind, data: dict[str, Any]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+            file.write(f"\n{line}\n")  # a line before that a full disk cut short is ended first
     except OSError:
         return  # a full disk must not end a session over this
 

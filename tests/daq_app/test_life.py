@@ -44,11 +44,12 @@ def test_drift_noise_and_overloads_are_those_that_were_kept():
     assert known.since == known.last_overload != ""
 
 
-def test_a_torn_line_costs_itself_alone(kept):
+@pytest.mark.parametrize("end", [b"\n", b""])
+def test_a_torn_line_costs_itself_alone(kept, end):
     remember_overload(INFO, (1.2, 0, 0, 0, 0, 0, 1.2))
     (file,) = (kept / "transducers").iterdir()
     with file.open("ab") as torn:
-        torn.write(b'{"time": "2026-11-21", "kind": "zero", "wrench": [1, \xff\n')
+        torn.write(b'{"time": "2026-11-21", "kind": "zero", "wrench": [1, \xff' + end)
     remember_overload(INFO, (1.3, 0, 0, 0, 0, 0, 1.3))
     known = life_of("FT1234")
     assert known is not None
