@@ -131,7 +131,7 @@ _SETTLE = 0.05  # how long after a pause its lump may still be arriving [real s]
 _STEADY = 0.3  # records come as fast as they are made where their lateness changes by less of the time passed [-]
 _LONGEST = 1.0  # that records are kept back while they come faster or slower [real s]
 _LEAD = 1.0  # how fast times and rate follow the session's clock [rad/s]
-_SPREAD = 0.05  # how far the true rate may lie from the stated one [-]
+SPREAD = 0.05  # how far the true rate may lie from the stated or measured one [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +160,7 @@ class ClockRecovery:
         self._limit = GAP * factor + 3.0 * self._period
         self._settle = _SETTLE * factor + self._period
         self._longest = _LONGEST * factor + self._period
-        self.watch = RateWatch(rate, factor, self._limit, vague=2.0 * _SPREAD)
+        self.watch = RateWatch(rate, factor, self._limit, vague=2.0 * SPREAD)
         self._count = 0  # records that came, broken ones too
         self._sequence = 0
         self._time = 0.0
@@ -244,7 +244,7 @@ class ClockRecovery:
         self._sequence, self._time = int(sequence[-1]), float(time[-1])
         self.lost += int(damaged.sum())
         change = 1.0 + max(-0.002, min(0.002, _LEAD * share * late))
-        longest, shortest = self._period_of_times * (1.0 + _SPREAD), self._period_of_times * (1.0 - _SPREAD)
+        longest, shortest = self._period_of_times * (1.0 + SPREAD), self._period_of_times * (1.0 - SPREAD)
         self._period = max(shortest, min(longest, self._period * change))
         return Placement(sequence, time)
 

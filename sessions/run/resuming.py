@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from drivers.clock import Clock
+from drivers.clock_recovery import SPREAD
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan
@@ -91,7 +92,9 @@ def check_same_transducer(recorded: TransducerInfo | None, opened: TransducerInf
         )
     if calibration_hash(opened.calibration) != calibration_hash(recorded.calibration):
         raise RecordingError(f"transducer {opened.serial} is calibrated otherwise than before; begin a new session")
-    if not np.isclose(opened.rate, recorded.rate, rtol=1e-3, equal_nan=True):
+    # A device that counts no ticks of its own has its rate measured when it is opened, good to a few per cent.
+    tolerance = SPREAD if np.isnan(recorded.counter_rate) else 1e-3
+    if not np.isclose(opened.rate, recorded.rate, rtol=tolerance, equal_nan=True):
         raise RecordingError(
             f"transducer {opened.serial} gives {opened.rate:g} readings a second, and gave {recorded.rate:g};"
             " set it as it was"

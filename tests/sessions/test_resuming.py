@@ -1,4 +1,5 @@
 import dataclasses
+import math
 import os
 import random
 from datetime import UTC, datetime
@@ -177,6 +178,13 @@ def test_another_transducer_or_another_rate_is_refused_with_a_sentence():
         check_same_transducer(INFO, dataclasses.replace(INFO, serial="FT2"))
     with pytest.raises(RecordingError, match="gives 100 readings a second, and gave 200"):
         check_same_transducer(INFO, dataclasses.replace(INFO, rate=100.0))
+
+
+def test_a_rate_that_can_only_be_measured_may_be_another_by_a_few_per_cent():
+    controller = dataclasses.replace(INFO, rate=294.9, counter_rate=math.nan)
+    check_same_transducer(controller, dataclasses.replace(controller, rate=296.7))  # two openings over a USB adapter
+    with pytest.raises(RecordingError, match="gives 147 readings a second"):
+        check_same_transducer(controller, dataclasses.replace(controller, rate=147.0))
 
 
 def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forward(tmp_path):
