@@ -186,9 +186,13 @@ def _constants(link: Link) -> wire.Constants:
     return wire.parse_constants(_reply(link, wire.read_memory(0)), _reply(link, wire.read_memory(2)))
 
 
-def _reply(link: Link, request: bytes) -> bytes | None:
+def _reply(link: Link, request: bytes) -> bytes:
+    """Return the answer to a request. Raises LinkLost when there is none."""
     link.send(request)
-    return link.receive(_ANSWER)
+    answer = link.receive(_ANSWER)
+    if answer is None:
+        raise LinkLost("the converter does not answer; pull its plug and put it in again")
+    return answer
 
 
 DRIVER = Driver("labjack-u6", open_labjack_u6, identify_labjack_u6, ("labjack-u6://",))

@@ -122,14 +122,14 @@ def scan_clock(rate: float) -> ScanClock:
     return ScanClock(flags, interval, ticks / interval)
 
 
-def parse_identity(answer: bytes | None) -> Identity:
+def parse_identity(answer: bytes) -> Identity:
     """Return who answers. Raises DeviceFault when the answer is none."""
     data = _data(answer, 0x08, 38)
     serial = int.from_bytes(data[9:13], "little")
     return Identity(serial, f"{data[4]}.{data[3]:02d}", bool(data[31] & 0x08))
 
 
-def parse_constants(positive: bytes | None, negative: bytes | None) -> Constants:
+def parse_constants(positive: bytes, negative: bytes) -> Constants:
     """Return the constants in the answers for blocks 0 and 2. Raises DeviceFault when there are none to trust."""
     slope, _, _, _ = _fixed_points(_data(positive, 0x2D, 40)[2:])
     negative_slope, centre, _, _ = _fixed_points(_data(negative, 0x2D, 40)[2:])
@@ -139,18 +139,18 @@ def parse_constants(positive: bytes | None, negative: bytes | None) -> Constants
     return Constants(slope, negative_slope, centre)
 
 
-def check_configuration(answer: bytes | None) -> None:
+def check_configuration(answer: bytes) -> None:
     """Raise DeviceFault unless the answer confirms a stream's settings."""
     _data(answer, 0x11, 8)
 
 
-def normal_error(answer: bytes | None, command: int) -> int:
-    """Return the error code of the answer to START (0xA9) or STOP (0xB1), 0 for none. Raises DeviceFault for no answer.
+def normal_error(answer: bytes, command: int) -> int:
+    """Return the error code of the answer to START (0xA9) or STOP (0xB1), 0 for none. Raises DeviceFault.
 
     >>> normal_error(bytes.fromhex("E5B13400"), 0xB1)
     52
     """
-    if answer is None or len(answer) != 4 or answer[1] != command or answer[0] != _sum8(answer[1:]):
+    if len(answer) != 4 or answer[1] != command or answer[0] != _sum8(answer[1:]):
         raise DeviceFault(f"the converter gave no answer that can be read to command {command - 1:#04x}")
     return answer[2]
 
@@ -223,10 +223,8 @@ class StreamDecoder:
         del self._bytes[:count]
 
 
-def _data(answer: bytes | None, command: int, length: int) -> bytes:
+def _data(answer: bytes, command: int, length: int) -> bytes:
     """Return the data of an extended answer from its error code on. Raises DeviceFault when it is none or refuses."""
-    if answer is None:
-        raise DeviceFault("the converter does not answer; pull its plug and put it in again")
     if answer[:2] == b"\xb8\xb8":
         raise DeviceFault("the converter found a request garbled; check the USB cable")
     if len(answer) != length or answer[3] != command or not _is_sound(answer):

@@ -235,6 +235,31 @@ def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plugged, cal
     assert 0 <= device._done - (health.received + health.lost) <= 170
 
 
+class Forgetful(LabJackU6Box):
+    """A converter that leaves so many requests to start unanswered."""
+
+    unanswered = 0
+
+    def command(self, request):
+        super().command(request)
+        if request == wire.START and self.unanswered:
+            self.unanswered -= 1
+            self.answer()
+
+
+def test_a_converter_that_answers_late_after_its_plug_was_put_in_again_is_read_on(plugged, cal):
+    faults, clock = Faults(), RealClock()
+    device = plugged(Forgetful(Bench(3), clock, faults=faults))
+    transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=300", clock)
+    transducer.start()
+    device.unanswered = 1
+    faults.put(Fault("unplug", device.now(), device.now() + 0.1))
+    while transducer.health.restarted == 0:
+        transducer.read(0.1)
+    transducer.close()
+    assert transducer.health.lost > 300, "for a second nothing answered"
+
+
 def test_two_converters_are_told_apart_by_serial_number_and_neither_is_taken_unasked(plugged, cal):
     plugged(box(RealClock(), serial=11), box(RealClock(), serial=22))
     with pytest.raises(SetupError, match="several are plugged in; add serial= one of 11, 22"):
