@@ -78,7 +78,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
         sender = context.Process(target=send, args=(rate, seconds + 5.0, theirs), daemon=True)
         sender.start()
         port, info = there.recv(), replace(transducer.info, rate=float(TOP))
-        transducer = NetFtTransducer(info, lambda: UdpLink("127.0.0.1", port), lambda: info, clock_at(factor))
+        transducer = NetFtTransducer(info, lambda _: UdpLink("127.0.0.1", port), lambda: info, clock_at(factor))
     calibration = transducer.info.calibration
     transducer.start()
     ages: list[float] = []

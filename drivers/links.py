@@ -15,19 +15,20 @@ MOST_HEAD = 8 * 1024
 
 
 class UdpLink:
-    """Datagrams to and from one host and port; those of others are not seen."""
+    """Datagrams to and from one address and port; those of others are not seen."""
 
-    def __init__(self, host: str, port: int, deadline: Deadline) -> None:
-        """Bind a free local port. Raises SetupError when the host cannot be found, LinkLost when no way leads there."""
-        address = _resolve(host, deadline)
+    def __init__(self, address: str, port: int) -> None:
+        """Bind a free local port. Raises LinkLost when no way leads to the IP address."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
             self._socket.connect((address, port))
         except OSError as error:
             self._socket.close()
-            raise LinkLost(f"no way leads to {host}: {_reason(error)}; check the network cable and settings") from None
-        self._where = f"{host}, UDP port {port}"
+            raise LinkLost(
+                f"no way leads to {address}: {_reason(error)}; check the network cable and settings"
+            ) from None
+        self._where = f"{address}, UDP port {port}"
         self._timeout = 0.0
         self._socket.settimeout(0.0)
 
@@ -69,16 +70,16 @@ def _name_failures(where: str, missing: str, advice: str, deadline: Deadline) ->
         raise LinkLost(f"nothing answers at {where}: {_reason(error)}; {advice}") from None
 
 
-def tcp_answer(host: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
+def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
     """Return the `size` bytes that answer a request, or as many as came before the connection ended.
 
-    Raises SetupError when the host cannot be found, LinkLost when nothing answers there or not all by the deadline.
+    Raises LinkLost when nothing answers at the IP address, or not all by the deadline.
     """
-    where = f"{host}, TCP port {port}"
+    where = f"{address}, TCP port {port}"
     answer = b""
     with (
         _name_failures(where, "no whole answer", "check the address and the tcp port", deadline),
-        _Call(host, port, deadline) as call,
+        _Call(address, port, deadline) as call,
     ):
         call.send(request)
         while len(answer) < size and (more := call.receive(size - len(answer))):
@@ -87,12 +88,11 @@ def tcp_answer(host: str, port: int, request: bytes, size: int, deadline: Deadli
 
 
 class _Call:
-    """A connection to a port of a host, whose every wait ends by a deadline."""
+    """A connection to a port of an IP address, whose every wait ends by a deadline."""
 
-    def __init__(self, host: str, port: int, deadline: Deadline) -> None:
-        """Connect. Raises SetupError when the host cannot be found, OSError."""
+    def __init__(self, address: str, port: int, deadline: Deadline) -> None:
+        """Connect. Raises OSError."""
         self._deadline = deadline
-        address = _resolve(host, deadline)
         self._socket = socket.create_connection((address, port), timeout=self._remaining())
 
     def __enter__(self) -> "_Call":
@@ -131,18 +131,18 @@ class HttpAnswer:
     body: bytes
 
 
-def http_get(host: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
+def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
     """Return the answer to one GET; the whole exchange ends by the deadline.
 
-    Redirects are not followed. Raises SetupError when the host cannot be found, LinkLost when nothing answers in time
-    or what answers is not HTTP or is longer than MOST_BODY.
+    Redirects are not followed. Raises LinkLost when nothing answers at the IP address in time, or what answers is not
+    HTTP or is longer than MOST_BODY.
     """
-    where = f"http://{host}:{port}{path}"
+    where = f"http://{address}:{port}{path}"
     with (
         _name_failures(where, "no answer", "check power, cable and address", deadline),
-        _Call(host, port, deadline) as call,
+        _Call(address, port, deadline) as call,
     ):
-        call.send(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
+        call.send(f"GET {path} HTTP/1.0\r\nHost: {address}\r\nConnection: close\r\n\r\n".encode("ascii"))
         return _answer(call, where)
 
 
@@ -182,8 +182,11 @@ def _stated_length(head: bytes) -> int | None:
     return None
 
 
-def _resolve(host: str, deadline: Deadline) -> str:
-    """Return the IPv4 address of a host's name. Raises SetupError when it has none, or none is found in time."""
+def resolve(host: str, deadline: Deadline) -> str:
+    """Return the IPv4 address of a host's name. Raises SetupError when it has none, or none is found in time.
+
+    It is asked for once, at opening: a name server that falls silent must not end a stream.
+    """
     hosts: list[str] = []
 
     def look() -> None:

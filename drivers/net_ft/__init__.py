@@ -9,7 +9,7 @@ import numpy as np
 from drivers.address import Address, AddressError, Driver, check_options
 from drivers.clock import Clock
 from drivers.deadline import Deadline
-from drivers.links import UdpLink, http_get, tcp_answer
+from drivers.links import UdpLink, http_get, resolve, tcp_answer
 from drivers.net_ft import wire
 from drivers.net_ft.configuration import Configuration, parse_configuration, true_rate
 from drivers.net_ft.device import NetFtTransducer
@@ -27,6 +27,7 @@ class _Where:
     """The address of a box and the settings that the address requests."""
 
     address: Address
+    host: str  # IPv4 address
     http_port: int
     rdt_port: int
     tcp_port: int
@@ -38,10 +39,10 @@ class _Where:
 
 def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
     """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
-    place = _where(address)
+    place = _where(address, deadline)
     return NetFtTransducer(
         _prepare(place, deadline),
-        connect=lambda limit: UdpLink(address.host, place.rdt_port, limit),
+        connect=lambda _: UdpLink(place.host, place.rdt_port),
         who=lambda: _who(place),
         clock=clock,
         opening=deadline,
@@ -51,11 +52,11 @@ def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTran
 
 def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    place = _where(address)
+    place = _where(address, deadline)
     return _info(place, _configuration(place, deadline))
 
 
-def _where(address: Address) -> _Where:
+def _where(address: Address, deadline: Deadline) -> _Where:
     check_options(address, _OPTIONS)
     if not address.host:
         raise SetupError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
@@ -63,11 +64,15 @@ def _where(address: Address) -> _Where:
     for name, word in chosen.items():
         if word not in _WORDS[name]:
             raise AddressError(f"{address.uri}: {name}={word} must be {' or '.join(_WORDS[name])}")
+    http, rdt, tcp = (
+        address.number(name, usual, 1, 65535) for name, usual in (("http", 80), ("rdt", 49152), ("tcp", 49151))
+    )
     return _Where(
         address,
-        http_port=address.number("http", 80, 1, 65535),
-        rdt_port=address.number("rdt", 49152, 1, 65535),
-        tcp_port=address.number("tcp", 49151, 1, 65535),
+        resolve(address.host, deadline),
+        http_port=http,
+        rdt_port=rdt,
+        tcp_port=tcp,
         rate=address.number("rate", 0, 1, int(COUNTER_RATE)) or None,
         buffered=chosen["mode"] == "buffered",
         set_bias=chosen["bias"] == "set",
@@ -82,7 +87,7 @@ def _prepare(place: _Where, deadline: Deadline) -> TransducerInfo:
         raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
     if place.rate is not None and not _is_rate(configuration, place.rate):
         path = f"/comm.cgi?comrdtrate={place.rate}"
-        answer = http_get(place.address.host, place.http_port, path, deadline)
+        answer = http_get(place.host, place.http_port, path, deadline)
         if answer.status not in (200, 302) or not _is_rate(
             configuration := _configuration(place, deadline), place.rate
         ):
@@ -133,7 +138,7 @@ def _wrench(place: _Where, command: bytes, deadline: Deadline) -> tuple[int, ...
 
 
 def _tcp(place: _Where, command: bytes, size: int, deadline: Deadline) -> bytes:
-    return tcp_answer(place.address.host, place.tcp_port, command, size, deadline)
+    return tcp_answer(place.host, place.tcp_port, command, size, deadline)
 
 
 def _who(place: _Where) -> TransducerInfo | None:
@@ -164,7 +169,7 @@ def _is_rate(configuration: Configuration, rate: int) -> bool:
 
 
 def _configuration(place: _Where, deadline: Deadline) -> Configuration:
-    answer = http_get(place.address.host, place.http_port, "/netftapi2.xml", deadline)
+    answer = http_get(place.host, place.http_port, "/netftapi2.xml", deadline)
     if answer.status != 200:
         raise SetupError(
             f"{place.address.uri}: its web page answers {answer.status} instead of a configuration; "

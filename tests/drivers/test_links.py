@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from drivers.deadline import Deadline
-from drivers.links import MOST_BODY, HttpAnswer, UdpLink, http_get
+from drivers.links import MOST_BODY, HttpAnswer, UdpLink, http_get, resolve
 from drivers.transducer import LinkLost, SetupError
 
 
@@ -110,7 +110,7 @@ def far_end():
 
 
 def test_datagrams_go_both_ways_one_by_one(far_end):
-    link = UdpLink("127.0.0.1", far_end.getsockname()[1], Deadline(5.0))
+    link = UdpLink("127.0.0.1", far_end.getsockname()[1])
     link.send(b"start")
     request, asker = far_end.recvfrom(100)
     for answer in (b"one", b"", b"three"):
@@ -124,7 +124,7 @@ def test_datagrams_go_both_ways_one_by_one(far_end):
 
 
 def test_datagrams_of_strangers_are_not_seen(far_end):
-    link = UdpLink("127.0.0.1", far_end.getsockname()[1], Deadline(5.0))
+    link = UdpLink("127.0.0.1", far_end.getsockname()[1])
     link.send(b"start")
     _, asker = far_end.recvfrom(100)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
@@ -137,7 +137,7 @@ def test_datagrams_of_strangers_are_not_seen(far_end):
 
 def test_a_refused_datagram_is_no_reason_to_give_up(far_end):
     port = far_end.getsockname()[1]
-    link = UdpLink("127.0.0.1", port, Deadline(5.0))
+    link = UdpLink("127.0.0.1", port)
     far_end.close()
     for _ in range(3):
         link.send(b"start")
@@ -146,7 +146,7 @@ def test_a_refused_datagram_is_no_reason_to_give_up(far_end):
 
 
 def test_a_link_that_was_closed_is_lost(far_end):
-    link = UdpLink("127.0.0.1", far_end.getsockname()[1], Deadline(5.0))
+    link = UdpLink("127.0.0.1", far_end.getsockname()[1])
     link.close()
     with pytest.raises(LinkLost):
         link.send(b"start")
@@ -156,4 +156,4 @@ def test_a_link_that_was_closed_is_lost(far_end):
 
 def test_an_unknown_host_is_refused():
     with pytest.raises(SetupError, match="cannot be found"):
-        UdpLink("no.such.host.invalid", 1, Deadline(5.0))
+        resolve("no.such.host.invalid", Deadline(5.0))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hostile_devices import web
 
+from drivers import links
 from drivers.catalog import open_transducer, reachable
 from drivers.clock import PacedClock, RealClock
 from drivers.deadline import Deadline
@@ -125,6 +126,21 @@ def test_a_box_that_goes_on_in_the_same_units_is_not_disturbed_by_looking_at_its
     time.sleep(1.5)  # the page is read again in this time
     transducer.close()
     assert transducer.health.off_units == transducer.health.lost == transducer.health.restarted == 0
+
+
+def test_a_name_server_that_falls_silent_does_not_end_a_stream(box, monkeypatch):
+    transducer = open_transducer(box(clock=RealClock()).uri.replace("127.0.0.1", "localhost"), RealClock())
+    transducer.start()
+
+    def silent(_):
+        raise OSError
+
+    monkeypatch.setattr(links.socket, "gethostbyname", silent)
+    time.sleep(1.5)  # the page is read again in this time
+    transducer.stop()
+    assert transducer.ended is None
+    assert transducer.health.received > 200
+    transducer.close()
 
 
 def test_without_a_rate_the_box_is_left_as_it_is(box):
