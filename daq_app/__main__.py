@@ -11,20 +11,31 @@ def main() -> None:
     answered = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if answered:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until there is somebody to answer Ctrl-C with a sentence
+    _open_streams()
     from daq_app.child_process import keep_current_folder_out, use_one_thread
 
     keep_current_folder_out()
     use_one_thread()
-    from daq_app.cli.main import run
-
-    if answered:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
     first = sys.argv[1] if len(sys.argv) > 1 else "window"
     if first == "window" or first.startswith("--subject-"):
         from daq_app.qt.start import window  # the command line runs where Qt is not installed
 
         sys.exit(window(sys.argv[1 + (first == "window") :]))
-    _leave(run(sys.argv[1:]))
+    from daq_app.cli.main import run
+
+    if answered:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    code = run(sys.argv[1:])
+    if answered:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    _leave(code)
+
+
+def _open_streams() -> None:
+    """Open the null device in place of standard streams that are closed, so that no other file gets their number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
 
 
 def _leave(code: int) -> None:

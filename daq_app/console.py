@@ -8,14 +8,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TextIO
 
 from solver.progress import listening
 
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130  # exit codes
-_MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 _COLUMNS = 80  # of a terminal that does not say how many it has
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
 
@@ -47,8 +46,8 @@ class NotWritten(Exception):
     """What was said could not be written: why, where, and what to do."""
 
 
-def takes_all(*streams: TextIO | None) -> None:
-    """Let each stream write what its encoding has no letters for as escapes: no answer is lost to a dash."""
+def takes_all(*streams: TextIO) -> None:
+    """Let each stream read and write what its encoding has no letters for as escapes: no answer is lost to a dash."""
     for stream in streams:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -94,7 +93,7 @@ class Console:
         self._end_progress()
         for line in lines:
             if line is not None:
-                print(harmless(line), file=self._err, flush=True)
+                self._tell(harmless(line))
 
     def result(self, document: Mapping[str, Any]) -> None:
         """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""
@@ -116,9 +115,9 @@ class Console:
             return
         self._shown = now
         if terminal:
-            print(f"\r\x1b[K{self._bar(harmless(text), now, end_known)}", end="", file=self._err, flush=True)
+            self._tell(f"\r\x1b[K{self._bar(harmless(text), now, end_known)}", end="")
         else:
-            print(f"{100 * done:3.0f} %  {text}", file=self._err, flush=True)
+            self._tell(f"{100 * done:3.0f} %  {harmless(text)}")
         self._line_open = terminal
 
     def reporter(self, text: str, until: float = 1.0) -> Callable[[float], bool]:
@@ -191,9 +190,14 @@ class Console:
                 f"the answer could not be written to standard output ({why}); free space there, or send it elsewhere"
             ) from error
 
+    def _tell(self, text: str, end: str = "\n") -> None:
+        """Print on stderr; where that is full, or nobody reads it any more, what is being done goes on."""
+        with suppress(OSError):
+            print(text, end=end, file=self._err, flush=True)
+
     def _end_progress(self) -> None:
         if self._line_open:
-            print(file=self._err)
+            self._tell("")
             self._line_open = False
 
 
@@ -212,28 +216,3 @@ def table(rows: list[list[str]], *, head: list[str]) -> str:
         for line in lines
     ]
     return "\n".join(text.rstrip() for text in aligned)
-
-
-def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
-    """Return a number times a factor with so many significant digits, and a dash where there is none.
-
-    Of numbers below a million all digits before the point are there.
-
-    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(1423.4, 2)
-    ('0.00526', '–', '12.0', '1,423')
-    """
-    if value is None:
-        return "–"
-    value *= factor
-    return f"{value:,.0f}" if 10.0**digits <= abs(value) < 1e6 else f"{value:#.{digits}g}".rstrip(".")
-
-
-def span(low: float, high: float, digits: int = 3) -> str:
-    """Return a range with so many significant digits, and more where its ends would read alike.
-
-    >>> span(1.0, 2.5), span(-178.94, -178.91), span(2.0, 2.0)
-    ('1.00 to 2.50', '-178.94 to -178.91', '2.00 to 2.00')
-    """
-    while low != high and digits < _MOST_DIGITS and number(low, digits) == number(high, digits):
-        digits += 1
-    return f"{number(low, digits)} to {number(high, digits)}"

@@ -13,6 +13,8 @@ FOLDER = Path(__file__).parent / "translations"
 VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this process and to those that it starts
 SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.xlf
 
+_MOST_DIGITS = 9  # of a range whose ends read alike with fewer
+
 T = TypeVar("T")
 
 
@@ -64,17 +66,45 @@ def quantity(value: float | None, digits: int, unit: str = "") -> str:
     return f"{round(value, digits) + 0.0:.{digits}f} {unit}".rstrip().replace("-", "−")
 
 
+def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
+    """Return a number times a factor with so many significant digits, and a dash where there is none.
+
+    Of numbers below a million all digits before the point are there.
+
+    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(1423.4, 2), number(99.96, 2)
+    ('0.00526', '–', '12.0', '1,423', '100')
+    """
+    if value is None:
+        return "–"
+    value *= factor
+    shown = f"{value:#.{digits}g}".rstrip(".")
+    return f"{value:,.0f}" if 10.0**digits <= abs(float(shown)) < 1e6 else shown
+
+
+def span(low: float, high: float, digits: int = 3) -> str:
+    """Return a range with so many significant digits, and more where its ends would read alike.
+
+    >>> span(1.0, 2.5), span(-178.94, -178.91), span(2.0, 2.0)
+    ('1.00 to 2.50', '-178.94 to -178.91', '2.00 to 2.00')
+    """
+    while low != high and digits < _MOST_DIGITS and number(low, digits) == number(high, digits):
+        digits += 1
+    return f"{number(low, digits)} to {number(high, digits)}"
+
+
 def errors_words(mesh: float | None, effect: str = "") -> str:
     """Return what stands behind a number of the model: its relative error from the mesh, and from what is left out.
 
     >>> errors_words(0.0036, "viscosity 4 % of the SED"), errors_words(None)
     (' ± 0.36 % by the mesh; model: viscosity 4 % of the SED', '; mesh, model: no estimate')
     """
+    from solver.prediction import percent  # here: most verbs have no need of the solver
+
     if mesh is None and not effect:
         return tr("; mesh, model: no estimate")
     return tr(
         "{mesh}; model: {effect}",
-        mesh=tr("; mesh: no estimate") if mesh is None else tr(" ± {share:.2g} % by the mesh", share=100 * mesh),
+        mesh=tr("; mesh: no estimate") if mesh is None else tr(" ± {share} by the mesh", share=percent(mesh)),
         effect=effect or tr("no estimate"),
     )
 

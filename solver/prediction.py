@@ -161,10 +161,10 @@ class Prediction:
 def percent(part: float) -> str:
     """Return a part in per cent for people, two digits or all before the point.
 
-    >>> percent(0.00432), percent(1.42)
-    ('0.43 %', '142 %')
+    >>> percent(0.00432), percent(0.996), percent(1.42)
+    ('0.43 %', '100 %', '142 %')
     """
-    return f"{100.0 * part:.2g} %" if abs(part) < 1.0 else f"{100.0 * part:.0f} %"
+    return f"{100.0 * part:.2g} %" if abs(part) < 0.995 else f"{100.0 * part:.0f} %"
 
 
 def _response(response: Response) -> dict[str, float | None]:

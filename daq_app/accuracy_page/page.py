@@ -12,7 +12,7 @@ from typing import TypeVar
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from daq_app.accuracy_page.figures import plates
-from daq_app.console import number
+from daq_app.wording import number
 from sessions.report.figures.style import Plate
 from sessions.report.pages import embed, swap_in
 from solver.prediction import percent

@@ -7,8 +7,9 @@ import traceback
 from types import ModuleType
 from typing import NoReturn
 
-from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, WrongValue, harmless, takes_all
+from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, WrongValue, takes_all
 
+HELP = frozenset({"-h", "--help"})
 LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
 
 # Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
@@ -70,8 +71,8 @@ _OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code. Never raises, save for a broken interpreter."""
     debug = "--debug" in arguments
-    takes_all(sys.stdout, sys.stderr)
     try:
+        takes_all(sys.stdin, sys.stdout, sys.stderr)
         return _dispatch(arguments)
     except KeyboardInterrupt:
         return _report("stopped", STOPPED)
@@ -91,18 +92,26 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _dispatch(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in {"-h", "--help"}:
-        _overview().print_help(sys.stdout if arguments else sys.stderr)
-        return DONE if arguments else WRONG
+    if not arguments:
+        Console(as_json=False).note(_overview().format_help().rstrip())
+        return WRONG
     name, *rest = arguments
+    if name in HELP:
+        return _help(_overview())
     if name not in VERBS:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
     verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
-    try:
-        options = _parser(name, verb).parse_args(_join_normal(rest))
-    except SystemExit as leaving:  # argparse has printed its help
-        return int(leaving.code or 0)
+    parser = _parser(name, verb)
+    if HELP & {*rest}:
+        return _help(parser)
+    options = parser.parse_args(_join_normal(rest))
     return verb.run(options, Console(as_json=options.json))
+
+
+def _help(parser: argparse.ArgumentParser) -> int:
+    """Print how a command line is used; argparse itself would say nothing where that cannot be written."""
+    Console(as_json=False).say(parser.format_help().rstrip())
+    return DONE
 
 
 def _join_normal(arguments: list[str]) -> list[str]:
@@ -177,5 +186,5 @@ def _exceptions(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
 
 
 def _report(sentence: str, code: int) -> int:
-    print(f"daq-app: {harmless(sentence)}", file=sys.stderr)
+    Console(as_json=False).note(f"daq-app: {sentence}")
     return code

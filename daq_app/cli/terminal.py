@@ -30,10 +30,10 @@ WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal t
 class Terminal:
     """Reads lines in a thread of its own, so that nobody's slowness holds up the recording."""
 
-    def __init__(self, *, forces: bool, lines: TextIO | None = None, out: TextIO | None = None) -> None:
+    def __init__(self, console: Console, *, forces: bool, lines: TextIO | None = None) -> None:
         """Talk on stderr and listen on stdin; `forces` is False where no transducer tells when a stroke is done."""
         self._forces = forces
-        self._out = out or sys.stderr
+        self._print = console.note
         self._command: steps.Command | None = None
         self._lines: deque[str] = deque()
         self.closed = False  # nobody can type any more
@@ -139,9 +139,6 @@ class Terminal:
                 return steps.PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
             case _:
                 return None
-
-    def _print(self, sentence: str) -> None:
-        print(sentence, file=self._out, flush=True)
 
     def _read(self, lines: TextIO) -> None:
         for line in lines:
@@ -280,7 +277,7 @@ class _Attendance:
     def _begin(self, begun: m.SessionBegun) -> None:
         self._begun = begun
         if begun.people == "people":
-            self._terminal = Terminal(forces=begun.plan.forces)
+            self._terminal = Terminal(self._console, forces=begun.plan.forces)
 
     def _show_status(self, status: Status) -> None:
         if self._terminal is None and self._begun is not None:

@@ -4,6 +4,7 @@ import argparse
 import ctypes
 import gc
 import os
+import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -137,6 +138,8 @@ def open_window(
             bridge.report_drawing_failure(error)
 
     sys.excepthook = show_error
+    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # from now on Ctrl-C in a terminal ends no session
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     bridge.begin()
     return window
 

@@ -22,7 +22,7 @@ from sessions.strokes import FrictionParameters
 from sessions.strokes.settings import RatioSettings
 from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
-from solver.prediction import ROW, Prediction
+from solver.prediction import ROW, Prediction, percent
 from solver.response.fields import fields_of
 from solver.response.stepper import LivePicture, Stepper, stepper
 
@@ -193,7 +193,7 @@ def _greatest_effect(prediction: Prediction) -> str:
     """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
     known = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
     name = max(known, key=lambda one: known[one], default="")
-    return name and f"{name} {float(f'{100 * known[name]:.2g}'):g} % of the SED"
+    return name and f"{name} {percent(known[name])} of the SED"
 
 
 def place_of_greatest_shortening(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from daq_app.window.live_feed import AXES, LOADS
 from daq_app.window.state import AppState, BenchState, Dismissed, Message
 from daq_app.window.subject import SubjectView, Translate, mirror_view, subject_view
 from daq_app.window.view_course import CourseView, course_view
-from daq_app.wording import quantity, sentence, tr, tr_noop
+from daq_app.wording import number, quantity, sentence, tr, tr_noop
 from drivers.transducer import TransducerInfo
 
 NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
@@ -50,7 +50,7 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
 def greatest(six: tuple[float, ...]) -> str:
     """Return the greatest force and the greatest torque of six."""
     force, torque = max(map(abs, six[:3])), max(map(abs, six[3:]))
-    return f"{1000 * force:.2g} mN, {torque:.2g} N mm"
+    return f"{number(1000 * force, 2)} mN, {number(torque, 2)} N mm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,10 +195,10 @@ def _share(value: float) -> float | None:
 def _noise(value: float, unit: str) -> str:
     """Return a standard deviation in the smaller unit, two digits.
 
-    >>> _noise(0.0042, "N"), _noise(0.052, "N mm")
-    ('4.2 mN', '0.052 N mm')
+    >>> _noise(0.0042, "N"), _noise(0.152, "N"), _noise(0.052, "N mm")
+    ('4.2 mN', '152 mN', '0.052 N mm')
     """
-    return tr("{value:.2g} mN", value=1000 * value) if unit == "N" else f"{value:.2g} {unit}"
+    return f"{number(1000 * value, 2)} mN" if unit == "N" else f"{number(value, 2)} {unit}"
 
 
 def _tare(bench: BenchState) -> str:

@@ -1,8 +1,10 @@
 import importlib
 import os
+import shlex
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -100,21 +102,54 @@ def test_every_failure_the_command_line_tells_of_exists_where_it_is_looked_for(n
     assert issubclass(getattr(importlib.import_module(module), kind), Exception)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("words", [["--help"], ["solve", "--help"]])
+def test_help_that_cannot_be_written_is_exit_code_1_and_a_sentence(words):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "daq_app", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert "could not be written to standard output" in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="asks a shell")
+def test_a_verb_whose_standard_streams_are_closed_does_its_work_as_with_them(tmp_path):
+    words = [
+        sys.executable,
+        "-m",
+        "daq_app",
+        "translate",
+        "--program",
+        "--language",
+        "nl",
+        "--out",
+        tmp_path / "nl.xlf",
+    ]
+    command = f"{shlex.join(map(str, words))} <&- >&- 2>&-"
+    assert subprocess.run(command, shell=True, check=False).returncode == 0
+    assert (tmp_path / "nl.xlf").read_text(encoding="utf-8").startswith("<?xml")
+
+
 @pytest.mark.skipif(os.name != "posix", reason="no process dies of a signal there")
-def test_ctrl_c_before_the_command_line_is_loaded_ends_the_program_without_a_traceback():
-    code = """
+@pytest.mark.parametrize(
+    ("loaded", "words"),
+    [("daq_app.cli.main", ["solve"]), pytest.param("PySide6", ["window"], marks=pytest.mark.qt)],
+)
+def test_ctrl_c_before_anybody_can_answer_it_ends_the_program_without_a_traceback(loaded, words):
+    code = f"""
 import os, signal, sys
 from daq_app.__main__ import main
 
 class Stop:
     def find_spec(self, name, *_):
-        if name == "daq_app.cli.main":
+        if name == "{loaded}":
             os.kill(os.getpid(), signal.SIGINT)
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start what runs in the background without one
 sys.meta_path.insert(0, Stop())
 main()
 """
-    done = subprocess.run([sys.executable, "-c", code, "solve"], capture_output=True, timeout=60, check=False)
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, timeout=60, check=False)
     assert done.returncode == -signal.SIGINT  # which shells tell as 130
     assert done.stderr == b""

@@ -36,7 +36,7 @@ def test_without_json_the_document_stays_unsaid():
 
 def test_an_answer_that_the_output_has_no_letters_for_is_written_with_escapes():
     out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    takes_all(out, None)
+    takes_all(out)
     Console(as_json=False, out=out).say("Ω – 1.5")
     assert out.buffer.getvalue() == rb"\u03a9 \u2013 1.5" + os.linesep.encode()
 
@@ -60,6 +60,19 @@ def test_a_full_disk_is_told_with_what_could_not_be_written_and_where():
         speaker = Console(as_json=as_json, out=Full())
         with pytest.raises(NotWritten, match=r"the answer could not be written to standard output \(no space left"):
             (speaker.result if as_json else speaker.say)({} if as_json else "")
+
+
+def test_what_is_said_beside_the_answer_stops_nothing_where_it_cannot_be_written():
+    class Full(io.StringIO):
+        def write(self, _):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    out = io.StringIO()
+    speaker = Console(as_json=False, out=out, err=Full())
+    speaker.progress(0.5, "half")
+    speaker.note("a warning")
+    speaker.say("the answer")
+    assert out.getvalue() == "the answer\n"
 
 
 def test_a_package_that_is_missing_is_named_with_what_to_install(monkeypatch, capsys):

@@ -12,9 +12,21 @@ from pathlib import Path
 import pytest
 
 from daq_app.cli.terminal import Terminal
+from daq_app.console import Console, takes_all
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
-from sessions.run.steps import Abort, AskMount, AskScore, AskStroke, Pause, Redo, Scored, StimulusMounted, StrokeDone
+from sessions.run.steps import (
+    Abort,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Note,
+    Pause,
+    Redo,
+    Scored,
+    StimulusMounted,
+    StrokeDone,
+)
 
 TRIAL = plan(protocol("sensotact-friction"), "S01", 3).trials[0]
 ENDS = ("not at all", "very")
@@ -23,7 +35,7 @@ ENDS = ("not at all", "very")
 def meant(command, line, *, forces=True):
     """Return what a line means after a command, and what is said about it."""
     out = io.StringIO()
-    terminal = Terminal(forces=forces, lines=io.StringIO(f"{line}\n"), out=out)
+    terminal = Terminal(Console(as_json=False, err=out), forces=forces, lines=io.StringIO(f"{line}\n"))
     while not terminal.closed:
         time.sleep(0.001)
     terminal.show(command)
@@ -50,6 +62,15 @@ def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():
     events, said = meant(AskStroke(TRIAL), "")
     assert events == ()
     assert "Nothing is waiting for Enter now" in said
+
+
+def test_a_note_in_another_encoding_than_the_terminals_is_kept_with_escapes_and_the_next_line_is_heard():
+    lines = io.TextIOWrapper(io.BytesIO("note müde\npause\n".encode("latin-1")), encoding="utf-8")
+    takes_all(lines)
+    terminal = Terminal(Console(as_json=False, err=io.StringIO()), forces=True, lines=lines)
+    while not terminal.closed:
+        time.sleep(0.001)
+    assert terminal.poll() == (Note(r"m\xfcde"), Pause())
 
 
 @pytest.fixture

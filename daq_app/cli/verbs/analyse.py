@@ -9,7 +9,8 @@ import math
 
 from daq_app.batch.derived import analyse_session, analysis_document, outdated_prediction
 from daq_app.cli.options import add_analysis, add_number, add_session, area_law, calibration_error
-from daq_app.console import DONE, FLAWED, Console, number, span, table
+from daq_app.console import DONE, FLAWED, Console, table
+from daq_app.wording import number, span
 from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals
 from sessions.strokes.trial_analysis import Tilt

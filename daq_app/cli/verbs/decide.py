@@ -12,7 +12,8 @@ from typing import Any
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, analyse_session, settings_of, stored_document
 from daq_app.cli.options import add_session
-from daq_app.console import DONE, FLAWED, Console, WrongValue, number
+from daq_app.console import DONE, FLAWED, Console, WrongValue
+from daq_app.wording import number
 from sessions.plan.study import check_code
 from sessions.recording import Recording
 from sessions.recording.derived import gain_error_set

@@ -13,8 +13,9 @@ from typing import Any
 
 from daq_app.batch.derived import analyse_session, predict_session
 from daq_app.cli.options import add_flag, add_seed
-from daq_app.console import DONE, FLAWED, Console, number, table
+from daq_app.console import DONE, FLAWED, Console, table
 from daq_app.simulation.synthetic import Study, StudyCutShort, simulated_study
+from daq_app.wording import number
 from drivers.clock import LONGEST_STEP, clock_at
 from sessions.file_access import holds_something
 from sessions.prediction import PredictionOptions, SessionPrediction

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from daq_app.console import DONE, FLAWED, Console, WrongValue, number, table
+from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connect
+from daq_app.wording import number
 from drivers.catalog import Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock

@@ -15,7 +15,8 @@ import numpy as np
 
 from daq_app.batch.derived import open_visit, stored_settings
 from daq_app.cli.options import add_calibration, add_flag, add_number, add_seed, add_visit, calibration_error
-from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
+from daq_app.console import DONE, FLAWED, Console, WrongValue, table
+from daq_app.wording import number, span
 from sessions.exchange.csv_text import displacement_log
 from sessions.file_access import write_whole
 from sessions.plan.plan import SessionPlan
@@ -187,7 +188,9 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         f"{options.prior:g}. The stiffness is by the width: a finger twice as wide is half as stiff."
     )
     agree = "agree with" if checked.deviation <= AGREE else "DIFFER from"
-    console.say(f"The solver's own forces {agree} those fitted: by {100 * checked.deviation:.1g} % at most.")
+    console.say(
+        f"The solver's own forces {agree} those fitted: by {number(checked.deviation, 1, factor=100)} % at most."
+    )
     if options.scene is not None:
         console.say(f"finger: {options.scene}, for 'daq-app predict SESSION --scene {options.scene}'")
 

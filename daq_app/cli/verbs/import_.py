@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.cli.options import add_height
-from daq_app.console import DONE, FLAWED, Console, WrongValue, number
+from daq_app.console import DONE, FLAWED, Console, WrongValue
+from daq_app.wording import number
 
 if TYPE_CHECKING:
     from sessions.exchange.exported import ExportedSession

@@ -25,7 +25,8 @@ from daq_app.cli.options import (
     calibration_error,
     numbers_by_key,
 )
-from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
+from daq_app.console import DONE, FLAWED, Console, WrongValue, table
+from daq_app.wording import number, span
 from sessions.prediction import (
     BY_NAME,
     PredictionOptions,

@@ -28,7 +28,8 @@ from daq_app.batch.sensitivity import (
 )
 from daq_app.batch.sign_map import Answer
 from daq_app.cli.options import add_kinematics, add_quantity, add_seed, add_workers
-from daq_app.console import DONE, Console, WrongValue, number, table
+from daq_app.console import DONE, Console, WrongValue, table
+from daq_app.wording import number
 from sessions.prediction import QUANTITIES
 from sessions.prediction.surface_series import SERIES
 from sessions.toml_file import load_toml, tables_in, text_of

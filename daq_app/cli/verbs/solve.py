@@ -7,7 +7,8 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.console import DONE, FLAWED, STOPPED, Console, WrongValue, number, table
+from daq_app.console import DONE, FLAWED, STOPPED, Console, WrongValue, table
+from daq_app.wording import number
 from solver.quantities import NAMES, QUANTITIES, Quantity
 
 if TYPE_CHECKING:

@@ -35,6 +35,7 @@ from daq_app.cli.options import (
     within,
 )
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
+from daq_app.wording import number, span
 from sessions.file_access import json_text, read_within_limit
 from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.prediction.surface_series import StudyDesign, planted_strokes
@@ -274,7 +275,7 @@ def _print(study: StudyFindings, files: dict[str, str], console: Console) -> Non
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(
-            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {one.planted:.3g}, "
-            f"found {one.estimate:.3g} ({one.low:.3g} to {one.high:.3g}): {inside}"
+            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {number(one.planted)}, "
+            f"found {number(one.estimate)} ({span(one.low, one.high)}): {inside}"
         )
     console.say(*(f"{what:8}  {path}" for what, path in files.items()))

@@ -268,8 +268,8 @@ def test_a_tare_shows_its_figures_in_newtons_and_how_far_the_zero_has_moved_sinc
     bench = derive_view(after(m.Device(INFO, None), first)).bench
     assert bench.tare == "Fx 8, Fy −7, Fz −1 mN\nTx 0.0, Ty 0.0, Tz 0.0 N mm\nover 1.0 s, n = 200"
     assert bench.drift == "first zero"
-    assert bench.bars[0].noise == "4 mN"
-    assert bench.bars[3].noise == "0.05 N mm"
+    assert bench.bars[0].noise == "4.0 mN"
+    assert bench.bars[3].noise == "0.050 N mm"
     second = logged("zeroed", 1, mean=[14e3, -7e3, -1e3, 0.0, 0.0, 0.0], spread=[4e3] * 6, readings=100, duration=0.5)
     assert derive_view(after(m.Device(INFO, None), first, second)).bench.drift == "6 mN since the first"
 
