@@ -124,11 +124,12 @@ class FingerPainter:
 
     def _name_bone(self, bone: QPolygonF, middle: QPointF) -> None:
         """Write the bone's name where all of it lies on the bone: on the colours around it could not be read."""
-        words = self.painter.fontMetrics().boundingRect("bone").toRectF()
-        words.moveCenter(middle)
-        corners = (words.topLeft(), words.topRight(), words.bottomLeft(), words.bottomRight())
+        words = tr("bone")
+        place = self.painter.fontMetrics().boundingRect(words).toRectF()
+        place.moveCenter(middle)
+        corners = (place.topLeft(), place.topRight(), place.bottomLeft(), place.bottomRight())
         if all(bone.containsPoint(corner, Qt.FillRule.OddEvenFill) for corner in corners):
-            self.painter.drawText(words, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, tr("bone"))
+            self.painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, words)
 
     def _paint_line(self, line: Line) -> None:
         ends = self._to_screen(np.array(line))

@@ -41,7 +41,8 @@ class Header(QWidget):
         lamp = hbox(1, self._simulated, self._lamp, self._words, self._saved, spacing=GRID)
         self._one_row = round(ONE_ROW * scale)
         self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
-        self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
+        longest = tr("saved {age:.1f} s ago", age=99.9)
+        self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance(f"{longest} "))
 
     def show_view(self, view: View) -> None:
         say(self._heading, view.heading)

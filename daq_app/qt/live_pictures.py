@@ -219,7 +219,7 @@ class FingerView(QWidget):
         painter.setPen(QColor(t.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, tr("  SED along the skin [kPa]"))
         painter.drawText(box.adjusted(0, 0, -6, 0), TOP_RIGHT, f"{self._heights.high:g}")
-        ends = (f"  {ROW[0]:g} mm proximal".replace("-", ""), tr("{row:g} mm distal", row=ROW[-1]))
+        ends = (tr("  {row:g} mm proximal", row=-ROW[0]), tr("{row:g} mm distal", row=ROW[-1]))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, ends[0])
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
         painter.setPen(QPen(QColor(t.line), 1))

@@ -163,7 +163,7 @@ class LivePlot(PaintedWidget):
         x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
         named = [curve for curve in self._curves if curve.named]
         several = len(named) > 1
-        unit = self._name[self._name.index("[") :] if several else self._name
+        unit = self._name[max(self._name.find("["), 0) :] if several else self._name
         words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in named)
         room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
         sample = max(min(SAMPLE * self._type_scale, room), 0.0)

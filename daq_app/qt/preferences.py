@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 
 from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
 from daq_app.window.subject import LENGTH
-from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr_noop
+from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr, tr_noop
 from sessions.recording import Setting
 
 THEMES = tr_noop(("system", "light", "dark"))
@@ -129,7 +129,7 @@ class Millimetres:
 
     @property
     def words(self) -> str:
-        return "checked with a ruler" if self.checked else "as the screen says, not checked with a ruler"
+        return tr("checked with a ruler") if self.checked else tr("as the screen says, not checked with a ruler")
 
 
 def millimetres(screen: QScreen) -> Millimetres:

@@ -146,7 +146,8 @@ class Menus:
 
         group = QActionGroup(menu)
         for name, value in values.items():
-            action = menu.addAction(tr(name).capitalize(), lambda value=value: choose(value))
+            words = tr(name)
+            action = menu.addAction(words[:1].upper() + words[1:], lambda value=value: choose(value))
             action.setCheckable(True)
             action.setChecked(value == now)
             group.addAction(action)
@@ -178,7 +179,7 @@ def _version(name: str) -> str:
     try:
         return version(name)
     except PackageNotFoundError:
-        return "unknown"
+        return tr("unknown")
 
 
 class ReviewRoom(QWidget):

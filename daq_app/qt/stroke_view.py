@@ -18,6 +18,7 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
+WORDS: dict[Edge, float] = {"onset": 0.92, "steady begin": 0.8, "steady end": 0.68, "lift": 0.92}  # share of the height
 
 
 class EdgeHandle(QPushButton):
@@ -89,7 +90,7 @@ class EdgeHandle(QPushButton):
         words = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
         self.setToolTip(words)
         spoken = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
-        self.setAccessibleName(f"{spoken} {at} s, {state}{', Enter records' if self._away else ''}")
+        self.setAccessibleName(f"{spoken} {at} s, {state}{tr(', Enter records') if self._away else ''}")
 
 
 class StrokeView(QWidget):
@@ -212,7 +213,7 @@ class StrokeView(QWidget):
                     line.setPen(pg.mkPen(self._tokens.act, width=3 if one.decided else 1.5, style=style))
                     line.setPos(one.time - self._origin)
             label: Any = self._lines[edge][0].label
-            label.setFormat(f"✎ {edge}" if one is not None and one.decided else edge)
+            label.setFormat(f"✎ {tr(edge)}" if one is not None and one.decided else tr(edge))
         self._fill()
 
     def _fill(self) -> None:
@@ -236,9 +237,11 @@ class StrokeView(QWidget):
     def _line(self, edge: Edge, plot: Any) -> Any:  # noqa: ANN401  pyqtgraph has no types
         line: Any = pg.InfiniteLine(angle=90, movable=True, hoverPen=pg.mkPen(self._tokens.text, width=3))
         if plot is self._plots[0]:
-            side = 1.0 if edge in ("lift", "steady end") else 0.0  # on the side where there is room
-            place, anchors = 0.92 if edge in ("onset", "lift") else 0.8, [(side, 0.5)] * 2
-            line.label = pg.InfLineLabel(line, tr(edge), position=place, color=self._tokens.act, anchors=anchors)
+            side = 1.05 if edge in ("lift", "steady end") else -0.05  # where there is room, beside the line
+            place, anchors = WORDS[edge], [(side, 0.5)] * 2
+            ground = self._tokens.surface if edge == "lift" else None  # hides the end of a window close before it
+            look = {"color": self._tokens.act, "fill": ground}
+            line.label = pg.InfLineLabel(line, tr(edge), position=place, anchors=anchors, **look)
             line.label.setFont(font(SMALL, type_scale()))
         line.sigDragged.connect(lambda: self._try(edge, float(line.value()) + self._origin))
         line.sigPositionChangeFinished.connect(lambda: self.moved.emit(edge, float(line.value()) + self._origin))

@@ -25,6 +25,7 @@ from daq_app.qt import preferences
 from daq_app.wording import EXPERIMENTER, VARIABLE, languages, tr, translations
 from sessions.exchange import FORMATS
 from sessions.plan.protocols import protocol_names
+from tests.daq_app.qt.painted_text import painted_texts, paints_by_hand
 
 pytestmark = pytest.mark.qt
 
@@ -32,23 +33,26 @@ pytestmark = pytest.mark.qt
 DATA = re.compile(
     "|".join((*protocol_names(), *FORMATS)) + r"|SIMULATED Net F/T[^:]*|SIM00000|three"
     r"|stickiness|slipperiness|/\S*|English \(en\)|kPa|SED|SVG|PNG|CSV|analyst|dragged by hand"
-    r"|counts per unit read from|Ctrl|P01_\S*|<[^>]*>|&\w+;"
+    r"|counts(?: per unit read from)?|Ctrl|P01_\S*|<[^>]*>|&\w+;|finite strain \d+ to \d+ % of the SED"
+    # The process that reads a recording has the program's own translations:
+    r"|data sets readings/\S*, rows \d+ to \d+|mean before contact, readings: \d+"
 )
-SESSIONS_OWN = ("SIMULATED: the transducer and",)  # sentences of a recording, which the report has too
+# Sentences of a recording, which the report has too; and what the subject reads, whose language is another.
+SESSIONS_OWN = ("SIMULATED: the transducer and", "⟦the subject's page: ⟧")
 FOLDERS = "recent sessions"  # a list of names of folders
 MODELS_OWN = "scene and model"  # a table whose words are the report's
 
 
 def translated(text):
-    return f"⟦{text}⟧"
+    """Return a text with marks around all of it but what is put in for its braces."""
+    pieces = re.split(r"(\{[^}]*\})", text)
+    return "".join(one if one.startswith("{") else f"⟦{one}⟧" for one in pieces if one)
 
 
 def left_in_english(text):
     """Return what of a text is neither within the marks of a translation nor data."""
-    while (shorter := re.sub(r"⟦[^⟦⟧]*⟧", " ", text)) != text:
-        text = shorter
-    rest = DATA.sub(" ", text)
-    return rest if re.search("[A-Za-z]{3}", rest) and not rest.startswith(SESSIONS_OWN) else ""
+    rest = DATA.sub(" ", re.sub(r"⟦[^⟦⟧]*⟧", " ", text))
+    return rest if re.search("[A-Za-z]{3}", rest) and not text.startswith(SESSIONS_OWN) else ""
 
 
 def texts_of(widget):
@@ -78,7 +82,9 @@ def english_in(window):
     found = set()
     for widget in (window, *window.findChildren(QWidget)):
         if not type(widget).__module__.startswith("PySide6") or not widget.objectName().startswith("qt_"):
-            found.update(text for text in texts_of(widget) if left_in_english(text))
+            painted = painted_texts(widget) if widget.isVisible() and paints_by_hand(widget) else []
+            texts = (*texts_of(widget), *(text.words for text in painted))
+            found.update(text for text in texts if left_in_english(text))
     return {text for text in found if not text.startswith("Scroll ")}  # Qt's own
 
 
@@ -102,6 +108,7 @@ def marked_language(tmp_path_factory):
 def test_nothing_is_left_in_english_before_a_session(application, driver):
     window = driver.window
     window.page.subject.setText("P01")
+    window.resize(1920, 1080)  # in which the finger has a place
     window.act("keys")
     window.act("preview")
     application.processEvents()

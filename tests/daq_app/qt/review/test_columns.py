@@ -15,6 +15,7 @@ from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import finger_words
 from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import rows, selected_row
+from daq_app.analyst.stroke import EDGES
 from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
@@ -206,6 +207,27 @@ def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes
     assert handle.text() != before
     QTest.keyClick(handle, Qt.Key.Key_Escape)
     assert handle.text() == before
+
+
+def test_the_words_of_edges_that_are_close_together_are_read_as_those_of_edges_apart(application, window):
+    view, report = window.stroke.stroke, example()
+
+    def words(begin, end):
+        """Return the picture of the word of the lift, and the places of those of the steady window."""
+        steady = report.strokes[0].onset + begin, report.strokes[0].lift - end
+        strokes = (replace(report.strokes[0], steady=steady), *report.strokes[1:])
+        window.take(m.ReportReady("predicted", replace(report, strokes=strokes)))
+        for _ in range(3):
+            view.grab()
+            application.processEvents()
+        places = [view._lines[edge][0].label.textItem.sceneBoundingRect() for edge in EDGES]
+        return view._plots[0].grab(places[-1].adjusted(2, 2, -2, -2).toRect()).toImage(), places[1:3]
+
+    apart, _ = words(0.5, 0.6)
+    close, _ = words(0.5, 0.045)
+    assert close == apart
+    begin, end = words(0.8, 1.35)[1]
+    assert not begin.adjusted(0, 4, 0, -4).intersects(end.adjusted(0, 4, 0, -4))  # without the margins of their lines
 
 
 def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
