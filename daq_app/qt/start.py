@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from daq_app.console import FAILED, STOPPED
 from daq_app.wording import VARIABLE
 
 if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
@@ -25,7 +26,6 @@ if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
 
 SIMULATED_BENCH = "sim:?rate=200"
 ICON = Path(__file__).with_name("daq-app.svg")
-FAILED = 1  # exit code: could not be done
 NO_SCREEN = (
     "there is no screen to open a window on: start it from a desktop (or under xvfb-run), "
     "or use the command line, 'daq-app --help'"
@@ -156,6 +156,7 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     if missing := what_is_missing():
         return _fail(missing)
     try:
+        from PySide6.QtCore import QTimer
         from PySide6.QtWidgets import QApplication
     except ImportError as error:
         return _fail(missing_library(error))
@@ -168,7 +169,16 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     except NoTabletServer as error:
         return _fail(str(error))
     window.show()
-    return application.exec()
+    stopped: list[int] = []
+
+    def stop(*_: object) -> None:
+        """Close the window as its button does: it asks first where a session is being recorded."""
+        stopped.append(STOPPED)
+        QTimer.singleShot(0, window.close)
+
+    signal.signal(signal.SIGINT, stop)
+    code = application.exec()
+    return stopped[0] if stopped else code
 
 
 def _speak(application: "QApplication") -> None:
