@@ -236,21 +236,25 @@ class LivePanel(Panel):
             return
         trace = self._feed.trace
         newest = trace.newest
+        if self._hold_time is not None and (newest is None or newest < self._hold_time):  # another device's clock
+            self.bar.hold.click()
         now = self._hold_time if self._hold_time is not None else newest
         if now is None or newest is None:
             now, marks = 0.0, ()
         end = picture_end(marks, now)
         seen = tuple(mark for mark in marks if mark.stop >= end - self._seconds and mark.start <= now)
-        drawn = (trace, now, end, self._seconds, self._columns(), seen)
+        hold = tr("held") if self._hold_time is not None else ""
+        frozen = newest is not None and end < newest
+        drawn = (trace, now, end, self._seconds, self._columns(), seen, frozen, hold)
         if drawn != self._drawn:
             self._drawn = drawn
             if end == newest or trace.holds(end - self._seconds):  # else the stroke stays as it was drawn last
                 self._show_until(self.plots[:3], end, seen, clock)
             self._show_until(self.plots[3:], now, seen, clock)
-            frozen = newest is not None and end < newest
-            edge = tr("now") if not frozen else tr("lift + 1 s") if self._hold_time is None else tr("held")
             for plot in self._column:
-                plot.show_axis(end=edge)
+                plot.show_axis(end=hold or (tr("lift + 1 s") if frozen else tr("now")))
+            for plot in self.plots[3:]:
+                plot.show_axis(end=hold or tr("now"))
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
@@ -311,6 +315,7 @@ class LivePanel(Panel):
 
     def _hold(self) -> None:
         self._hold_time = self._feed.trace.newest if self.bar.hold.isChecked() else None
+        self.bar.hold.setChecked(self._hold_time is not None)  # of nothing no picture is held
         self.bar.show_words()
 
     def _finite(self, chosen: bool) -> None:

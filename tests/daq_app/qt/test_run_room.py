@@ -191,6 +191,31 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
     panel.hide()
 
 
+def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transducer_sends(driver):
+    class Feed:
+        trace = LiveTrace(100.0)
+
+    panel = LivePanel(Feed, driver.window.bridge.model, 1.0)
+    panel.resize(1200, 800)
+    panel.show()
+    driver.application.processEvents()
+    click(panel.bar.hold)
+    assert not panel.bar.hold.isChecked()
+
+    def fed(first, last):
+        time = np.arange(first, last, 0.01)
+        Feed.trace.add(time, np.ones((len(CHANNELS), len(time))))
+        panel.draw((), last)
+        return panel.plots[0]._end, panel.plots[4]._end, panel.bar.hold.isChecked()
+
+    assert fed(100.0, 105.0) == ("now", "now", False)
+    click(panel.bar.hold)
+    assert fed(105.0, 106.0) == ("held", "held", True)
+    Feed.trace = LiveTrace(100.0)  # of a transducer that was plugged in anew
+    assert fed(0.0, 1.0) == ("now", "now", False)
+    panel.hide()
+
+
 def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
     window, mirror = driver.window, driver.window.course.mirror
     mirror.open.set_room(room=True)
