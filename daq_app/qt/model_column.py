@@ -87,7 +87,7 @@ class ModelColumn(QWidget):
         self.why = WrappedLabel("value", "look")
         self.errors.show_text(tr(FIELD_ERRORS))
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
-        self.which.activated.connect(lambda: self._show_session())
+        self.which.activated.connect(lambda: self._show_picture())
         self.session_errors = WrappedLabel("quiet")
         self.compared = ComparedView(self.other_wanted.emit, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
@@ -99,7 +99,7 @@ class ModelColumn(QWidget):
         self.tabs.addTab(session, tr("Session"))
         self.tabs.addTab(self.compared, tr("Comparison"))
         self.tabs.addTab(self.scene, tr("Scene"))
-        self.tabs.currentChanged.connect(lambda: self._show_session())
+        self.tabs.currentChanged.connect(lambda: self._show_picture())
         vbox(self.tabs, on=self)
 
     def show_state(self, state: AnalystState) -> None:
@@ -126,40 +126,34 @@ class ModelColumn(QWidget):
             if names != [self.which.itemText(i) for i in range(self.which.count())]:
                 self.which.clear()
                 self.which.addItems(names)
-        self._show_session()
-        if state.compared is not None and (before is None or before.compared is not state.compared):
-            self._show_comparison(state, state.compared)
+        if (other := state.compared) is not None and state.report is not None:
+            names = (name_and_errors(state.report), name_and_errors(other.report))
+            self.compared.show_rows(compare_reports(state.report, other.report), names)
+            if before is None or before.compared is not other:
+                self._drawing = ("", -1)
+                self.together.setChecked(True)
+                self._paint()
+                self.tabs.setCurrentIndex(COMPARISON)
+        self._show_picture()
 
-    def _show_comparison(self, state: AnalystState, other: m.Compared) -> None:
-        assert state.report is not None  # nothing is compared before this session is open
-        names = (name_and_errors(state.report), name_and_errors(other.report))
-        self.compared.show_rows(compare_reports(state.report, other.report), names)
-        self.together.setChecked(True)
-        self._paint()
-        self.tabs.setCurrentIndex(COMPARISON)
-        self.requested.emit(m.Draw(PICTURE))
-
-    def _show_session(self) -> None:
-        """Show the picture that is chosen; what is not drawn is asked for only when it is looked at."""
-        state = self._state
+    def _show_picture(self) -> None:
+        """Show the picture of the tab; what is not drawn is asked for only when it is looked at."""
+        state, tab, which = self._state, self.tabs.currentIndex(), self.which.currentIndex()
         if state is None:
             return
-        if self.tabs.currentIndex() == COMPARISON:
-            drawn = state.drawn.get(PICTURE)
-            if drawn is not None:
-                self.compared.picture.show_picture(PICTURE, drawn.title, drawn.png)
+        if tab == COMPARISON and state.compared is not None:
+            view, name, words = self.compared.picture, PICTURE, tr("both sessions")
+        elif tab == SESSION and 0 <= which < len(names := session_pictures(state.report)):
+            view, (name, words) = self.picture, names[which]
+            self.session_errors.show_text(picture_errors(state.report, name))
+        else:
             return
-        names = session_pictures(state.report)
-        if self.tabs.currentIndex() != SESSION or not 0 <= self.which.currentIndex() < len(names):
-            return
-        name, words = names[self.which.currentIndex()]
-        self.session_errors.show_text(picture_errors(state.report, name))
         drawn = state.drawn.get(name)
         if drawn is not None:
             title = drawn.title or tr("There are no numbers yet for: {words}", words=words)
-            self.picture.show_picture(name, title, drawn.png)
+            view.show_picture(name, title, drawn.png)
             return
-        self.picture.show_picture("", tr("Drawing: {words}", words=words), b"")
+        view.show_picture("", tr("Drawing: {words}", words=words), b"")
         if self._drawing != (name, state.version):
             self._drawing = (name, state.version)
             self.requested.emit(m.Draw(name))

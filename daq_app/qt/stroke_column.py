@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QSettings, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
@@ -12,7 +12,7 @@ from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.analyst.stroke import Edge, History
 from daq_app.qt.parts import WrappedLabel, button, hbox, label, scroll_area, vbox
 from daq_app.qt.pictures import SaveButtons
-from daq_app.qt.preferences import type_scale
+from daq_app.qt.preferences import settings, type_scale
 from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import ReadingsTable, TextTable
 from daq_app.qt.tokens import GRID, TEXT, Tokens, font
@@ -182,11 +182,11 @@ class DecisionsBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.by = QLineEdit(str(QSettings().value(BY, "")))
+        self.by = QLineEdit(str(settings().value(BY, "")))
         self.by.setPlaceholderText(NOBODY)
         self.by.setAccessibleName(tr("code of who decides; never a name"))
         self.by.setMaximumWidth(round(110 * type_scale()))
-        self.by.editingFinished.connect(lambda: QSettings().setValue(BY, self.by.text()))
+        self.by.editingFinished.connect(lambda: settings().setValue(BY, self.by.text()))
         self.why = QLineEdit()
         self.why.setPlaceholderText(DRAGGED)
         self.why.setMinimumWidth(QFontMetrics(font(TEXT, type_scale())).horizontalAdvance(DRAGGED) + 3 * GRID)

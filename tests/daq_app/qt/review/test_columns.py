@@ -16,7 +16,9 @@ from daq_app.analyst.finger_words import finger_words
 from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import rows, selected_row
 from daq_app.analyst.stroke import EDGES
+from daq_app.qt import preferences
 from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
+from daq_app.qt.stroke_column import BY, DecisionsBar
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
 from tests.daq_app.qt.review.examples import SESSION, film, raw, until
@@ -319,6 +321,25 @@ def test_a_second_session_is_shown_beside_the_first(window):
     assert len(texts(table)) == len({(p.experiment, p.index) for p in window.state.report.predictions})
     assert {line[3] for line in texts(table)} == {"+0.000"}
     assert m.Draw("compared") in window._work.asked
+
+
+def test_the_comparison_follows_a_decision_that_changes_the_first_session(window):
+    report = example()
+    window.take(m.Compared("other", report))
+    asked = window._work.asked.count(m.Draw("compared"))
+    moved = tuple(replace(said, mu=said.mu + 0.1) for said in report.predictions)
+    window.take(m.ReportReady("predicted", replace(report, predictions=moved)))
+    assert {line[3] for line in texts(window.model.compared.table)} == {"−0.100"}
+    assert window._work.asked.count(m.Draw("compared")) == asked + 1
+
+
+def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(window):
+    by = window.stroke.decisions.by
+    by.setText("E07")
+    by.editingFinished.emit()
+    assert preferences.settings().value(BY) == "E07"
+    assert DecisionsBar().by.text() == "E07"
+    preferences.settings().remove(BY)
 
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):
