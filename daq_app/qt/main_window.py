@@ -27,7 +27,6 @@ from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline
 from daq_app.window.new_session import Bench, Refusal, SessionForm, bench_of, check_form, pilot_form
-from daq_app.window.state import NewSession
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
@@ -129,7 +128,7 @@ class MainWindow(QMainWindow):
         return {
             "primary": self._primary,
             "undo": self._undo,
-            "new": lambda: self.rooms.over and self.bridge.send(NewSession()),
+            "new": lambda: self.rooms.over and self.go_to("prepare"),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
             "connect": self.bench.connect_choice,
             "acknowledge": lambda: self.bridge.view.bench.can_acknowledge and self.bridge.send(AcknowledgeOverloads()),
@@ -276,9 +275,12 @@ class MainWindow(QMainWindow):
             self.notice.warn(tr("The subject's window was closed; F6 brings it again."))
 
     def _warn_of_tablet(self) -> None:
-        if self.tablet is not None and self.bridge.recording and not self.tablet.server.connected:
-            words = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
+        words = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
+        silent = self.tablet is not None and self.bridge.recording and not self.tablet.server.connected
+        if silent and not self.notice.warning:
             self.notice.warn(words)
+        elif not silent and self.notice.warning == words:
+            self.notice.warn("")
 
     def _draw(self) -> None:
         session = self.bridge.state.session

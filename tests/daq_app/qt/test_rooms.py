@@ -109,6 +109,17 @@ def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_pla
     assert other not in preferences.recent_sessions()  # what is gone is not offered
 
 
+def test_a_new_session_that_is_asked_for_in_review_is_prepared_in_sight(driver, rooms):
+    window = driver.window
+    begin(driver)
+    window.bridge.send(Stop())
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    rooms.open(SESSION)
+    QTest.keyClick(window, Qt.Key.Key_N, Qt.KeyboardModifier.ControlModifier)
+    assert driver.session is None
+    assert rooms.room == "prepare"
+
+
 def test_every_entry_of_the_menu_does_something_and_course_entries_wait_for_a_session(driver, rooms):
     window = driver.window
     found = entries(window.menuBar())

@@ -182,6 +182,22 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
         assert "close once more" in window.notice._words.text()
 
 
+def test_the_warning_of_a_tablet_gives_way_to_others_and_goes_when_it_answers_again(driver, monkeypatch):
+    window, server = driver.window, SimpleNamespace(connected=False)
+    begin(driver, "P13")
+    monkeypatch.setattr(window, "tablet", SimpleNamespace(server=server))
+    window.show_view(driver.view)
+    assert "tablet does not answer" in window.notice._words.text()
+    window.close()
+    window.show_view(driver.view)
+    assert "close once more" in window.notice._words.text()
+    window.notice.warn("")
+    window.show_view(driver.view)
+    server.connected = True
+    window.show_view(driver.view)
+    assert "tablet" not in window.notice._words.text()
+
+
 def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_the_keyboard_stays(driver, monkeypatch):
     window = driver.window
     window.subject.hide()
