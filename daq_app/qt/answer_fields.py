@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QRectF, QRegularExpression, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QRegularExpression, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QInputDevice,
@@ -262,6 +262,7 @@ class ChoiceOfTwo(_Field):
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
         super().__init__(now)
+        self._pointer: Device = "mouse"  # that pressed a button last
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(Text.OF_TWO)
         self.first = self._button(Text.FIRST, "first", scale)
@@ -289,8 +290,15 @@ class ChoiceOfTwo(_Field):
         else:
             super().keyPressEvent(event)
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Note what presses a button: a click itself does not tell."""
+        if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
+            self._pointer = _device(event)
+        return False
+
     def _button(self, words: str, which: Which, scale: float) -> QPushButton:
-        choice = button(words, words, lambda: self._take(self.answer.choose(self.now(), which, "mouse")))
+        choice = button(words, words, lambda: self._take(self.answer.choose(self.now(), which, self._pointer)))
+        choice.installEventFilter(self)
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.

@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 from qt_events import wheel
 
-from daq_app.qt.answer_fields import NumberField
+from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField
 from daq_app.recorder.messages import Connect, Disconnect
 from daq_app.window.new_session import UnfinishedSession
 from daq_app.window.state import DevicesFound, Searching
@@ -110,6 +110,18 @@ def test_a_number_is_typed_of_digits_alone():
     QTest.keyClicks(field.field, "-1x2,5")
     assert field.field.text() == "12,5"
     assert field.answer.value == 12.5
+
+
+def test_a_choice_by_touch_is_kept_as_one_by_touch(application):
+    choice, finger = ChoiceOfTwo(1.0, lambda: 0.0), QTest.createTouchDevice()
+    choice.show()
+    application.processEvents()
+    place = choice.second.rect().center()
+    QTest.touchEvent(choice.second, finger).press(0, place, choice.second).commit()
+    QTest.touchEvent(choice.second, finger).release(0, place, choice.second).commit()
+    assert (choice.answer.value, choice.answer.device) == ("second", "touch")
+    QTest.mouseClick(choice.first, Qt.MouseButton.LeftButton)
+    assert (choice.answer.value, choice.answer.device) == ("first", "mouse")
 
 
 def test_a_protocol_of_ones_own_is_rehearsed_from_its_first_trial_to_its_last(driver, tmp_path):
