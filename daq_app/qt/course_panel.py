@@ -97,6 +97,11 @@ class CoursePanel(Panel):
         if not text:
             say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._asked_for))
             return
+        question = "" if self._view is None else _button_of(self._view, self._asking).question
+        if question and question != self._asked_for:  # it would discard another trial than was meant
+            self._asked_for = question
+            say(self._question, tr("The session has gone on meanwhile. {question}", question=question))
+            return
         self.leave()
         self._send(MESSAGES[self._asking](text))
 

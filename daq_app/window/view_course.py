@@ -140,7 +140,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         stroke=stroke,
         redo=_redo(again, stroke.redo),
         undo=_undo(session),
-        skip=Button(tr("Skip"), "S", session.phase in IN_A_TRIAL, question=tr("Why is it left out?")),
+        skip=Button(tr("Skip"), "S", trial is not None and session.phase in IN_A_TRIAL, question=_why_skip(trial)),
         pause=Button(tr("Resume"), "P", sends=steps.Resume())
         if session.phase == "paused"
         else Button(tr("Pause"), "P", session.phase in IN_A_TRIAL, steps.Pause()),
@@ -157,6 +157,10 @@ def _no_forces(plan: SessionPlan) -> str:
     if not plan.forces:
         return tr("No forces are recorded: this visit is of scores only.")
     return "" if "forces" in plan.shown.experimenter else tr(NO_FORCES)
+
+
+def _why_skip(trial: TrialState | None) -> str:
+    return "" if trial is None else tr("Why is {trial} left out?", trial=_name_trials((trial,)))
 
 
 def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:

@@ -152,6 +152,24 @@ def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_cour
         QApplication.setDoubleClickInterval(interval)
 
 
+def test_a_reason_that_is_typed_while_the_course_goes_on_discards_no_other_trial_than_the_one_asked_about(driver):
+    window, course = driver.window, driver.window.course
+    window.page.scores_only.setChecked(True)
+    begin_scoring(driver)
+    QTest.keyClick(window, Qt.Key.Key_S)
+    assert "trial 1 (" in course._question.text()
+    QTest.keyClicks(course.line, "it was dropped")
+    window.bridge.send(steps.Scored(40.0))  # meanwhile the subject answers, on another screen
+    moved_on(driver, 1)
+    QTest.keyClick(course.line, ENTER)
+    assert course.asking
+    assert course.line.text() == "it was dropped"
+    assert "trial 2 (" in course._question.text()
+    assert [trial.outcome for trial in driver.session.trials[:2]] == ["done", "coming"]
+    QTest.keyClick(course.line, ENTER)
+    driver.until(lambda: driver.session.trials[1].outcome == "skipped", "the second trial left out")
+
+
 def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
     window = driver.window
     window.page.scores_only.setChecked(True)
