@@ -15,7 +15,7 @@ from sessions.plan.protocols.protocol import FOLDER
 def test_tables_filled_in_at_the_end_of_a_protocol_are_its_new_language(tmp_path, capsys):
     out, own = tmp_path / "nl.toml", tmp_path / "ours.toml"
     assert run(["translate", "sensotact-friction", "--language", "nl", "--out", str(out)]) == 0
-    assert "3 texts" in capsys.readouterr().err
+    assert "texts yet to be translated: 3" in capsys.readouterr().err
     filled = out.read_text().replace("Put your index finger", "Leg uw wijsvinger")
     own.write_text((FOLDER / "sensotact-friction.toml").read_text() + filled)
     made = plan(protocol(own), "S01", 1, setting=VisitSetting(language="nl"))

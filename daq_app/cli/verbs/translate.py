@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
                 f"{options.out} cannot be written ({error.strerror}); {remedy(error, new=True)}"
             ) from error
     console.result({"language": options.language, "missing": missing, "out": options.out and str(options.out)})
-    console.note(f"{missing} texts are yet to be translated" if missing else "every text is translated")
+    console.note(f"texts yet to be translated: {missing}" if missing else "every text is translated")
     return DONE
 
 
