@@ -110,12 +110,13 @@ def _rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
 
 
 def _ranks(values: Sequence[float]) -> NDArray[np.float64]:
-    """Return the ranks from 1 on, the same for equal values: the middle of those they share.
+    """Return the ranks from 1 on, the same for values equal but for round-off: the middle of those they share.
 
     >>> _ranks([3.0, 1.0, 3.0])
     array([2.5, 1. , 2.5])
     """
-    _, at, counts = np.unique(np.asarray(values), return_inverse=True, return_counts=True)
+    parts = np.asarray(values, np.float64) / (float(np.max(np.abs(values))) or 1.0)
+    _, at, counts = np.unique(parts.round(12), return_inverse=True, return_counts=True)
     return (np.cumsum(counts) - (counts - 1) / 2)[at]
 
 
@@ -186,8 +187,11 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
     (a, b), (c, d) = ((math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)) for r in (first, second))
     shared = _covariance(first, second, mutual) / ((1 - first**2) * (1 - second**2))
     difference = first - second
-    low = difference - math.sqrt((first - a) ** 2 + (d - second) ** 2 - 2 * shared * (first - a) * (d - second))
-    high = difference + math.sqrt((b - first) ** 2 + (second - c) ** 2 - 2 * shared * (b - first) * (second - c))
+
+    def reach(one: float, other: float) -> float:
+        return math.sqrt(max(one**2 + other**2 - 2 * shared * one * other, 0.0))
+
+    low, high = difference - reach(first - a, d - second), difference + reach(b - first, second - c)
     return Contrast(n, difference, low, high, z, math.erfc(abs(z) / math.sqrt(2.0)))
 
 

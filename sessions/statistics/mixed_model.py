@@ -1,8 +1,8 @@
 """Linear mixed models of scores, subjects differing in level or slope, or crossed with surfaces.
 
-The restricted likelihood is written in the factor of the subjects' covariance relative to what is left, as by Bates,
-Maechler, Bolker & Walker 2015 (J. Stat. Softw. 67:1, equation 41): fixed effects and scale are solved for, and a
-covariance that does not have full rank is no edge of it. Its gradient is exact, so that the maximum is found to the
+The likelihood is written in the factor of the covariance of levels and slopes relative to what is left, as by Bates,
+Maechler, Bolker & Walker 2015 (J. Stat. Softw. 67:1, equations 34 and 41): fixed effects and scale are solved for, and
+a covariance that does not have full rank is no edge of it. Its gradient is exact, so that the maximum is found to the
 last few bits.
 """
 
@@ -20,10 +20,92 @@ from sessions.statistics.scores import sd_interval
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-_STARTS = ((1.0, 1.0), (0.3, 0.3), (3.0, 0.3), (0.3, 3.0), (3.0, 3.0))  # spreads relative to what is left
+_STARTS = (0.3, 3.0)  # spreads relative to what is left: the search starts from each pair, and the best end is kept
+_WIDEST = 1e3  # such a spread: scores have three figures, and a step of the search may not go beyond
+_TO_ROUND_OFF = 1e-9  # gradient of the deviance: an error of a spread enters the deviance squared
 _SINGULAR = 1e-4  # of the factor's diagonal, as lme4 has it
 _NOTHING = 1e-9  # of the factor: it enters by its square, which is then below round-off
 _STEPS = 6  # of Newton's method, after which nothing moves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Likelihood:
+    """The likelihood of y = X b + Z u + e by the factor L of the covariance of u relative to the variance of e.
+
+    n values, p fixed effects b, c random ones u; of what the fixed effects leave (`reml`), or of all.
+    """
+
+    n: int
+    sums: Array  # of products of all columns: Z (c), X (p), and what least squares by X leaves of y
+    offset: Array  # (p,) these least squares, taken away first so that nothing cancels
+    patterns: Array  # (m, c, c): L is their sum, each times one of the m numbers that are sought
+    reml: bool
+
+    @staticmethod
+    def of(y: Array, fixed: Array, random: Array, patterns: Array, *, reml: bool) -> "_Likelihood":
+        offset = np.asarray(np.linalg.lstsq(fixed, y, rcond=None)[0], np.float64)
+        columns = np.column_stack([random, fixed, y - fixed @ offset])
+        return _Likelihood(len(y), columns.T @ columns, offset, patterns, reml)
+
+    @property
+    def dof(self) -> int:
+        """Values that tell the variance of e."""
+        return self.n - len(self.offset) * self.reml
+
+    def reduce(self, at: Array) -> tuple[Array, Array, float]:
+        """Return L (c, c), `sums` weighted by the inverse covariance, and the log of the covariance's determinant."""
+        factor = np.tensordot(at, self.patterns, 1)
+        c = len(factor)
+        root = linalg.cholesky(np.eye(c) + factor.T @ self.sums[:c, :c] @ factor, lower=True)
+        half = linalg.solve_triangular(root, factor.T @ self.sums[:c], lower=True)
+        return factor, self.sums - half.T @ half, 2.0 * float(np.log(np.diag(root)).sum())
+
+    def deviance(self, at: Array) -> tuple[float, Array]:
+        """Return -2 log likelihood, and its gradient."""
+        factor, left, value = self.reduce(at)
+        c = len(factor)
+        root = linalg.cholesky(left[c:-1, c:-1], lower=True)
+        half = linalg.solve_triangular(root, left[c:-1], lower=True)
+        left = left - half.T @ half  # by what the fixed effects leave
+        rest = float(left[-1, -1])
+        by = left[:c, :c] - self.dof / rest * np.outer(left[:c, -1], left[:c, -1])
+        if self.reml:
+            value += 2.0 * float(np.log(np.diag(root)).sum())
+        else:
+            by += half[:, :c].T @ half[:, :c]
+        value += self.dof * (1.0 + math.log(2.0 * math.pi * rest / self.dof))
+        return value, 2.0 * np.einsum("mij,ij->m", self.patterns, by @ factor)
+
+    def maximum(self, starts: Sequence[Array]) -> Array:
+        """Return the numbers (m,) with the greatest likelihood."""
+        optima = [
+            optimize.minimize(
+                self.deviance,
+                start,
+                jac=True,
+                method="L-BFGS-B",
+                bounds=[(-_WIDEST, _WIDEST)] * len(self.patterns),
+                options={"ftol": 0.0, "gtol": _TO_ROUND_OFF},
+            )
+            for start in starts
+        ]
+        return self._polish(min(optima, key=lambda one: float(one.fun)).x)
+
+    def _polish(self, at: Array) -> Array:
+        """Return where the gradient vanishes to round-off, by Newton's method from a point close by."""
+        value, slope = self.deviance(at)
+        for _ in range(_STEPS):
+            step = 1e-6 * np.maximum(np.abs(at), 1e-2)
+            curve = np.array(
+                [(self.deviance(at + e)[1] - self.deviance(at - e)[1]) / (2 * e.sum()) for e in np.diag(step)]
+            )
+            # Where subjects' levels do not differ the factor may turn without changing the covariance: no step there.
+            new = at - np.linalg.lstsq(0.5 * (curve + curve.T), slope, rcond=1e-7)[0]
+            new_value, new_slope = self.deviance(new)
+            if not new_value <= value + 1e-9 * abs(value) or np.abs(new_slope).max() >= np.abs(slope).max():
+                break
+            at, value, slope = new, new_value, new_slope
+        return np.where(np.abs(at) < _NOTHING, 0.0, at)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,8 +116,9 @@ class Fit:
     errors: Array  # (p,) standard errors
     among: Array  # (q, q) covariance of the subjects' own coefficients
     within: float  # standard deviation of what is left
-    criterion: float  # half the deviance, without its constant; the smaller the likelier
+    deviance: float  # -2 log restricted likelihood, but for a constant of the design
     singular: bool  # `among` has not full rank
+    exact: bool  # hardly anything is left
 
 
 def restricted_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int) -> Fit:
@@ -43,92 +126,34 @@ def restricted_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, ow
 
     Columns should be of about one size.
     """
-    sums = _Sums.of(y, columns, subjects, own)
-    free = np.tril_indices(own)
-    starts = (np.diag(spread[:own])[free] for spread in _STARTS)
-    optima = [optimize.minimize(sums.criterion, start, jac=True, method="BFGS") for start in starts]
-    best: Array = min(optima, key=lambda one: float(one.fun)).x
-    return sums.fit(_polish(sums, best))
+    whose = _levels(subjects)
+    random = (whose[:, :, None] * columns[:, None, :own]).reshape(len(y), -1)
+    places = np.tril_indices(own)
+    units = np.zeros((len(places[0]), own, own))
+    units[(np.arange(len(units)), *places)] = 1.0
+    patterns = np.array([np.kron(np.eye(whose.shape[1]), unit) for unit in units], np.float64)
+    likelihood = _Likelihood.of(y, columns, random, patterns, reml=True)
+    at = likelihood.maximum([np.diag(spread)[places] for spread in product(_STARTS, repeat=own)])
+    factor, left, _ = likelihood.reduce(at)
+    factor, left = factor[:own, :own], left[random.shape[1] :, random.shape[1] :]
+    inverse = np.linalg.inv(left[:-1, :-1])
+    beta = inverse @ left[:-1, -1]
+    square = float(left[-1, -1] - left[-1, :-1] @ beta) / likelihood.dof
+    return Fit(
+        estimates=likelihood.offset + beta,
+        errors=np.sqrt(square * np.diag(inverse)),
+        among=square * factor @ factor.T,
+        within=math.sqrt(square),
+        deviance=likelihood.deviance(at)[0],
+        singular=bool(np.abs(np.diag(factor)).min() < _SINGULAR),
+        exact=bool(np.abs(at).max() >= _WIDEST),
+    )
 
 
-def _polish(sums: "_Sums", at: Array) -> Array:
-    """Return where the gradient vanishes to round-off, by Newton's method from a point close by."""
-    value, slope = sums.criterion(at)
-    for _ in range(_STEPS):
-        step = 1e-6 * np.maximum(np.abs(at), 1e-2)
-        curve = np.array(
-            [(sums.criterion(at + e)[1] - sums.criterion(at - e)[1]) / (2 * e.sum()) for e in np.diag(step)]
-        )
-        # Where subjects' levels do not differ the factor may turn without changing the covariance: no step that way.
-        new = at - np.linalg.lstsq(0.5 * (curve + curve.T), slope, rcond=1e-7)[0]
-        new_value, new_slope = sums.criterion(new)
-        if not new_value <= value + 1e-9 * abs(value) or float(np.abs(new_slope).max()) >= float(np.abs(slope).max()):
-            break
-        at, value, slope = new, new_value, new_slope
-    return np.where(np.abs(at) < _NOTHING, 0.0, at)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sums:
-    """All that the criterion needs of the data: sums over each subject's trials (k subjects), y as the last column."""
-
-    n: int
-    total: Array  # (p + 1, p + 1)
-    among: Array  # (k, q, q)
-    across: Array  # (k, q, p + 1)
-    offset: Array  # (p,) least squares, taken from y first so that nothing cancels
-
-    @staticmethod
-    def of(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int) -> "_Sums":
-        offset = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], np.float64)
-        all_of = np.column_stack([columns, y - columns @ offset])
-        codes = np.unique(np.array(subjects), return_inverse=True)[1]
-        each = [all_of[codes == code] for code in range(int(codes.max()) + 1)]
-        across = np.array([rows[:, :own].T @ rows for rows in each])
-        return _Sums(len(y), all_of.T @ all_of, across[:, :, :own], across, offset)
-
-    def _reduce(self, at: Array) -> tuple[Array, Array, Array, float]:
-        """Return the factor (q, q), columns weighted by the inverse covariance, and half the log of its determinant."""
-        q = self.among.shape[1]
-        factor = np.zeros((q, q))
-        factor[np.tril_indices(q)] = at
-        inner = np.eye(q) + factor.T @ self.among @ factor
-        shrink = factor @ np.linalg.solve(inner, np.broadcast_to(factor.T, inner.shape))  # (k, q, q)
-        across: Array = self.across - self.among @ shrink @ self.across
-        total: Array = self.total - np.sum(np.swapaxes(self.across, 1, 2) @ shrink @ self.across, axis=0)
-        return factor, total, across, 0.5 * float(np.linalg.slogdet(inner)[1].sum())
-
-    def criterion(self, at: Array) -> tuple[float, Array]:
-        """Return half the restricted deviance, and its gradient by the factor's lower triangle."""
-        factor, total, across, spread = self._reduce(at)
-        q, p = len(factor), len(self.offset)
-        root: Array = linalg.cholesky(total[:p, :p], lower=True)
-        beta: Array = linalg.cho_solve((root, True), total[:p, p])
-        left = float(total[p, p] - total[:p, p] @ beta)
-        dof = self.n - p
-        value = spread + float(np.log(np.diag(root)).sum()) + 0.5 * dof * math.log(left)
-        fixed, own = across[:, :, :p], across[:, :, p] - across[:, :, :p] @ beta
-        half: Array = linalg.solve_triangular(root, fixed.transpose(2, 0, 1).reshape(p, -1), lower=True)
-        half = half.reshape(p, -1, q)
-        kept = across[:, :, :q].sum(axis=0) - np.einsum("pki,pkj->ij", half, half)
-        by = 0.5 * kept - 0.5 * dof / left * (own.T @ own)
-        return value, (2.0 * by @ factor)[np.tril_indices(q)]
-
-    def fit(self, at: Array) -> Fit:
-        """Return what the factor says."""
-        factor, total, _, _ = self._reduce(at)
-        p = len(self.offset)
-        inverse = np.linalg.inv(total[:p, :p])
-        beta = inverse @ total[:p, p]
-        square = float(total[p, p] - total[:p, p] @ beta) / (self.n - p)
-        return Fit(
-            estimates=self.offset + beta,
-            errors=np.sqrt(square * np.diag(inverse)),
-            among=square * factor @ factor.T,
-            within=math.sqrt(square),
-            criterion=self.criterion(at)[0],
-            singular=bool(np.abs(np.diag(factor)).min() < _SINGULAR),
-        )
+def _levels(groups: Sequence[str] | Sequence[int] | Array) -> Array:
+    """Return a column for each group that marks its members (n, k)."""
+    codes = np.unique(np.asarray(groups), return_inverse=True)[1]
+    return np.eye(int(codes.max()) + 1)[codes]
 
 
 def fits_exactly(design: Array, y: Array) -> bool:
@@ -137,60 +162,27 @@ def fits_exactly(design: Array, y: Array) -> bool:
     return float(np.abs(left).max()) <= 1e-9 * (1.0 + float(np.abs(y).max()))
 
 
-_WIDEST = 1e3  # spread relative to what is left: scores have three figures, and a step of the search may not go beyond
-_TO_ROUND_OFF = 1e-9  # gradient of the deviance: an error of a spread enters the deviance squared
-_CROSSED_STARTS = (0.1, 1.0)  # spreads relative to what is left; the criterion is smooth, and the best of four is kept
-
-
 def crossed_deviance(
     subjects: Sequence[str], surfaces: Sequence[int], y: Sequence[float], x: Sequence[float]
 ) -> float | None:
     """Return -2 log likelihood of y (n) as intercept + slope x + level of the subject + level of the surface + error.
 
-    By maximum likelihood, profiled over slope and error (Bates, Maechler, Bolker & Walker 2015, J. Stat. Softw. 67:1,
-    equation 34). Models of the same scores with different x have as many parameters: their AICs differ as their
-    deviances do. None where x does not vary, or where the fixed terms leave nothing to tell an error from.
+    By maximum likelihood. Models of the same scores with different x have as many parameters: their AICs differ as
+    their deviances do. None where x does not vary, or where the fixed terms leave nothing to tell an error from.
     """
-    values, along = np.asarray(y, np.float64), np.asarray(x, np.float64)
+    along = np.asarray(x, np.float64)
     along = along - along.mean()
     if float(np.abs(along).max()) <= 1e-12 * float(np.abs(x).max()):
         return None
-    columns = np.column_stack([np.ones(len(values)), along / np.abs(along).max(), values - values.mean()])
-    groups = [np.unique(np.asarray(one), return_inverse=True)[1] for one in (subjects, surfaces)]
-    levels = [np.eye(int(codes.max()) + 1)[codes] for codes in groups]
+    values, levels = np.asarray(y, np.float64), [_levels(one) for one in (subjects, surfaces)]
     random = np.hstack(levels)
-    if fits_exactly(np.hstack([random, columns[:, 1:2]]), columns[:, 2]):
+    if fits_exactly(np.column_stack([random, along / np.abs(along).max()]), values):
         return None
+    fixed = np.column_stack([np.ones(len(values)), along / np.abs(along).max()])
     whose = np.repeat([0, 1], [one.shape[1] for one in levels])
-    inner, across, total = random.T @ random, random.T @ columns, columns.T @ columns
-    n = len(values)
-
-    def deviance(spread: Array) -> tuple[float, Array]:
-        """Return the deviance at two relative spreads, and its derivatives by them."""
-        scale = spread[whose]
-        root = linalg.cholesky(np.eye(len(scale)) + scale[:, None] * inner * scale, lower=True)
-        half = linalg.solve_triangular(root, scale[:, None] * across, lower=True)
-        wide = linalg.solve_triangular(root, scale[:, None] * inner, lower=True)
-        left = total - half.T @ half
-        fixed = np.linalg.solve(left[:2, :2], left[:2, 2])
-        rest = float(left[2, 2] - left[:2, 2] @ fixed)
-        residual = (across - wide.T @ half) @ np.append(-fixed, 1.0)  # Z' V^-1 of what the fixed terms leave
-        slope = np.diag(inner) - (wide**2).sum(axis=0) - n / rest * residual**2
-        value = 2.0 * float(np.log(np.diag(root)).sum()) + n * (1.0 + float(np.log(2.0 * np.pi * rest / n)))
-        return value, 2.0 * spread * np.bincount(whose, slope)
-
-    fits = [
-        optimize.minimize(
-            deviance,
-            start,
-            jac=True,
-            method="L-BFGS-B",
-            bounds=[(0.0, _WIDEST)] * 2,
-            options={"ftol": 0.0, "gtol": _TO_ROUND_OFF},
-        )
-        for start in product(_CROSSED_STARTS, _CROSSED_STARTS)
-    ]
-    return min(float(one.fun) for one in fits)
+    patterns = np.array([np.diag((whose == group).astype(np.float64)) for group in (0, 1)])
+    likelihood = _Likelihood.of(values, fixed, random, patterns, reml=False)
+    return likelihood.deviance(likelihood.maximum([np.array(spread) for spread in product(_STARTS, repeat=2)]))[0]
 
 
 def akaike_weights(deviances: Sequence[float]) -> tuple[float, ...]:
@@ -281,12 +273,13 @@ def mixed_model(
     varies = sum(float(np.ptp(columns[np.array(subjects) == one, 1])) > 0.0 for one in set(subjects))
     if varies < 2:
         return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
-    levels = np.array(subjects)[:, None] == np.unique(np.array(subjects))[None, :]
-    if fits_exactly(np.hstack([levels, columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
+    if fits_exactly(np.hstack([_levels(subjects), columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
     fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own=2)
+    if fit.exact:
+        return "each subject's scores lie on a line of their own: there is nothing to tell an error from"
     level_sd, slope_sd = (np.sqrt(np.diag(fit.among)) / scale[:2]).tolist()
-    rest = max(len(score) - len(names) - (count - 1) * 2, 1)
+    rest = max(len(score) - len(names) - (count - 1) - (varies - 1), 1)
     free = [count - 1, varies - 1, *([rest] * (len(names) - 2))]
     terms = map(_term, names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free)
     first, *common = covariates.values()

@@ -94,7 +94,7 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
         return None
     left_x, left_y = (_without_means(np.array(values, np.float64), codes) for values in (x, y))
     size = math.sqrt(float(left_x @ left_x) * float(left_y @ left_y))
-    if size < 1e-12 * (1.0 + float(np.abs(x).max()) * float(np.abs(y).max())):
+    if size <= 1e-12 * float(np.abs(x).max()) * float(np.abs(y).max()):
         return None
     r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
     several = np.bincount(codes) > 1
@@ -130,6 +130,7 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
 def agreement(table: Table) -> Agreement | None:
     """Return how far subjects agree on the order; None for fewer than two subjects or three stimuli, or all ties."""
     subjects, _, scores = complete(table)
+    scores = scores.round(9)  # means of repeats that tie differ by round-off
     n, c = scores.shape
     if n < 2 or c < 3 or np.all(np.ptp(scores, axis=1) == 0):
         return None
@@ -162,8 +163,9 @@ def differences(table: Table) -> tuple[Difference, ...]:
     indices = sorted({index for row in table.values() for index in row})
     rows: list[Difference] = []
     for a, b in itertools.combinations(indices, 2):
-        steps = np.array([row[b] - row[a] for row in table.values() if a in row and b in row])
-        if len(steps) < 3 or float(np.ptp(steps)) == 0.0:
+        pairs = np.array([(row[a], row[b]) for row in table.values() if a in row and b in row]).reshape(-1, 2)
+        steps = pairs[:, 1] - pairs[:, 0]
+        if len(steps) < 3 or float(np.ptp(steps)) <= 1e-12 * float(np.abs(pairs).max()):
             continue
         test = stats.ttest_1samp(steps, 0.0)
         low, high = test.confidence_interval(CONFIDENCE)
@@ -196,8 +198,9 @@ def z_scores(table: Table) -> dict[str, dict[int, float]]:
     stimuli = len({index for row in table.values() for index in row})
     for subject, row in table.items():
         values = np.array(list(row.values()))
-        if len(values) == stimuli > 1 and (spread := float(values.std(ddof=1))) > 0.0:
-            rows[subject] = {index: (score - float(values.mean())) / spread for index, score in row.items()}
+        if len(values) == stimuli > 1 and float(np.ptp(values)) > 0.0:
+            mean, spread = float(values.mean()), float(values.std(ddof=1))
+            rows[subject] = {index: (score - mean) / spread for index, score in row.items()}
     return rows
 
 

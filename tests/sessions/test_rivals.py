@@ -41,6 +41,11 @@ def test_the_interval_of_a_difference_is_that_of_zous_worked_example():
     assert (found.low, found.high) == pytest.approx((-0.093, 0.517), abs=5e-4)
 
 
+def test_correlations_that_are_hardly_less_than_one_have_a_difference_with_an_interval():
+    found = contrast(0.9999999871286794, 0.999999999202874, 0.999999983262, 4)  # of three columns alike to 1e-4
+    assert found.low <= found.difference <= found.high
+
+
 def test_a_rival_with_the_other_sign_is_turned_round_before_it_is_compared():
     assert contrast(0.6, -0.5, -0.3, 30) == contrast(0.6, 0.5, 0.3, 30)
 
@@ -206,6 +211,32 @@ def test_round_off_in_the_scores_leaves_the_crossed_deviance_as_it_is():
             for _ in range(4)
         ]
         assert max(moved) - min(moved) < 1e-10
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_spreads_of_a_grid_are_likelier_than_the_crossed_deviance(seed):
+    draw = np.random.default_rng([9, seed])
+    who, what = np.repeat(np.arange(8), 5), np.tile(np.arange(5), 8)
+    base = draw.normal(size=5)
+    x = base[what] + 0.1 * draw.normal(size=40)
+    y = (
+        20.0 * base[what]
+        + 12.0 * draw.normal(size=8)[who]
+        + 5.0 * draw.normal(size=5)[what]
+        + 3.0 * draw.normal(size=40)
+    )
+    columns = np.column_stack([np.ones(40), x])
+
+    def dense(level, surface):
+        v = np.eye(40) + level**2 * (who[:, None] == who) + surface**2 * (what[:, None] == what)
+        inverse = np.linalg.inv(v)
+        left = y - columns @ np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ y)
+        return np.linalg.slogdet(v)[1] + 40 * (1.0 + np.log(2.0 * np.pi * (left @ inverse @ left) / 40))
+
+    grid = np.geomspace(0.02, 20.0, 25)
+    least = min(dense(level, surface) for level in (0.0, *grid) for surface in (0.0, *grid))
+    found = crossed_deviance([str(one) for one in who], what, y, x)
+    assert least - 0.5 < found <= least + 1e-9
 
 
 def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():

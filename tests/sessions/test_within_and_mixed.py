@@ -93,6 +93,14 @@ def test_of_two_stimuli_the_interval_within_is_the_paired_one_over_the_root_of_t
     assert [one.high - one.mean for one in found] == pytest.approx([half, half])
 
 
+def test_scores_that_are_equal_but_for_round_off_tie_and_do_not_vary():
+    third = float(np.mean([0.1, 0.2, 0.3]))  # 0.20000000000000004
+    assert z_scores({"flat": {0: 0.1, 50: 0.1, 100: 0.1}}) == {}  # the mean of three times 0.1 is not 0.1
+    assert differences({"A": {0: 0.1, 50: 0.2}, "B": {0: 0.2, 50: 0.3}, "C": {0: 0.3, 50: 0.4}}) == ()
+    near, exact = ({k: {0: a, 50: 0.2, 100: 0.1 * int(k)} for k in "1234"} for a in (third, 0.2))
+    assert agreement(near) == agreement(exact)
+
+
 def test_agreement_is_one_where_all_order_alike_and_kendalls_example_comes_out():
     alike = {str(k): {i: float(i * (k + 1)) for i in range(5)} for k in range(4)}
     found = agreement(alike)
@@ -226,14 +234,15 @@ def test_an_offset_of_the_predictions_changes_no_number_of_the_model():
 
 
 def restricted_deviance(theta, y, columns, codes):
-    """Return half the restricted deviance written out with the whole covariance matrix (Harville 1977)."""
+    """Return -2 log restricted likelihood written out with the whole covariance matrix (Harville 1977)."""
     factor = np.array([[theta[0], 0.0], [theta[1], theta[2]]])
     v = np.eye(len(y)) + (columns[:, :2] @ factor @ factor.T @ columns[:, :2].T) * (codes[:, None] == codes)
     inverse = np.linalg.inv(v)
     information = columns.T @ inverse @ columns
     left = y - columns @ np.linalg.solve(information, columns.T @ inverse @ y)
     dof = len(y) - columns.shape[1]
-    return 0.5 * sum(np.linalg.slogdet(m)[1] for m in (v, information)) + 0.5 * dof * np.log(left @ inverse @ left)
+    square = left @ inverse @ left / dof
+    return sum(np.linalg.slogdet(m)[1] for m in (v, information)) + dof * (1.0 + np.log(2.0 * np.pi * square))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
@@ -243,7 +252,7 @@ def test_nothing_is_likelier_than_the_fit_singular_or_not_and_rounding_moves_its
     columns = np.column_stack([np.ones(50), np.tile(np.linspace(-1, 1, 5), 10), rng.uniform(-1, 1, 50)])
     y = columns @ [50.0, 30.0, 2.0] + (seed > 2) * np.repeat(rng.normal(0, 5, 10), 5) + rng.normal(0, 4, 50)
     fit, again = (restricted_fit(y * (1.0 + step), columns, codes, 2) for step in (0.0, rng.uniform(-1, 1, 50) * 2e-16))
-    assert fit.criterion == pytest.approx(
+    assert fit.deviance == pytest.approx(
         min(
             optimize.minimize(restricted_deviance, start, (y, columns, codes), "Nelder-Mead", tol=1e-10).fun
             for start in ([1.0, 0.0, 1.0], [0.3, 0.1, 0.1])
@@ -253,6 +262,31 @@ def test_nothing_is_likelier_than_the_fit_singular_or_not_and_rounding_moves_its
     for name in ("estimates", "errors", "among"):
         one, other = getattr(fit, name), getattr(again, name)
         assert np.abs(one - other).max() <= 1e-12 * np.abs(one).max()
+
+
+def test_what_all_subjects_share_has_the_degrees_of_freedom_of_a_fit_to_each_alone():
+    rng = np.random.default_rng(7)
+    subjects = [*"aaaabbbbcccc", *"defgh"]  # five of one trial: a level each, and no slope
+    x, place = rng.normal(size=(2, 17))
+    term = mixed_model(subjects, rng.normal(50.0, 9.0, 17), {"x": x, "place": place}).term("place")
+    dof = 17 - 8 - 3 - 1  # trials less levels, slopes on x and the slope on the place
+    error = (term.high - term.estimate) / stats.t.ppf(0.975, dof)
+    assert term.p == pytest.approx(2.0 * stats.t.sf(abs(term.estimate) / error, dof))
+
+
+def test_where_each_subject_lies_on_a_line_of_its_own_there_is_no_error_to_tell():
+    subjects, x = [str(k) for k in range(4) for _ in range(5)], [0.0, 1.0, 2.0, 3.0, 4.0] * 4
+    own = [10.0 * int(k) + (1.0 + int(k)) * along for k, along in zip(subjects, x, strict=True)]
+    assert "line of their own" in mixed_model(subjects, own, {"x": x})
+
+
+def test_of_two_stimuli_the_slope_is_the_paired_t_test():
+    rng = np.random.default_rng(6)
+    y = rng.normal(50.0, 10.0, (7, 1)) + rng.normal([0.0, 10.0], 5.0, (7, 2))
+    slope = mixed_model([str(k) for k in range(7) for _ in range(2)], y.ravel(), {"x": [0.0, 1.0] * 7}).term("x")
+    test = stats.ttest_1samp(y[:, 1] - y[:, 0], 0.0)
+    assert (slope.low, slope.high) == pytest.approx(tuple(test.confidence_interval(0.95)), rel=1e-6)
+    assert slope.p == pytest.approx(test.pvalue, rel=1e-6)
 
 
 @pytest.mark.slow
