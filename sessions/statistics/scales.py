@@ -88,8 +88,8 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") ->
         return replace(none, reason="there are no two surfaces to compare")
     counts = _counts(choices, indices, subjects)
     whole = counts.sum(axis=0)
-    if unbounded := _why_unbounded(whole, indices):
-        return replace(none, reason=unbounded)
+    if why := _why_none(whole, indices):
+        return replace(none, reason=why)
     fitted = _fit(whole, model)
     if fitted is None:
         return replace(none, reason="the likelihood has no finite maximum")
@@ -136,8 +136,8 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
     return out
 
 
-def _why_unbounded(counts: Array, indices: Sequence[int]) -> str:
-    """Return why the values have no bound, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
+def _why_none(counts: Array, indices: Sequence[int]) -> str:
+    """Return why there are no values, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
     met, chosen = counts
     beaten = chosen + (met - chosen).T  # [a, b]: how often a was chosen and b was not
     groups, label = csgraph.connected_components(beaten > 0, directed=True, connection="strong")
@@ -145,6 +145,8 @@ def _why_unbounded(counts: Array, indices: Sequence[int]) -> str:
         above = next(group for group in range(groups) if not (beaten[label != group][:, label == group] > 0).any())
         names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == above)
         return f"no other surface was ever preferred to {names}, so their distance has no bound"
+    if np.linalg.matrix_rank(_design(len(indices))[met > 0]) < len(indices):
+        return "preference and order cannot be told apart: some pairs must be met in both orders"
     return ""
 
 
@@ -199,7 +201,7 @@ def _bootstrap(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
     drawn = np.random.default_rng(0).multinomial(subjects, np.full(subjects, 1.0 / subjects), RESAMPLES)
     totals = np.tensordot(drawn.astype(np.float64), counts, axes=1)
     indices = range(counts.shape[2])
-    fits = [None if _why_unbounded(total, indices) else _fit(total, model, begin) for total in totals]
+    fits = [None if _why_none(total, indices) else _fit(total, model, begin) for total in totals]
     scales = [fit for fit in fits if fit is not None]
     lost = RESAMPLES - len(scales)
     if lost > MOST_LOST * RESAMPLES:
@@ -287,7 +289,8 @@ def _deming(cells: Array) -> tuple[float, float] | None:
         return (xy / xx, math.inf) if xx > 0.0 and error_x == 0.0 else None
     ratio = error_y / error_x
     off = yy - ratio * xx
-    return (off + math.sqrt(off**2 + 4.0 * ratio * xy**2)) / (2.0 * xy), ratio
+    root = math.hypot(off, 2.0 * math.sqrt(ratio) * xy)
+    return (off + root) / (2.0 * xy) if off > 0.0 else 2.0 * ratio * xy / (root - off), ratio
 
 
 Judgement = Literal["scores", "estimates", "choices", "comparisons"]

@@ -100,6 +100,13 @@ def test_a_surface_that_was_always_chosen_has_no_finite_value_and_is_named():
     assert paired_scale([]).reason
 
 
+def test_preference_is_not_told_from_order_where_one_surface_was_always_first():
+    star = [Choice("P1", 0, other, chosen) for other in (20, 50) for chosen in (True, False, True)]
+    found = paired_scale(star)
+    assert not found.values
+    assert "in both orders" in found.reason
+
+
 def test_a_circle_of_three_is_one_triad_and_an_order_none():
     order = [Choice("P1", a, b, True) for a in range(5) for b in range(a + 1, 5)]
     assert consistence(order)["P1"].zeta == 1.0

@@ -80,6 +80,11 @@ def test_a_perfect_order_of_five_has_the_exact_p_of_two_in_120():
     assert found.spearman_p == pytest.approx(2 / 120)
 
 
+def test_means_that_are_equal_but_for_round_off_share_their_rank():
+    found = relation([1, 2, 3, 4], [np.mean([0.1, 0.2, 0.3]), np.mean([0.3, 0.2, 0.1]), 1, 2], labels=(1, 2, 3, 4))
+    assert found.spearman == pytest.approx(math.sqrt(0.9))  # ranks 1.5 1.5 3 4: 4.5 / sqrt(5 * 4.5)
+
+
 def test_the_published_slipperiness_friction_is_out_of_order_at_55_only():
     index, mu = (0, 20, 55, 75, 100), (0.62, 0.55, 0.44, 0.52, 0.24)  # the published Table 2
     found = relation(index, mu, labels=index)

@@ -35,6 +35,13 @@ def test_where_what_was_measured_errs_the_plain_slope_is_too_flat_and_deming_s_i
     assert np.mean([one.deming[0] for one in found]) == pytest.approx(1.1, abs=0.1)
 
 
+def test_magnitudes_that_are_the_same_for_all_leave_the_plain_slope():
+    people, surfaces, answers, _ = study(np.random.default_rng(5), 0.9, subjects=3)
+    exact = np.tile(MU, 3)
+    found = stevens_exponent(people, surfaces, answers, exact)
+    assert found.deming[0] == pytest.approx(np.polyfit(np.log(exact), np.log(answers), 1)[0], rel=1e-9)
+
+
 @pytest.mark.slow
 def test_intervals_hold_the_planted_exponent_in_88_to_98_of_a_hundred_studies():
     found = [stevens_exponent(*study(np.random.default_rng([4, n]), 1.1)) for n in range(150)]
