@@ -84,6 +84,7 @@ class Driver:
     open: Callable[[Address, Clock, Deadline], Transducer]
     identify: Callable[[Address, Deadline], TransducerInfo]  # who answers; changes nothing
     usual: tuple[str, ...] = ()  # addresses where such a device stands unless somebody moved it
+    serial_line: bool = False  # it reads a serial line, and its addresses name the port
 
 
 FARTHEST = 1000.0  # displacement that is believed [mm]

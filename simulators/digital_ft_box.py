@@ -171,10 +171,9 @@ def _crc(frame: bytes) -> bytes:
 
 SIMULATOR = Simulator(
     "digital-ft",
-    serve_on_ports(lambda bench, clock, faults: DigitalFtBox(bench, clock, faults=faults)),
+    serve_on_ports(DigitalFtBox),
     factor=0.25,
     statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
     unshown=0.2,  # a sum of seven bits
-    serial_line=True,
     at_start=True,
 )

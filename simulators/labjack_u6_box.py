@@ -346,4 +346,4 @@ def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningS
     return RunningSimulator(uri, bench, box.now, unplug(faults), bus.claims, forget)
 
 
-SIMULATOR = Simulator("labjack-u6", _start, factor=2.0, statuses=(54, 55, 63))  # codes in a stream
+SIMULATOR = Simulator("labjack-u6", _start, factor=2.0, statuses=(54, 55, 63), on_ports=False)  # codes in a stream

@@ -46,14 +46,15 @@ class NetFtBox(ServedBox):
         clock: Clock,
         *,
         rate: int = 200,
-        ports: tuple[int, int, int] = (0, 0, 0),
+        ports: tuple[int, int, int | None] = (0, 0, 0),
         faults: Faults | None = None,
         first: tuple[int, int] = (0, 1),
         product: Product = NET_FT,
     ) -> None:
         """Set up a box that streams at `rate` [Hz].
 
-        `ports` are those of UDP, TCP and HTTP, 0 for a free one. `first` holds its counter when it starts, as if it
+        `ports` are those of UDP, TCP and HTTP, 0 for a free one; without one for HTTP it is 80, or a free one where
+        80 is refused. `first` holds its counter when it starts, as if it
         had run for long, and the first number of the first stream. `product` says which box it is.
         """
         super().__init__(clock, faults)
@@ -225,8 +226,12 @@ class NetFtBox(ServedBox):
         return self._inside.http_reply(bytes(heard), self.now()), True
 
 
-def _open_port(kind: socket.SocketKind, option: str, port: int) -> socket.socket:
-    """Return a socket on `port` of loopback. Raises SetupError when the port cannot be had."""
+def _open_port(kind: socket.SocketKind, option: str, port: int | None) -> socket.socket:
+    """Return a socket on `port` of loopback; None: 80 or a free one. Raises SetupError when it cannot be had."""
+    if port is None:
+        with contextlib.suppress(SetupError):
+            return _open_port(kind, option, 80)
+        port = 0
     bound = socket.socket(socket.AF_INET, kind)
     try:
         if kind == socket.SOCK_STREAM and os.name == "posix":  # there it lets a port be had again soon after its end
@@ -249,7 +254,7 @@ _ERROR = 1 << 31  # set beside any other bit
 SIMULATOR = Simulator(
     "net-ft",
     # Its counter is that of a box which has run for long.
-    serve_on_ports(lambda bench, clock, faults: NetFtBox(bench, clock, faults=faults, first=(10_000_000, 1))),
+    serve_on_ports(partial(NetFtBox, first=(10_000_000, 1))),
     factor=10.0,
     tells=("repeat", "reorder", "delay", "stall", *LINE_FAULTS),
     hides=(),

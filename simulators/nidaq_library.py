@@ -133,4 +133,6 @@ def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningS
     return RunningSimulator(uri, bench, library.now, unplug(faults), lambda: library.open, library.remove)
 
 
-SIMULATOR = Simulator("nidaq", _start, factor=1.0, tells=("lose", "saturate", "unplug", "reboot", "slow"))
+SIMULATOR = Simulator(
+    "nidaq", _start, factor=1.0, tells=("lose", "saturate", "unplug", "reboot", "slow"), on_ports=False
+)

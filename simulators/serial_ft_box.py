@@ -173,9 +173,8 @@ class SerialFtBox(LineBox):
 
 SIMULATOR = Simulator(
     "serial-ft",
-    serve_on_ports(lambda bench, clock, faults: SerialFtBox(bench, clock, faults=faults)),
+    serve_on_ports(SerialFtBox),
     factor=2.0,
     statuses=tuple(range(1, 10)),
     unshown=0.2,  # binary records have no checksum
-    serial_line=True,
 )

@@ -195,7 +195,7 @@ class RunningSimulator:
     forget: Callable[[], None] = lambda: None  # lets the computer have its own USB and libraries again
 
 
-Start = Callable[[Bench, Clock, Faults, Path], RunningSimulator]  # in a folder for what it writes
+Start = Callable[..., RunningSimulator]  # takes bench, clock, faults, a folder for what it writes, and own settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +209,7 @@ class Simulator:
     hides: tuple[Kind, ...] = ("stall",)  # faults that can happen and that no driver can tell
     statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be planted one after the other
     unshown: float = 0.0  # share of damaged records that no check on this wire shows
-    serial_line: bool = False  # so that hostile bytes on a line are tried on its driver too
+    on_ports: bool = True  # of this computer, so that any program can open it (`daq-app simulate`)
     at_start: bool = False  # a status is sent in full only where it is set when a stream begins
 
 
@@ -224,11 +224,11 @@ class _Box(Protocol):
     def close(self) -> None: ...
 
 
-def serve_on_ports(make: Callable[[Bench, Clock, Faults], _Box]) -> Start:
-    """Return the function that starts a box with ports of its own on this computer."""
+def serve_on_ports(make: Callable[..., _Box]) -> Start:
+    """Return the function that starts a box with ports of its own; `make` takes bench, clock, `faults` and settings."""
 
-    def start(bench: Bench, clock: Clock, faults: Faults, _: Path) -> RunningSimulator:
-        box = make(bench, clock, faults)
+    def start(bench: Bench, clock: Clock, faults: Faults, _: Path, **settings: object) -> RunningSimulator:
+        box = make(bench, clock, faults=faults, **settings)
         box.start()
         return RunningSimulator(box.uri, bench, box.now, box.close)
 

@@ -8,6 +8,7 @@ import pytest
 from daq_app.accuracy_page.page import PAGES as TABLES
 from daq_app.accuracy_page.page import fill_marks
 from daq_app.cli.main import VERBS
+from drivers.catalog import DRIVERS
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -41,6 +42,11 @@ def test_every_file_of_code_that_a_page_names_is_there(page):
 def test_readme_names_every_verb():
     told = (ROOT / "README.md").read_text(encoding="utf-8")
     assert [verb for verb in VERBS if not re.search(rf"`(\w+`, `)*{verb}\b", told)] == []
+
+
+def test_readme_names_an_address_of_every_driver():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert not [driver.name for driver in DRIVERS if f"| `{driver.name}://" not in readme]
 
 
 def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():

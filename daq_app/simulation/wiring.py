@@ -15,20 +15,19 @@ from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
 from simulators.bench import Bench, PlantedStroke
 from simulators.net_ft_box import NetFtBox
-from simulators.serving import serve_digital_ft, serve_net_ft, serve_serial_ft
+from simulators.serving import WIRES, serve
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
 __all__ = [
+    "WIRES",
     "Connection",
     "SimulatedHand",
     "SimulatedPeople",
     "SimulatedSubject",
     "connect",
     "planted_surface",
-    "serve_digital_ft",
-    "serve_net_ft",
-    "serve_serial_ft",
+    "serve",
 ]
 
 SIMULATED = "sim"

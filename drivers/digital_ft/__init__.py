@@ -236,4 +236,4 @@ def _response(link: Link, request: bytes, expected: bytes, patience: float = _AN
             return response
 
 
-DRIVER = Driver("digital-ft", open_digital_ft, identify_digital_ft)
+DRIVER = Driver("digital-ft", open_digital_ft, identify_digital_ft, serial_line=True)

@@ -251,4 +251,4 @@ def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True)
             return reply
 
 
-DRIVER = Driver("serial-ft", open_serial_ft, identify_serial_ft)
+DRIVER = Driver("serial-ft", open_serial_ft, identify_serial_ft, serial_line=True)

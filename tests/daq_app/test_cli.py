@@ -1,15 +1,20 @@
 import importlib
+import json
 import os
 import shlex
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from driver_courses import identified
 
 from daq_app.cli import main as cli
 from daq_app.cli.main import VERBS, run
+from daq_app.cli.verbs import simulate
+from daq_app.simulation.wiring import WIRES
 
 
 def test_without_arguments_the_verbs_are_listed_and_the_command_line_counts_as_wrong(capsys):
@@ -94,6 +99,21 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
+@pytest.mark.parametrize("wire", WIRES)
+def test_the_simulated_device_of_a_wire_answers_at_the_address_that_is_printed_until_ctrl_c(wire, capsys, monkeypatch):
+    answers = []
+
+    def look(_):
+        answers.append(identified(wire, json.loads(capsys.readouterr().out)["address"]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(simulate, "time", SimpleNamespace(sleep=look))
+    ports = [f"--{name}-port=0" for name in ("rdt", "tcp", "http")] if wire == "net-ft" else []
+    assert run(["simulate", wire, "--json", "--seed", "7", *ports]) == 130
+    assert [(one.driver, one.serial, one.simulated) for one in answers] == [(wire, "SIM00007", True)]
 
 
 @pytest.mark.parametrize("name", [*cli._WRONG, *cli._FAILED])

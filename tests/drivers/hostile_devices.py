@@ -8,6 +8,7 @@ import threading
 import time
 
 from drivers import usb_link
+from drivers.catalog import DRIVERS
 from drivers.clock import RealClock
 from simulators.bench import Bench, calibration_file
 from simulators.faults import Faults
@@ -169,9 +170,9 @@ HOSTILE = {
     "digital-ft, one packet": lambda _: line("digital-ft", "parity=none", b"\x55" * 26),
     "labjack-u6, zeros": labjack_u6,
     **{
-        f"{name}, {what}": any_line(name, data)
-        for name, simulator in SIMULATORS.items()
+        f"{driver.name}, {what}": any_line(driver.name, data)
+        for driver in DRIVERS
         for what, data in (("zeros", bytes(50)), ("random bytes", lambda: os.urandom(30)))
-        if simulator.serial_line
+        if driver.serial_line
     },
 }

@@ -10,7 +10,7 @@ from drivers.catalog import open_transducer
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError
 from simulators.faults import Fault
-from simulators.serving import ScriptedBench, Timetable, TimetableError, load_timetable, serve_net_ft, usual_timetable
+from simulators.serving import ScriptedBench, Timetable, TimetableError, load_timetable, serve, usual_timetable
 from simulators.stroke import Surface, paper_surfaces
 
 SCRIPT = """
@@ -117,7 +117,7 @@ def test_without_a_script_the_papers_ten_surfaces_are_stroked():
 
 
 def test_a_served_box_is_opened_by_its_address_and_carries_out_its_script(script):
-    served = serve_net_ft(rdt_port=0, tcp_port=0, http_port=0, rate=1000, seed=4, factor=20.0, script=script(SCRIPT))
+    served = serve("net-ft", ports=(0, 0, 0), rate=1000, seed=4, factor=20.0, script=script(SCRIPT))
     try:
         transducer = open_transducer(served.uri, PacedClock(20.0))
         assert (transducer.info.rate, transducer.info.serial) == (1000.0, "SIM00004")
@@ -135,14 +135,14 @@ def test_where_port_80_is_refused_a_free_one_is_taken():
         with contextlib.suppress(OSError):  # somebody else may hold it already
             taken.bind(("127.0.0.1", 80))
             taken.listen()
-        served = serve_net_ft(rdt_port=0, tcp_port=0)
+        served = serve("net-ft", ports=(0, 0, None))
         served.close()
     assert "http=80" not in served.uri.split("&")
 
 
 def test_a_port_in_use_is_refused_in_one_sentence():
-    served = serve_net_ft(rdt_port=0, tcp_port=0, http_port=0)
+    served = serve("net-ft", ports=(0, 0, 0))
     port = int(served.uri.split("rdt=")[1].split("&")[0])
     with pytest.raises(SetupError, match=f"UDP port {port}"):
-        serve_net_ft(rdt_port=port, tcp_port=0)
+        serve("net-ft", ports=(port, 0, None))
     served.close()

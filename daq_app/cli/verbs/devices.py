@@ -14,7 +14,7 @@ from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connect
 from daq_app.wording import number
-from drivers.catalog import Probe, reachable
+from drivers.catalog import DRIVERS, Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.serial_link import serial_ports
@@ -50,8 +50,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     ]
     rows.append(["sim:", "simulated bench", "–", "always there"])
     console.say(table(rows, head=["address", "model", "serial", "calibration"]))
-    unopened = "is a serial port, which was not opened: ask it as"
-    console.say(*(f"{line} {unopened} serial-ft://{line} or digital-ft://{line}" for line in lines))
+    for line in lines:
+        addresses = " or ".join(f"{driver.name}://{line}" for driver in DRIVERS if driver.serial_line)
+        console.say(f"{line} is a serial port, which was not opened: ask it as {addresses}")
     for device in devices:
         if device.problem:
             problem = device.problem.removeprefix(f"{device.uri}: ")

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from daq_app.cli.options import add_number, add_seed
 from daq_app.console import Console, WrongValue
-from daq_app.simulation.wiring import serve_digital_ft, serve_net_ft, serve_serial_ft
+from daq_app.simulation.wiring import WIRES, serve
 from sessions.plan.protocols.protocol import LARGEST_SEED
 
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
-WIRES = ("net-ft", "serial-ft", "digital-ft")
 BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
-OF_ONE_WIRE = {"rdt_port": "net-ft", "tcp_port": "net-ft", "http_port": "net-ft", "rate": "net-ft", "baud": "serial-ft"}
+PORTS = {"rdt_port": 49152, "tcp_port": 49151, "http_port": None}  # of net-ft, where none are given
+OF_ONE_WIRE = {**dict.fromkeys((*PORTS, "rate"), "net-ft"), "baud": "serial-ft"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,8 +41,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
             raise WrongValue(f"--{name.replace('_', '-')} belongs to {OF_ONE_WIRE[name]}, not to {options.wire}")
     if settings.get("baud", 9600) not in BAUDS:
         raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, BAUDS))}")
-    serve = {"net-ft": serve_net_ft, "serial-ft": serve_serial_ft, "digital-ft": serve_digital_ft}[options.wire]
-    box = serve(**settings, seed=options.seed, factor=options.factor, script=options.script)
+    if options.wire == "net-ft":
+        settings["ports"] = tuple(settings.pop(name, usual) for name, usual in PORTS.items())
+    box = serve(options.wire, **settings, seed=options.seed, factor=options.factor, script=options.script)
     try:
         console.result({"address": box.uri, "simulated": True})
         console.say(f"SIMULATED {options.wire} at {box.uri}")
