@@ -19,7 +19,7 @@ from typing import Any, cast
 
 from daq_app.child_process import process_pool
 from daq_app.console import Console
-from sessions.file_access import as_type, remedy, write_whole
+from sessions.file_access import as_type, json_object, name_failure, remedy, write_whole
 from sessions.prediction.sealed_predictions import SEAL
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import GAIN_ERROR, UNBLINDING
@@ -40,8 +40,9 @@ Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why 
 
 
 def content_of(session: Path) -> dict[str, bytes]:
-    """Return the files of a session that its numbers come from. Raises OSError."""
-    return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
+    """Return the files of a session that its numbers come from. Raises RecordingError."""
+    with name_failure(RecordingError, "its files cannot be read"):
+        return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
 
 
 def compute_visit(folder: Path, options: VisitOptions) -> Answer:
@@ -172,7 +173,11 @@ def _by_client(
             # Files are read and sent as workers come free: never those of a thousand sessions at once.
             while waiting and threads and len(under_way) < 2 * threads:
                 folder = waiting.pop()
-                content = content_of(folder)
+                try:
+                    content = content_of(folder)
+                except RecordingError as error:
+                    yield folder.name, str(error)
+                    continue
                 future = client.submit(compute_sent_visit, folder.name, content, options, pure=False, retries=1)
                 names[future.key], under_way[future.key] = folder.name, future
                 answers.add(future)
@@ -207,7 +212,7 @@ class Shelf:
         self._recipe = json.dumps(recipe, sort_keys=True, default=str).encode()
 
     def key(self, session: Path) -> str:
-        """Return the SHA-256 over all that a session's result comes from. Raises OSError."""
+        """Return the SHA-256 over all that a session's result comes from. Raises RecordingError."""
         digest = hashlib.sha256(self._recipe)
         digest.update(session.name.encode())
         for name, content in content_of(session).items():
@@ -217,7 +222,7 @@ class Shelf:
     def load(self, key: str) -> Visit | None:
         """Return the visit stored under a key; None where there is none, or where the file has changed."""
         with suppress(OSError, ValueError, KeyError, TypeError):
-            kept = json.loads(self.file(key).read_bytes())
+            kept = json_object(self.file(key).read_bytes())
             if kept["sha256"] == _digest(kept["visit"]):
                 return as_type(kept["visit"], Visit)
         return None
@@ -255,7 +260,14 @@ def visits(
     What is on the shelf already is not computed again; what is done stays there whatever comes. Raises SchedulerError,
     RecordingError where the shelf cannot be written.
     """
-    keys = {folder: shelf.key(folder) for folder in folders}
+    keys: dict[Path, str] = {}
+    failed: list[tuple[str, str]] = []
+    for folder in folders:
+        try:
+            keys[folder] = shelf.key(folder)
+        except RecordingError as error:
+            failed.append((folder.name, str(error)))
+            console.note(f"{folder.name}: {error}")
     kept = {folder: shelf.load(key) for folder, key in keys.items()}
     done = [visit for visit in kept.values() if visit is not None]
     missing = [folder for folder, visit in kept.items() if visit is None]
@@ -264,7 +276,6 @@ def visits(
             console.note(f"{folder.name}: {shelf.file(keys[folder])} is damaged; the session is computed anew")
     if done:
         console.note(f"{len(done)} of {len(folders)} sessions were computed before and are taken as they are")
-    failed: list[tuple[str, str]] = []
     named = {folder.name: keys[folder] for folder in missing}
     start = time.monotonic()
     if missing:

@@ -4,6 +4,7 @@ A finger's answer is `sessions.prediction.surface_series`: how each quantity at 
 surfaces. Fingers are computed side by side, and kept as they come where a file is given.
 """
 
+import errno
 import hashlib
 import json
 import math
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from daq_app.batch.pool import cluster_client, local_pool, refuse_other_workers
 from daq_app.batch.sensitivity import Index, sobol_indices
+from sessions.file_access import json_object
 from sessions.prediction.surface_series import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions
 from solver import Friction, Loading, Receptor, Scene, Solve
@@ -187,13 +189,15 @@ def answers_of(
 
 
 def _load_answers(keep: Path | None) -> dict[str, Any]:
-    """Return the answers that a file holds; a line that a crash cut short is left out."""
+    """Return the answers that a file holds; a line that a crash cut short is left out. Raises OSError."""
+    content = keep.read_bytes().strip() if keep is not None and keep.exists() else b""
+    if content and not content.startswith(b'{"key": "'):  # nothing is written behind it
+        raise OSError(errno.EEXIST, "it holds something else than answers", str(keep))
     answers: dict[str, Any] = {}
-    if keep is not None and keep.exists():
-        for line in keep.read_text(encoding="utf-8").splitlines():
-            with suppress(ValueError, KeyError, TypeError):
-                one = json.loads(line)
-                answers[one["key"]] = one["answer"]
+    for line in content.splitlines():
+        with suppress(ValueError, KeyError):
+            one = json_object(line)
+            answers[one["key"]] = one["answer"]
     return answers
 
 

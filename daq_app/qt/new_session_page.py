@@ -26,7 +26,16 @@ from daq_app.qt.parts import (
 from daq_app.qt.preferences import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
-from daq_app.window.new_session import AXES, Bench, SessionForm, enrol_subject, enrolment, optional_phases, place_of
+from daq_app.window.new_session import (
+    AXES,
+    Bench,
+    SessionForm,
+    enrol_subject,
+    enrolment,
+    folder_of,
+    optional_phases,
+    place_of,
+)
 from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
@@ -191,7 +200,7 @@ class NewSessionPage(Panel):
 
     def look_for_unfinished_sessions(self) -> None:
         """Look for sessions that were cut short, without holding up the window."""
-        self.cut_short.look_in(Path(self.form().folder or "."))
+        self.cut_short.look_in(folder_of(self.form()))
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
@@ -239,8 +248,7 @@ class NewSessionPage(Panel):
 
     def _place_changed(self) -> None:
         """Offer the studies of the folder, and the code after those that were there."""
-        folder = Path(self.folder.text().strip() or ".").expanduser()
-        there = ["", *studies_in(folder)]
+        there = ["", *studies_in(folder_of(self.form()))]
         if there != [self.studies.itemText(at) for at in range(self.studies.count())]:
             with QSignalBlocker(self.study):  # what stands in the field stays
                 typed = self.study.text()

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -131,7 +132,7 @@ def check_form(
         planned = replace(planned, frame=replace(planned.frame, normal=form.normal, normal_origin="set"))
     # In a study the folder's name tells what the visit is for: the protocol is the same in all.
     what = planned.protocol if place is None else "forces" if planned.forces else "scores"
-    parent = Path(form.folder.strip() or ".").expanduser() / PILOTS if form.pilot else place_of(form)
+    parent = folder_of(form) / PILOTS if form.pilot else place_of(form)
     folder = parent / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
     hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
     people = People("simulated people" if form.simulated else hand, seed, chosen.planted_friction)
@@ -189,7 +190,7 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     """Return what the study that the form names says of the subject; None where it names none that was made."""
     try:
         study = _study(form)
-    except (StudyError, SettingsError) as error:
+    except (StudyError, SettingsError, OSError) as error:
         return Enrolment("", _sentence(error))
     if study is None:
         return None
@@ -215,14 +216,23 @@ def enrol_subject(form: SessionForm) -> str:
     """Enrol the form's subject in its study, without measures of its finger; return why it failed, or ""."""
     try:
         enrol(place_of(form), form.subject.strip(), Body())
-    except (StudyError, SettingsError) as error:
+    except (StudyError, SettingsError, OSError) as error:
         return _sentence(error)
     return ""
 
 
 def place_of(form: SessionForm) -> Path:
     """Return the folder in which the session gets its own."""
-    return Path(form.folder.strip() or ".").expanduser() / form.study.strip()
+    return folder_of(form) / form.study.strip()
+
+
+def folder_of(form: SessionForm) -> Path:
+    """Return the folder that a form names; as it was typed where it begins with the home of nobody."""
+    typed = Path(form.folder.strip() or ".")
+    try:
+        return typed.expanduser()
+    except RuntimeError:
+        return typed
 
 
 def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
@@ -251,8 +261,11 @@ def _protocol(form: SessionForm) -> Protocol:
 def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
     """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
     unfinished: list[UnfinishedSession] = []
-    places = (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite"))
-    for place in sorted(places, key=lambda place: -place.stat().st_mtime):
+    places: dict[Path, float] = {}
+    with suppress(OSError):  # a folder that cannot be read, or that goes meanwhile
+        for place in (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")):
+            places[place] = place.stat().st_mtime
+    for place in sorted(places, key=lambda place: -places[place]):
         if len(unfinished) == SHOWN:
             break
         if is_sealed(place.parent):
@@ -291,17 +304,26 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
         wrong["area"] = tr(
             "An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty.", least=AREAS[0], most=AREAS[1]
         )
-    place = Path(form.folder.strip() or ".").expanduser()
-    existing = next((p for p in (place, *place.parents) if p.exists()), place)
-    if not existing.is_dir():
-        wrong["folder"] = tr("{place} is a file: choose a folder.", place=existing)
-    elif not os.access(existing, os.W_OK):
-        wrong["folder"] = tr("Nothing can be written in {place}: choose another folder.", place=existing)
+    if unusable := _why_unusable(folder_of(form)):
+        wrong["folder"] = unusable
     if form.forces and not bench.connected:
         wrong["forces"] = tr("No transducer is connected: connect one, or choose scores only.")
     if form.simulated and form.forces and bench.connected and not bench.simulated:
         wrong["simulated"] = tr("Only the simulated bench can be stroked by a simulated subject.")
     return wrong
+
+
+def _why_unusable(place: Path) -> str:
+    """Return why no session can be kept below a folder, "" where it can."""
+    try:
+        existing = next((p for p in (place, *place.parents) if p.exists()), place)
+        if not existing.is_dir():
+            return tr("{place} is a file: choose a folder.", place=existing)
+    except OSError as error:
+        return _sentence(error)
+    if str(place).startswith("~") or not os.access(existing, os.W_OK):
+        return tr("Nothing can be written in {place}: choose another folder.", place=place)
+    return ""
 
 
 def _number(text: str) -> float | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from importlib import import_module
 
@@ -126,11 +127,12 @@ class Judge:
         self._offset = 0.0  # of the times in the log to those of the stream [s]
         self._due: float | None = None  # when the take is to be looked at [s, device time]
 
-    def prepare(self) -> None:
-        """Start the process, so that the first stroke need not wait for it."""
+    def prepare(self) -> ProcessPoolExecutor:
+        """Start the process, so that the first stroke need not wait for it, and return it."""
         if self._worker is None:
             self._worker = process_pool(1)
             self._worker.submit(_warm)
+        return self._worker
 
     def close(self) -> None:
         """Let go of the process."""
@@ -167,9 +169,12 @@ class Judge:
         block = feed.take()
         if trial is None or not len(block):
             return
-        self.prepare()
-        assert self._worker is not None
-        future = self._worker.submit(stroke_quality, block, session.plan, in_newtons(info), trial.trial)
+        words = block, session.plan, in_newtons(info), trial.trial
+        try:
+            future = self.prepare().submit(stroke_quality, *words)
+        except BrokenProcessPool:  # it ended while it had nothing to do
+            self._worker = None
+            future = self.prepare().submit(stroke_quality, *words)
         future.add_done_callback(lambda done: self._report_quality(number, take, done))
 
     def _report_quality(self, number: int, take: int, done: "Future[Quality]") -> None:

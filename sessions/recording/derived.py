@@ -1,5 +1,6 @@
 """What is kept beside a recording: numbers made from it, whether they come out again, and the opened key."""
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -198,10 +199,18 @@ def reveal(recording: Recording) -> Recording:
     return replace(recording, plan=plan, trials=trial_records(plan, recording.events))
 
 
+def session_folders(folder: Path) -> tuple[Path, ...]:
+    """Return the folders in a folder that hold a session, by name, and those that nobody may look into.
+
+    Raises OSError where the folder itself cannot be read.
+    """
+    inside = (path for path in folder.iterdir() if path.is_dir())
+    return tuple(sorted(p for p in inside if not os.access(p, os.R_OK | os.X_OK) or (p / LIVE_FILE).is_file()))
+
+
 def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:
     """Return the sessions in a study's folder, by name, those of one subject where a code is given."""
-    paths = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
-    recordings = (reveal(Recording.open(path)) for path in paths)
+    recordings = (reveal(Recording.open(path)) for path in session_folders(folder))
     return tuple(recording for recording in recordings if subject in (None, recording.plan.subject))
 
 

@@ -67,6 +67,13 @@ def test_what_is_kept_is_not_computed_again_and_a_line_cut_short_is(tmp_path, mo
     assert sign_map.answers_of(trials, parts.append, keep=keep, workers=1) == first
 
 
+def test_a_file_that_holds_something_else_than_answers_is_left_as_it_is(tmp_path):
+    for content in (b"\xff\xd8 a photograph", b"[" * 5000, b"title = 'a scene'\n"):
+        (tmp_path / "other").write_bytes(content)
+        assert run(["sensitivity", "--samples", "2", "--keep", str(tmp_path / "other")]) == 2
+        assert (tmp_path / "other").read_bytes() == content
+
+
 def test_the_verb_prints_signs_map_shares_and_indices(tmp_path, capsys):
     keep = str(tmp_path / "keep.jsonl")
     assert run(["sensitivity", "--samples", "2", "--workers", "1", "--keep", keep, "--json"]) == 0

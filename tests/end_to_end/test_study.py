@@ -1,6 +1,8 @@
 """A synthetic study from its seed to its page: made, computed once, spoilt parts named, the same wherever computed."""
 
 import json
+import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -47,6 +49,30 @@ def rows(pool, subject):
 def test_the_damaged_session_is_named_and_stops_nothing(pool):
     assert [name for name, _ in pool["failed"]] == ["S11"]
     assert [visit["session"] for visit in pool["visits"]] == ["S01", "S02"]
+
+
+def test_a_session_that_nobody_may_read_is_named_and_left_out(study, tmp_path, capsys):
+    folder = tmp_path / "closed"
+    shutil.copytree(study / "S01", folder / "S01")
+    (folder / "S02").mkdir()
+    (folder / "S02").chmod(0)
+    try:
+        if os.access(folder / "S02", os.R_OK):
+            pytest.skip("nothing is closed to this user")
+        assert run(["study", str(folder), "--out", str(tmp_path / "out"), "--json"]) == 3
+    finally:
+        (folder / "S02").chmod(0o700)
+    ((name, why),) = json.loads(capsys.readouterr().out)["study"]["failed"]
+    assert (name, "permit reading" in why) == ("S02", True)
+
+
+@pytest.mark.parametrize("content", ["[" * 100_000, "[]", "{"])
+def test_planted_numbers_that_are_damaged_are_named(study, tmp_path, capsys, content):
+    folder = tmp_path / "planted"
+    shutil.copytree(study / "S01", folder / "S01")
+    (folder / "planted.json").write_text(content)
+    assert run(["study", str(folder)]) == 1
+    assert "planted.json is damaged" in capsys.readouterr().err
 
 
 def test_each_planted_flaw_stands_beside_whether_it_was_found(pool):

@@ -5,7 +5,6 @@ speed are met. Ctrl-C stops it and keeps what was measured until then. Run it wh
 """
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,7 +51,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunResults":
     """Measure, or return the results of an earlier run. Raises WrongValue for a file that holds none."""
-    from sessions.file_access import read_within_limit
+    from sessions.file_access import json_object, read_within_limit
     from sessions.recording.head import software_versions
     from solver.verification.measuring import measure, restore
     from solver.verification.request import Host
@@ -60,6 +59,6 @@ def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunRe
     if options.data is None:
         return measure(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))
     try:
-        return restore(json.loads(read_within_limit(options.data)))
+        return restore(json_object(read_within_limit(options.data)))
     except (ValueError, KeyError, TypeError) as error:
         raise WrongValue(f"{options.data} is no accuracy.json of this program ({error}); give another file") from error

@@ -127,6 +127,8 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             scheduler=options.scheduler,
         )
     except OSError as error:
+        if options.keep is None:
+            raise
         raise WrongValue(f"--keep {options.keep} cannot be used ({error.strerror})") from error
     single = dict(zip(changes, answers, strict=False))
     radii = dict(zip(mapped, answers[len(changes) :], strict=False))

@@ -8,7 +8,6 @@ With --synthetic a study of ten simulated subjects is made first, and what was p
 """
 
 import argparse
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
@@ -36,11 +35,11 @@ from daq_app.cli.options import (
 )
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number, span
-from sessions.file_access import json_text, read_within_limit
+from sessions.file_access import json_text, json_value, read_within_limit
 from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.prediction.surface_series import StudyDesign, planted_strokes
 from sessions.recording import RecordingError
-from sessions.recording.schema import LIVE_FILE
+from sessions.recording.derived import session_folders
 from sessions.statistics.findings import UNITS, StudyFindings, check_ground_truth
 from sessions.statistics.pooled import pool_visits
 from sessions.statistics.power import TWIN, Judgement, PlantedEffects, Recovery, power, recovery
@@ -197,7 +196,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.depths is not None:
         raise WrongValue("--depths are those of simulated studies: give --power too")
     folder, out = _places(options, console)
-    sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
+    sessions = session_folders(folder)
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
@@ -229,7 +228,7 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        settings = check_ground_truth(json.loads(read_within_limit(path)))
+        settings = check_ground_truth(json_value(read_within_limit(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
     return settings

@@ -15,6 +15,7 @@ from daq_app.window.new_session import (
     enrolment,
     optional_phases,
     pilot_form,
+    refusals,
     unfinished_sessions,
 )
 from sessions.plan.plan import Frame
@@ -87,6 +88,19 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     made = check_form(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
     assert "is a file" in made.sentences["folder"]
+
+
+def test_a_folder_below_the_home_of_nobody_or_that_no_file_system_can_hold_is_refused_beside_its_field(tmp_path):
+    for typed in ("~nobody-of-that-name/recordings", str(tmp_path / ("x" * 300))):
+        assert "folder" in refusals(replace(FORM, folder=typed, study="pilot"), REAL)
+
+
+def test_sessions_that_were_cut_short_are_listed_whatever_else_lies_in_the_folder(tmp_path):
+    begun(tmp_path / "P01").close()
+    (tmp_path / "gone").mkdir()
+    (tmp_path / "gone" / "session.sqlite").symlink_to(tmp_path / "nowhere")
+    assert [one.folder for one in unfinished_sessions(tmp_path)] == [tmp_path / "P01"]
+    assert unfinished_sessions(tmp_path / ("x" * 300)) == ()
 
 
 def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():

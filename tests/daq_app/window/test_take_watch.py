@@ -3,9 +3,51 @@
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
+import numpy as np
 import pytest
+from session_messages import GOOD, INFO, SCORE, after, logged
+
+from daq_app.recorder.messages import Live
+from daq_app.window import stroke_quality
+from daq_app.window.course_state import Judged
+from daq_app.window.live_feed import LiveFeed
+from daq_app.window.stroke_quality import Judge
+from sessions.plan.plan import Frame
+from sessions.run import steps
+
+
+class Pool:
+    """A process that judges a stroke at once, or has ended meanwhile."""
+
+    def __init__(self, *, ended):
+        self.ended = ended
+
+    def submit(self, work, *_):
+        if self.ended and work is stroke_quality.stroke_quality:
+            raise BrokenProcessPool
+        future = Future()
+        future.set_result(GOOD)
+        return future
+
+
+def test_a_process_that_ended_while_it_waited_for_strokes_is_replaced_at_the_next(monkeypatch):
+    pools = [Pool(ended=True), Pool(ended=False)]
+    monkeypatch.setattr(stroke_quality, "process_pool", lambda _: pools.pop(0))
+    said, feed = [], LiveFeed()
+    judge = Judge(said.append)
+    judge.prepare()
+    feed.device(INFO)
+    judge.heard(steps.StartTake(1, 1), feed)
+    number = np.arange(700)
+    feed.add(Live(1, number, number / 100.0, number, np.zeros((700, 6)), number * 0, (0.0,) * 6), Frame())
+    judge.heard(logged("finger_lifted", 1, time=3.6), feed)
+    judge.look(feed, after(*SCORE))
+    assert said == [Judged(1, 1, GOOD)]
+
 
 PREPARED = """
 import os, signal
