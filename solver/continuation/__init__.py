@@ -11,7 +11,8 @@ ill-posed at that stretch, and finer meshes come ever nearer to it. The theory i
 strain (Dowaikh and Ogden 1990, IMA J. Appl. Math. 44, 261), here for any law in plane strain.
 """
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Protocol
 
@@ -25,14 +26,15 @@ from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadS
 from solver.failures import NotConverged
 from solver.progress import check_stop, report_progress
 
+ROUND_OFF = 1e-12  # relative difference below which a target is reached
 LARGEST_MU = 2.0  # largest coefficient of friction to which a branch is followed
 
 
 @dataclass(frozen=True, slots=True)
 class BranchControl:
-    """Control of the continuation and of its end; steps are fractions of the range that is followed."""
+    """Control of the continuation and of its end; steps are fractions of the largest range."""
 
-    tolerance: float = 1e-6  # of a point on the branch [mm]
+    tolerance: float = 1e-4  # of a point on the branch [mm]
     first: float = 0.1  # first step along the branch
     shortest: float = 1e-3  # shortest step
     growth: float = 1.5  # ratio of the next step to one with few iterations
@@ -47,6 +49,7 @@ class BranchControl:
     hop: tuple[float, ...] = (0.01, 0.03)  # relative steps of the parameter for that
     force_change: float = 0.05  # largest relative change of the forces in such a step
     apart: float = 0.04  # largest difference of least stretches at consecutive points
+    aim: float = 0.5  # part of that difference at which a step aims
 
 
 BRANCH = BranchControl()
@@ -71,12 +74,13 @@ class BranchBody(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branch:
-    """A branch of settled slides; its last state is at the target or the last before the limit."""
+    """A branch of settled slides; its last state is at the target, a step beyond it, or the last before the limit."""
 
     states: tuple[EquilibriumState, ...]
     value: float  # largest friction coefficient or depth [mm] on it
     limited: bool  # whether the branch ends before its target
     lost: bool = False  # whether only the corrector failed there, far from a limit point and from a fold
+    length: float | None = None  # of the next step along it, where it continues
 
     @property
     def last(self) -> EquilibriumState:
@@ -85,14 +89,21 @@ class Branch:
 
 
 def continue_branch(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
+    """Follow a branch as `trace` does, up to exactly `target`."""
+    return stop_at(finger, trace(finger, start, by, target, folds), by, target)
+
+
+def trace(
+    finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float, length: float | None = None
+) -> Branch:
     """Follow a branch as `follow` does, and continue where it turns back only over a short stretch."""
-    branch = follow(finger, start, by, target, folds)
+    branch = follow(finger, start, by, target, folds, length)
     for _ in range(BRANCH.hops):
         beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
         if beyond is None:
             break
         more = follow(finger, beyond, by, target, folds)
-        branch = Branch((*branch.states, *more.states), more.value, more.limited, more.lost)
+        branch = replace(more, states=(*branch.states, *more.states))
     return branch
 
 
@@ -121,48 +132,69 @@ def _beyond(finger: BranchBody, branch: Branch, by: int, target: float, folds: f
     return None
 
 
-def follow(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
-    """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
+def follow(
+    finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float, length: float | None = None
+) -> Branch:
+    """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) passes `target`.
 
-    It ends where that parameter passes a maximum, or where the least stretch of the skin reaches `folds`.
+    It ends where that parameter passes a maximum, or where the least stretch of the skin reaches `folds`. `length` is
+    that of the first step. In friction no step depends on `target`, so that all targets beyond the end have one limit.
     """
     way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
-    if way[0].value >= target * (1.0 - 1e-12):
-        return Branch((start,), way[0].value, limited=False)
     best = 0  # the point with the largest parameter
-    reach = min(abs(target - way[0].value), LARGEST_MU)
-    length = BRANCH.first * reach
+    scale = LARGEST_MU if by == BY_FRICTION else target - way[0].value
+    shortest = BRANCH.shortest * scale
+    length = BRANCH.first * scale if length is None else length
     direction, rate = _tangent(finger.newton, start, by)
     doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
-    for _ in range(BRANCH.most):
+
+    def ended(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
+        return Branch(tuple(point.state for point in way[: best + 1]), value, limited, lost, length)
+
+    while way[best].value < target * (1.0 - ROUND_OFF):
         check_stop()
-        report_progress(doing, abs(way[best].value - way[0].value) / reach)
-        step = _further(finger, way[-1], by, direction, rate, length, target, BRANCH.shortest * reach)
-        if step is None:
-            lost = rate > BRANCH.steep and way[-1].compression.least > folds + BRANCH.apart
-            return Branch(tuple(point.state for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
+        report_progress(doing, way[best].value / target)
+        last = way[-1]
+        step = _further(finger, last, by, direction, rate, length, shortest)
+        if step is None or len(way) > BRANCH.most:
+            lost = rate > BRANCH.steep and last.compression.least > folds + BRANCH.apart
+            return ended(way[best].value, lost=lost)
         point, length = step
+        fall = last.compression.least - point.compression.least
         if point.compression.least < folds:
-            last = way[-1]
-            part = min(
-                max((last.compression.least - folds) / (last.compression.least - point.compression.least), 0.0), 1.0
-            )
-            value = max(way[best].value, last.value + part * (point.value - last.value))
-            return Branch(tuple(point.state for point in way[: best + 1]), value, limited=True)
-        easy = point.state.iterations - way[-1].state.iterations <= BRANCH.easy
+            part = min(max((last.compression.least - folds) / fall, 0.0), 1.0)
+            return ended(max(way[best].value, last.value + part * (point.value - last.value)))
         way.append(point)
         if point.value > way[best].value:
             best = len(way) - 1
-        if point.value >= target * (1.0 - 1e-12):
-            return Branch(tuple(point.state for point in way), point.value, limited=False)
-        length *= BRANCH.growth if easy else 1.0
-        before = direction, rate
+        easy = point.state.iterations - last.state.iterations <= BRANCH.easy
+        most = BRANCH.growth * length if easy else length
+        if fall > 0.0:  # the next step aims at a part of the largest fall of the stretch, or just beyond the fold
+            aim = min(BRANCH.aim * BRANCH.apart, BRANCH.growth * (point.compression.least - folds))
+            most = min(most, max(aim / fall * length, shortest))
+        before, length = (direction, rate), most
         direction, rate = _tangent(finger.newton, point.state, by)
         if direction @ before[0] + rate * before[1] < 0.0:
             direction, rate = -direction, -rate
         if rate <= 0.0:
-            break
-    return Branch(tuple(point.state for point in way[: best + 1]), way[best].value, limited=True)
+            return ended(way[best].value)
+    return ended(way[best].value, limited=False)
+
+
+def stop_at(finger: BranchBody, branch: Branch, by: int, target: float) -> Branch:
+    """Return a branch up to `target`; the whole branch where it ends before."""
+    if branch.value < target * (1.0 - ROUND_OFF):
+        return branch
+    values = [value_of(state.load, by) for state in branch.states]
+    after = next((number for number, value in enumerate(values) if value >= target), len(values))
+    if after < len(values) and values[after] <= target * (1.0 + ROUND_OFF):
+        return Branch(branch.states[: after + 1], values[after], limited=False)
+    for near in branch.states[max(after - 1, 0) : after + 1]:
+        with suppress(NotConverged):
+            state = finger.newton.settle(near, with_value(near.load, by, target), BRANCH.tolerance)
+            if not jumped_branch(finger, near, state):
+                return Branch((*branch.states[:after], state), target, limited=False)
+    return Branch(branch.states[:after], values[after - 1], limited=True, lost=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,12 +211,11 @@ def _further(
     direction: Array,
     rate: float,
     length: float,
-    target: float,
     shortest: float,
 ) -> tuple[_Point, float] | None:
     """Return the next point of the branch and the length of the step to it; None where every step fails."""
     while length >= shortest:
-        state = _next(finger.newton, last.state, by, direction, rate, length, target)
+        state = _next(finger.newton, last.state, by, direction, rate, length)
         if state is not None:
             compression = finger.skin_compression(state)
             if compression.least >= last.compression.least - BRANCH.apart and not jumped_branch(
@@ -220,12 +251,11 @@ def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, f
 
 
 def _next(
-    newton: Newton, start: EquilibriumState, by: int, direction: Array, rate: float, length: float, target: float
+    newton: Newton, start: EquilibriumState, by: int, direction: Array, rate: float, length: float
 ) -> EquilibriumState | None:
-    """Return the state a step of `length` along the branch, at most at `target`; None where the corrector fails."""
+    """Return the state a step of `length` along the branch; None where the corrector fails."""
     root = np.sqrt(len(newton.steps))
     value = value_of(start.load, by)
-    to_target = rate * length >= target - value
     state, load = start, start.load
     gone = np.zeros(len(newton.steps))
     for _ in range(BRANCH.corrections):
@@ -233,13 +263,10 @@ def _next(
             return None
         to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
         now = value_of(load, by)
-        if to_target:
-            change = target - now
-        else:
-            ahead = direction @ along + rate
-            if ahead == 0.0:
-                return None
-            change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
+        ahead = direction @ along + rate
+        if ahead == 0.0:
+            return None
+        change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
         step = to + change * along
         load = with_value(load, by, now + change)
         state, largest, changed = newton.apply_step(state, load, step * root, newton.skin_x)

@@ -15,7 +15,7 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED
 from solver._kernels.contact_system import STEEP
 from solver.arrays import Array
-from solver.continuation import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
+from solver.continuation import BRANCH, LARGEST_MU, Branch, folds_at, stop_at, trace
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -107,11 +107,23 @@ class _Search:
         """Return the finger on a coarse mesh, or on one that is fine at the arc position of a `fold` [mm]."""
         return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=MARGIN, fold=fold))
 
-    def trace_branch(self, finger: FiniteFinger, start: EquilibriumState) -> Branch:
-        """Return the branch from `start`. Beyond LARGEST_MU the bound governs, and one step reaches the target."""
-        target = self.target if self.by == BY_DEPTH else min(self.target, LARGEST_MU)
-        branch = continue_branch(finger, start, self.by, target, self.folds)
-        if branch.limited or target == self.target:
+    @property
+    def last(self) -> float:
+        """The largest value to which the branch is followed; beyond LARGEST_MU the bound governs."""
+        return self.target if self.by == BY_DEPTH else min(self.target, LARGEST_MU)
+
+    def to(self, target: float) -> "_Search":
+        """Return the search with another target."""
+        return replace(self, target=target)
+
+    def trace(self, finger: FiniteFinger, start: EquilibriumState, length: float | None = None) -> Branch:
+        """Return the branch from `start` until it passes the target; its first step has the `length`."""
+        return trace(finger, start, self.by, self.last, self.folds, length)
+
+    def stop(self, finger: FiniteFinger, branch: Branch) -> Branch:
+        """Return a branch up to the target, which one step from LARGEST_MU reaches."""
+        branch = stop_at(finger, branch, self.by, self.last)
+        if branch.limited or self.last == self.target:
             return branch
         load = branch.last.load._replace(mu=self.target)
         last = solve_full_slip(finger.newton, load, branch.last, BRANCH.tolerance)
@@ -123,7 +135,8 @@ class _Search:
         """Return a finger that is fine where the last of `states` is compressed most, its branch, and that place."""
         place = _place_of_least_stretch(finger, states[-1])
         fine = self.finger(place)
-        return fine, self.trace_branch(fine, self._start_on_fine_mesh(fine, finger, states)), place
+        branch = self.trace(fine, self._start_on_fine_mesh(fine, finger, states))
+        return fine, self.stop(fine, branch), place
 
     def start(self, finger: FiniteFinger) -> EquilibriumState:
         """Return the state at which the branch begins. Raises NotConverged."""
@@ -154,11 +167,36 @@ class _Search:
         return self.start(fine)
 
 
+PIECES = (LARGEST_MU / 8.0, LARGEST_MU / 4.0, LARGEST_MU / 2.0, LARGEST_MU)  # ends of pieces of branches in friction
+
+
+@lru_cache(maxsize=32)
+def _coarse_branch(search: _Search) -> Branch:
+    """Return the branch of a search on its coarse mesh; in friction its target is one of PIECES.
+
+    It is cached, because all friction coefficients of a scene share it.
+    """
+    finger = search.finger()
+    if search.by == BY_DEPTH or search.target == PIECES[0]:
+        return search.trace(finger, search.start(finger))
+    before = _coarse_branch(search.to(search.target / 2.0))
+    if before.limited:
+        return before
+    more = search.trace(finger, before.last, before.length)
+    return replace(more, states=(*before.states, *more.states[1:]))
+
+
 @lru_cache(maxsize=32)
 def _reach(search: _Search) -> Reach:
     """Return the range of a branch, cached because all meshes of a scene need the same."""
+    by_depth = search.by == BY_DEPTH
+    coarse = _coarse_branch(search if by_depth else search.to(min(end for end in PIECES if end >= search.last)))
+    if coarse.value < search.last < LARGEST_MU and not by_depth:
+        end = _reach(search.to(LARGEST_MU))
+        if end.limited and end.value < search.target:
+            return end
     finger = search.finger()
-    branch = search.trace_branch(finger, search.start(finger))
+    branch = search.stop(finger, coarse)
     if branch.limited or not sound(finger, branch.last, PROOF.plain):
         finger, branch, place = search.trace_on_fine_mesh(finger, branch.states)
         if abs(_place_of_least_stretch(finger, branch.last) - place) > PROOF.astray:
@@ -205,7 +243,7 @@ def steady(
             "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
         )
     begin = solve_full_slip(finger.newton, load._replace(mu=0.0), None, tolerance)
-    branch = follow(finger, begin, BY_FRICTION, load.mu, 0.0)
+    branch = trace(finger, begin, BY_FRICTION, load.mu, 0.0)
     if not branch.limited:
         state = solve_full_slip(finger.newton, load, branch.last, tolerance)
         if _proven(finger, state, proof):

@@ -8,7 +8,7 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
-from solver.continuation import existence, finite_states, folds_at, follow
+from solver.continuation import continue_branch, existence, finite_states, folds_at
 from solver.continuation import existence as reach
 from solver.equilibrium import BY_FRICTION, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
@@ -79,12 +79,18 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     finger = published(5)
     load = LoadState(1.0, 0.5, 0.03, TOWARDS_TIP)
     start = solve_full_slip(finger.newton, load._replace(mu=0.0))
-    branch = follow(finger, start, BY_FRICTION, load.mu, 0.54)
-    again = follow(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
+    branch = continue_branch(finger, start, BY_FRICTION, load.mu, 0.54)
+    again = continue_branch(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
     assert again.states == (branch.last,)
     assert not again.limited
     assert not branch.limited
     np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=1e-6)
+
+
+def test_every_friction_beyond_the_end_of_a_branch_has_the_same_limit():
+    scene, load = Scene(friction=Friction(0.0), loading=Loading(2.2)), LoadState(2.2, 0.0, np.inf, TOWARDS_TIP)
+    targets = (1.1, 0.33, 0.7)  # in pieces of the branch that are traced one after another
+    assert len({reach.of_friction(scene, load, target).value for target in targets}) == 1
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
