@@ -189,9 +189,7 @@ class LoadBar(QWidget):
         if bar == self._bar:
             return
         self._bar = bar
-        now = (
-            tr("no rated range") if bar.share is None else tr("{share:.0f} % of the rated load", share=100 * bar.share)
-        )
+        now = tr("not known") if bar.share is None else tr("{share:.0f} % of the rated load", share=100 * bar.share)
         peak = "" if bar.peak is None else tr(", at most {peak:.0f} %", peak=100 * bar.peak)
         state = tr(", OVERLOAD") if bar.over else ""
         noise = tr(", noise {noise}", noise=bar.noise) if bar.noise else ""

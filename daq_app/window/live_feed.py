@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
+from math import nan
 
 import numpy as np
 from msgspec import structs
@@ -32,9 +33,12 @@ KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Shares of the rated range, the greatest of some readings; 1 is the rated load. nan where no range is stated."""
+    """Shares of the rated range, the greatest of some readings; 1 is the rated load.
 
-    shares: tuple[float, ...] = (0.0,) * 7  # of LOADS, as `drivers.calibration.loads` has them
+    nan where no range is stated, and before the first reading.
+    """
+
+    shares: tuple[float, ...] = (nan,) * 7  # of LOADS, as `drivers.calibration.loads` has them
 
     def latch(self, other: "Load") -> "Load":
         """Return the greater of each share.

@@ -28,3 +28,4 @@ def test_a_transducer_that_states_no_rated_range_shows_no_load_instead_of_a_fals
     load = load_of(np.ones((3, 6)), np.full(6, np.nan))
     assert np.isnan(load.shares).all()
     assert load.over == ()
+    assert np.isnan(Load().latch(load).shares).all()  # as a tenth of a second, or an acknowledgement, begins anew
