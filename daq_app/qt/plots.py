@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent
+from PySide6.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent, QValidator
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 
 from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Finger, Line, Range, along_line, along_skin, read_out
@@ -214,7 +214,7 @@ class FieldBar(QWidget):
         self._automatic: Range = (0.0, 1.0)
         self.which = choice(tr("field that is drawn"), (tr(field.label) for field in FIELD_CHOICES))
         self.ranges = choice(tr("range of the colours"), (tr("All trials"), tr("Own scale"), tr("Fixed")))
-        self.low, self.high = _number(tr("colours begin at")), _number(tr("colours end at"))
+        self.low, self.high = _NumberField(tr("colours begin at")), _NumberField(tr("colours end at"))
         hbox((self.which, 3), (self.ranges, 2), self.low, self.high, on=self, spacing=GRID // 2)
         for number in (self.low, self.high):
             number.setVisible(False)
@@ -260,11 +260,17 @@ class FieldBar(QWidget):
         self.changed.emit()
 
 
-def _number(name: str) -> QDoubleSpinBox:
-    box = QDoubleSpinBox()
-    box.setAccessibleName(name)
-    box.lineEdit().setAccessibleName(name)
-    box.setMinimumHeight(TARGET)
-    box.setRange(-LARGEST, LARGEST)
-    box.setDecimals(3)
-    return box
+class _NumberField(QDoubleSpinBox):
+    """A number with a point in every country; a comma is a point."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.setLocale(QLocale.c())
+        self.setAccessibleName(name)
+        self.lineEdit().setAccessibleName(name)
+        self.setMinimumHeight(TARGET)
+        self.setRange(-LARGEST, LARGEST)
+        self.setDecimals(3)
+
+    def validate(self, text: str, pos: int) -> tuple[QValidator.State, str, int]:
+        return super().validate(text.replace(",", "."), pos)

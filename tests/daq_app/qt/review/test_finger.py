@@ -9,14 +9,14 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QLocale, QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from qt_events import wheel
 
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import rows, selected_row
-from daq_app.qt.plots import ALL_TRIALS, FIXED
+from daq_app.qt.plots import ALL_TRIALS, FIXED, FieldBar
 from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame, until
 from tests.sessions.report_example import example
 
@@ -144,6 +144,23 @@ def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees
     assert canvas.look.field.unit == "mm"
     assert not canvas.grab().isNull()
     fields.which.setCurrentIndex(0)
+
+
+@pytest.mark.parametrize("locale", ["en_US", "de_DE", "ar_EG"])
+@pytest.mark.parametrize("typed", ["2.5", "2,5"])
+@pytest.mark.usefixtures("application")
+def test_an_end_of_the_colours_is_typed_with_a_point_or_a_comma_in_every_country(locale, typed):
+    before = QLocale()
+    QLocale.setDefault(QLocale(locale))
+    try:
+        fields = FieldBar()
+        fields.ranges.setCurrentIndex(FIXED)
+        fields.high.lineEdit().selectAll()
+        QTest.keyClicks(fields.high, typed)
+        QTest.keyClick(fields.high, Qt.Key.Key_Return)
+        assert (fields.high.value(), fields.high.text()) == (2.5, "2.500 kPa")
+    finally:
+        QLocale.setDefault(before)
 
 
 def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
