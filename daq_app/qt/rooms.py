@@ -212,6 +212,7 @@ class ReviewRoom(QWidget):
 
     def open(self, folder: Path) -> None:
         """Open a session in place of the one that is open."""
+        folder = folder.absolute()
         if self.analyst is not None and self.analyst.state.folder == folder:
             return
         self.leave()

@@ -109,6 +109,14 @@ def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_pla
     assert other not in preferences.recent_sessions()  # what is gone is not offered
 
 
+def test_a_session_that_is_open_stays_as_it_is_when_it_is_chosen_again(rooms, monkeypatch):
+    monkeypatch.chdir(SESSION.parent)
+    rooms.open(Path(SESSION.name))
+    shown = rooms.analyst
+    rooms.review.recent.itemClicked.emit(rooms.review.recent.item(0))
+    assert rooms.analyst is shown
+
+
 def test_a_new_session_that_is_asked_for_in_review_is_prepared_in_sight(driver, rooms):
     window = driver.window
     begin(driver)
