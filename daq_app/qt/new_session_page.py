@@ -1,7 +1,6 @@
 """The page on which a session is begun: a checklist of cards, each of which says in one line why not."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
 from PySide6.QtGui import QResizeEvent
@@ -125,6 +124,7 @@ class NewSessionPage(Panel):
             self.screen_fields.language.currentIndexChanged.connect(follow)
         for line in (self.study, self.folder):
             line.textChanged.connect(self._place_changed)
+        self.folder.editingFinished.connect(self.look_for_unfinished_sessions)
 
     def form(self) -> SessionForm:
         return SessionForm(
@@ -242,9 +242,10 @@ class NewSessionPage(Panel):
             self.changed.emit()
 
     def _choose_folder(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, tr("Folder of sessions"), self.folder.text() or str(Path.cwd()))
+        name = QFileDialog.getExistingDirectory(self, tr("Folder of sessions"), str(folder_of(self.form()).absolute()))
         if name:
             self.folder.setText(name)
+            self.look_for_unfinished_sessions()
 
     def _place_changed(self) -> None:
         """Offer the studies of the folder, and the code after those that were there."""

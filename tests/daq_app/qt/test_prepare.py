@@ -102,6 +102,18 @@ def test_a_session_that_was_cut_short_is_offered_above_every_card(driver, tmp_pa
     page.cut_short.show_sessions(())
 
 
+def test_sessions_that_were_cut_short_are_looked_for_in_the_folder_that_is_chosen(driver, tmp_path, monkeypatch):
+    folder, page = tmp_path / "elsewhere", driver.window.page
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    cut_short = (UnfinishedSession(folder / "P03", "P03: 2 of 10 trials done"),)
+    monkeypatch.setattr("daq_app.qt.cards.unfinished_sessions", lambda place: cut_short if place == folder else ())
+    page.folder.setText("~/elsewhere")
+    page.folder.editingFinished.emit()
+    driver.until(page.cut_short.isVisible, "the offer to go on")
+    page.cut_short.show_sessions(())
+
+
 @pytest.mark.usefixtures("application")
 def test_a_number_is_typed_of_digits_alone():
     field = NumberField(1.0, lambda: 0.0)
