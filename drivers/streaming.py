@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.clock_recovery import Placement, RateWatch, rate_of_least_late, rate_words
-from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link, Stopped
+from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link
 from drivers.readings import ReadingBlock, RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
-from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
+from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
 _GATHER = 0.002  # at fast rates bytes are let gather for so long before they are taken,
@@ -137,17 +137,13 @@ class StreamingTransducer(ThreadedTransducer):
         clock: Clock,
         *,
         opening: Deadline | None = None,
-        gathers: bool = True,
     ) -> None:
-        """Take an identified device whose `info.rate` [Hz] is known within a few per cent, opened by `opening`.
-
-        `gathers`: the link hands over all that has arrived at one go, as lines do, and not a datagram at a time.
-        """
+        """Take an identified device whose `info.rate` [Hz] is known within a few per cent, opened by `opening`."""
         super().__init__(info, clock, opening)
         self._connect = connect
         self._conversation = conversation
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
-        self._gather = _GATHER if gathers and self._period < _GATHER else 0.0
+        self._gather = _GATHER if self._period < _GATHER else 0.0
         self._pending: deque[_Arrival] = deque()
         self.reset()
 
@@ -188,24 +184,17 @@ class StreamingTransducer(ThreadedTransducer):
         self._heard = time.monotonic()  # when the last one did
 
     def run(self) -> None:
-        """Be the receiving thread: bring the device to stream, take what comes, and bring it back when it is lost."""
+        """Bring the device to stream, take what comes, and bring it back when it is lost."""
         tries = 0
         while not self.stopping.is_set():
             try:
                 self._stream()
-            except Stopped:
-                break
-            except (LinkLost, SetupError, DeviceFault) as error:
+            except (LinkLost, SetupError):
                 silent = time.monotonic() - self._heard
-                if not self._ever or isinstance(error, DeviceFault) or silent > _SILENCE + 4.0 * self._period:
-                    self.ended = error if self.info.uri in str(error) else type(error)(f"{self.info.uri}: {error}")
-                    break
+                if not self._ever or silent > _SILENCE + 4.0 * self._period:
+                    raise
                 tries = 0 if silent < 2.0 * _QUIET else tries + 1
                 self.stopping.wait(_BACK_OFF[min(tries, len(_BACK_OFF) - 1)])
-            except Exception as error:  # noqa: BLE001 - an error of ours must not look like a device that is silent
-                self.ended = LinkLost(f"{self.info.uri}: unexpected {type(error).__name__} ({error}); open it anew")
-                break
-        self.news.set()
 
     def _stream(self) -> None:
         """Stream over one opening of the line until asked to stop. Raises LinkLost when no records come any more."""

@@ -7,9 +7,9 @@ from typing import Any
 
 from drivers import deadline
 from drivers.clock import Clock
-from drivers.deadline import Deadline
+from drivers.deadline import Deadline, Stopped
 from drivers.readings import ReadingBlock
-from drivers.transducer import Health, LinkLost, SetupError, StatusCount, TransducerInfo
+from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, StatusCount, TransducerInfo
 
 _LEAVING = 0.9  # for the thread to end, until it is left alone with a device that holds it [real s]
 
@@ -29,7 +29,7 @@ class ThreadedTransducer(ABC):
         self.stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._last_thread: threading.Thread | None = None  # the thread that was stopped last, which a device may hold
-        self.ended: Exception | None = None  # why the stream ended, when nobody had stopped it
+        self.ended: Exception | None = None  # why the stream ended, where nobody stopped it
         self._ready: list[ReadingBlock] = []
         self._received = 0
         self._statuses = StatusCount(info.status)
@@ -60,7 +60,7 @@ class ThreadedTransducer(ABC):
         patience, self._spent = deadline.CONNECTING - self._spent, 0.0
         waiting, self.begin_by = Deadline(patience), Deadline(patience, self.stopping)
         name = f"{self.info.driver} {self.info.serial}".strip()
-        thread = self._thread = threading.Thread(target=self.run, name=name, daemon=True)
+        thread = self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         try:
             thread.start()
             while not self.has_come() and self.ended is None and thread.is_alive():
@@ -123,9 +123,25 @@ class ThreadedTransducer(ABC):
         """Stop; port and thread are given back. Harmless when repeated."""
         self.stop()
 
+    def _run(self) -> None:
+        """Be the thread, and put down in `ended` why the stream ended, where nobody stopped it."""
+        try:
+            self.run()
+        except Stopped:
+            pass
+        except (LinkLost, SetupError, DeviceFault) as error:
+            self.ended = error if self.info.uri in str(error) else type(error)(f"{self.info.uri}: {error}")
+        except Exception as error:  # noqa: BLE001 - an error of ours must not look like a device that is silent
+            self.ended = LinkLost(f"{self.info.uri}: unexpected {type(error).__name__} ({error}); open it anew")
+        finally:
+            self.news.set()
+
     @abstractmethod
     def run(self) -> None:
-        """Be the thread: bring the device to stream by `begin_by`, and put down in `ended` why the stream ended."""
+        """Bring the device to stream by `begin_by`, and take what comes until `stopping` is set.
+
+        Raises why the stream ended, where nobody stopped it: LinkLost, SetupError, DeviceFault.
+        """
 
     @abstractmethod
     def has_come(self) -> bool:

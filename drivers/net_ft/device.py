@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.clock_recovery import RateWatch, rate_words
-from drivers.deadline import ENDING, Deadline, Link, Stopped
+from drivers.deadline import ENDING, Deadline, Link
 from drivers.net_ft.wire import START, STOP, decode
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
@@ -29,7 +29,7 @@ class _SettingsWatch:
 
     def __init__(self, info: TransducerInfo, who: Callable[[], TransducerInfo | None], clock: Clock) -> None:
         """Watch the box of `info`. `who` returns who answers there now, soon, None when nobody does."""
-        self.fault: DeviceFault | None = None  # what was found
+        self.fault: Exception | None = None  # what was found, or an error of ours
         self.confirmed_ns = clock.now_ns()  # until then the box counted as before [ns, session clock]
         self._info = info
         self._who = who
@@ -84,7 +84,7 @@ class _SettingsWatch:
             self._look.clear()
             try:
                 answered = self.is_the_same()
-            except DeviceFault as fault:
+            except Exception as fault:  # noqa: BLE001 - units that are watched no more must not look confirmed
                 self.fault = fault
                 return
             self._look.wait(_EVERY if answered else _AGAIN)
@@ -185,21 +185,14 @@ class NetFtTransducer(ThreadedTransducer):
         self._unconfirmed: deque[tuple[int, int]] = deque()  # when the last of so many readings came, units unsure [ns]
 
     def run(self) -> None:
-        """Be the receiving thread: ask for the stream, take what comes, ask again when it falls silent, and end it."""
+        """Ask for the stream, take what comes, ask again when it falls silent, and end it."""
+        link = self._connect(self.begin_by)
         try:
-            link = self._connect(self.begin_by)
-            try:
-                self._settings.start()
-                self._listen(link)
-            finally:
-                self._take_leave(Deadline(ENDING).bound(link))
-                self._settings.end()
-        except (LinkLost, SetupError, DeviceFault) as error:
-            self.ended = error
-        except Stopped:
-            pass
+            self._settings.start()
+            self._listen(link)
         finally:
-            self.news.set()
+            self._take_leave(Deadline(ENDING).bound(link))
+            self._settings.end()
 
     def _take_leave(self, link: Link) -> None:
         """Bring the stream to an end, and take what had been sent."""

@@ -88,10 +88,11 @@ def all_readings(transducer, link):
 
 def readings_until_lost(transducer, reason):
     """Read until the link is lost for `reason`, and return how many readings came."""
-    received = 0
+    received, until = 0, time.monotonic() + 60.0
     try:
-        while True:
+        while time.monotonic() < until:
             received += len(transducer.read(1.0))
+        raise AssertionError("it was never lost")
     except LinkLost as error:
         if reason not in str(error):
             raise
@@ -249,6 +250,13 @@ def test_a_link_that_breaks_is_lost_after_all_it_brought_was_read():
     transducer = opened(link)
     transducer.start()
     assert readings_until_lost(transducer, "the cable is out") == 10
+    transducer.close()
+
+
+def test_an_error_of_ours_ends_the_stream_in_a_sentence_and_not_in_silence():
+    transducer = opened(MemoryLink([*line(0, 10), ZeroDivisionError("by zero")]))
+    transducer.start()
+    assert readings_until_lost(transducer, "net-ft://box: unexpected ZeroDivisionError (by zero); open it anew") == 10
     transducer.close()
 
 
