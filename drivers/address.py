@@ -46,6 +46,8 @@ def parse_address(uri: str) -> Address:
     except ValueError:
         raise AddressError(f"{uri} is not a device address; one looks like net-ft://192.168.1.1") from None
     scheme, marker, _ = uri.partition(":")
+    if marker and " " in uri.strip() and uri.isprintable():
+        raise AddressError(f"{uri}: a device address holds no space; write %20 for each, in the name of a file too")
     if not marker or not parts.scheme or any(c.isspace() or not c.isprintable() for c in uri):
         raise AddressError(f"{uri!r} is not a device address; one looks like net-ft://192.168.1.1")
     if port is not None:

@@ -48,7 +48,7 @@ class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.kind not in KINDS:
             raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(KINDS)}")
         if not (0.0 <= self.start < self.stop and 0.0 < self.share <= 1.0 and self.delay > 0.0):
-            raise ValueError(f"fault {self.kind!r} needs 0 <= start < stop, 0 < share <= 1 and a delay above 0")
+            raise ValueError(f"fault {self.kind!r} needs 0 <= from < to, 0 < share <= 1 and a delay above 0")
         if (self.kind == "status") != (0 < self.status < 2**32):
             raise ValueError("fault 'status' needs status, the bits to be set, from 1 to 4294967295; no other has it")
         if self.kind == "slow" and self.share > 0.9:

@@ -43,6 +43,13 @@ def test_what_is_no_address_is_refused_in_a_sentence(uri):
         parse_address(uri)
 
 
+def test_a_space_in_the_name_of_a_file_is_written_as_the_refusal_of_one_says():
+    path = r"C:\Users\Anna Meier\FT1.cal"
+    with pytest.raises(SetupError, match="write %20 for each"):
+        parse_address(f"labjack-u6://?cal={path}")
+    assert parse_address(f"labjack-u6://?cal={path.replace(' ', '%20')}").options["cal"] == path
+
+
 @pytest.mark.parametrize("value", ["0", "65536", "-1", "1.5", "x", "", "٣", "9" * 5000])
 def test_an_option_out_of_range_is_refused_by_name(value):
     with pytest.raises(SetupError, match="rdt"):

@@ -76,7 +76,7 @@ def test_a_script_gives_strokes_in_order_and_faults(script):
         ("repeat = 4\n[[stroke]]\nat = 1\nmu = 0.5", "apart"),
         ("repeat = 10\n[[fault]]\nkind = 'lose'\nfrom = 9\nto = 11", "repeat"),
         ("[[fault]]\nkind = 'explode'\nfrom = 1\nto = 2", "explode"),
-        ("[[fault]]\nkind = 'lose'\nfrom = 2\nto = 1", "start < stop"),
+        ("[[fault]]\nkind = 'lose'\nfrom = 2\nto = 1", "from < to"),
         ("[[fault]]\nkind = 'lose'\nfrom = 1", "to"),
         ("\ufeff\x00", "not TOML"),
     ],
