@@ -217,13 +217,16 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
     """
     protocol = from_toml(protocol_text, Protocol, where)
     check_code("the name of the study's folder", folder.name)
-    if is_study(folder):
-        raise StudyError(f"{folder} is a study already, and its protocol is fixed: enrol without --protocol")
     adaptive = next((block.name for block in protocol.blocks if block.adaptive is not None), None)
     if blinded and adaptive is not None:
         raise StudyError(f"{adaptive} is adaptive and needs to know which stimulus is which: make the study unblinded")
     key = _new_key(protocol) if blinded else None
     folder.mkdir(parents=True, exist_ok=True)
+    try:
+        (folder / STUDY_FILE).touch(exist_ok=False)  # which one of two programs alone can do
+    except FileExistsError:
+        again = f"{folder} is a study already, and its protocol is fixed: enrol without --protocol"
+        raise StudyError(again) from None
     head = {
         "version": str(VERSION),
         "protocol": protocol_text,

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import platform
+import re
 import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
@@ -64,8 +65,8 @@ def without_home(address: str) -> str:
     """
     home = str(Path.home())
     for spelling in (home, quote(home, safe=""), quote(home)):
-        if len(spelling) > 1:
-            address = address.replace(spelling, "~")
+        if len(spelling) > 1:  # and ends there: /home/anna is not below /home/ann
+            address = re.sub(rf"{re.escape(spelling)}(?![\w.-])", "~", address)
     return address
 
 

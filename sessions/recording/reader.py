@@ -52,6 +52,7 @@ class Recording:
     events: tuple[LoggedEvent, ...]
     trials: tuple[TrialRecord, ...]  # every planned trial, in the plan's order
     head: Mapping[str, Any]  # plan and transducer as the file holds them, whatever later versions add to theirs
+    log_is_whole: bool  # no event is damaged or missing
     _log_losses: tuple[str, ...]
 
     @staticmethod
@@ -66,12 +67,13 @@ class Recording:
             if folder.is_file() and (folder.parent / schema.LIVE_FILE).is_file():
                 what = f"give the folder that it lies in, {folder.parent}"
             raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; {what}")
-        losses: list[str] = []
+        damaged: list[str] = []
         with name_failure(RecordingError, f"{path} cannot be read", _copy_of(folder), DATABASE_FAILURES):
-            losses += torn_log(path)
+            torn = tuple(torn_log(path))
             with _connect(path) as connection:
                 head = _head(path, connection)
-                events = _events(connection, losses)
+                events = _events(connection, damaged)
+        losses = [*torn, *damaged]
         losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
@@ -79,12 +81,13 @@ class Recording:
             plan = with_mounted_stimuli(as_type(head["plan"], SessionPlan), _mounted_codes(events))
             info = info_from_dict(head["transducer"]) if head["transducer"] else None
             as_type(head["provenance"], Provenance)
+            simulated = None if head["simulated"] == "no" else head["simulated"]
         except (ValueError, KeyError, TypeError) as error:
             what = f"its head is damaged ({error}); restore it from a copy{_copy_of(folder)}"
             raise RecordingError(f"{path}: {what}") from error
-        simulated = None if head["simulated"] == "no" else head["simulated"]
         trials = trial_records(plan, events)
-        return Recording(folder, plan, info, simulated, head["provenance"], events, trials, head, tuple(losses))
+        provenance, whole = head["provenance"], not damaged
+        return Recording(folder, plan, info, simulated, provenance, events, trials, head, whole, tuple(losses))
 
     @property
     def simulated(self) -> bool:
@@ -191,7 +194,7 @@ class Recording:
         path = self.folder / schema.LIVE_FILE
         try:
             with _connect(path) as connection:
-                (last,) = connection.execute("SELECT max(number) FROM blocks").fetchone()
+                (last,) = connection.execute("SELECT max(rowid) FROM blocks").fetchone()
                 return ReadingBlock.empty() if last is None else _block(connection, last)
         except (ValueError, TypeError, OSError, sqlite3.DatabaseError) as error:
             raise RecordingError(f"{path}: the last block of readings is damaged ({error})") from error
@@ -237,9 +240,7 @@ def _blocks(
         condition = " WHERE received_last_ns >= ?" + ("" if between[1] is None else " AND received_first_ns < ?")
         limits = tuple(limit for limit in between if limit is not None)
     expected = 1
-    for (number,) in connection.execute(
-        "SELECT number FROM blocks" + condition + " ORDER BY number", limits
-    ).fetchall():
+    for (number,) in connection.execute("SELECT rowid FROM blocks" + condition + " ORDER BY rowid", limits).fetchall():
         if between is None and number != expected:
             losses.append(f"blocks {expected} to {number - 1} of the readings are missing")
         expected = number + 1
@@ -254,13 +255,13 @@ def _blocks(
 def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
     """Return one block. Raises ValueError when it is not what was written."""
     names = ", ".join(schema.COLUMNS)
-    sql_columns = "readings, crc32, sequence_first, sequence_last, counter_first, counter_last"
-    row = connection.execute(f"SELECT {sql_columns}, {names} FROM blocks WHERE number=?", (number,)).fetchone()
-    readings, crc, ends, columns = row[0], row[1], list(row[2:6]), row[6:]
+    query = f"SELECT crc32, {names}, {schema.SUMMARY} FROM blocks WHERE rowid=?"
+    crc, *row = connection.execute(query, (number,)).fetchone()
+    columns, stored = tuple(row[: len(schema.COLUMNS)]), tuple(row[len(schema.COLUMNS) :])
     if schema.blobs_crc(columns) != crc:
         raise ValueError("its bytes do not give the CRC-32 stored with them")
     block = schema.block_from_blobs(columns)
-    if len(block) != readings or ends != [column[i] for column in (block.sequence, block.counter) for i in (0, -1)]:
+    if not len(block) or schema.summary(block) != stored:
         raise ValueError("its readings are not those that its row describes")
     return block
 
@@ -268,7 +269,7 @@ def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
 def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     """Return the head's values by name, JSON already read. Raises RecordingError when it is not ours or damaged."""
     rows = connection.execute("SELECT name, value, crc32 FROM head ORDER BY number").fetchall()
-    head: dict[str, Any] = {"simulated": "no", "transducer": None}
+    head: dict[str, Any] = {}
     for name, value, crc in rows:
         try:
             sound = schema.text_crc(value) == crc
@@ -294,7 +295,8 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
     """Return the undamaged events, and name the others in `losses`."""
     events: list[LoggedEvent] = []
     expected = 1
-    rows = connection.execute("SELECT number, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY number")
+    # By its rowid, which is its number also where the table's definition is damaged
+    rows = connection.execute("SELECT rowid, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY rowid")
     for number, *row in rows:
         if number != expected:
             losses.append(f"events {expected} to {number - 1} are missing")

@@ -182,17 +182,16 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
     live = folder / LIVE_FILE
     if not live.with_name(f"{live.name}-wal").exists():
         return
-    number, time_ns, readings = (
-        (last.number, last.time_ns, last.readings) if (last := next(reversed(events), None)) else (0, 0, 0)
-    )
-    torn = [
-        LoggedEvent(number + i, time_ns, "log_torn", None, readings, {"sentence": sentence})
-        for i, sentence in enumerate(torn_log(live), 1)
-    ]
+    time_ns, readings = (last.time_ns, last.readings) if (last := next(reversed(events), None)) else (0, 0)
     try:
         with closing(sqlite3.connect(live, timeout=0.5, isolation_level=None)) as connection:
-            for event in torn:
+            connection.execute("PRAGMA locking_mode=EXCLUSIVE")  # nobody else has the file open from here on
+            connection.execute("BEGIN IMMEDIATE")
+            (number,) = connection.execute("SELECT coalesce(max(rowid), 0) FROM events").fetchone()
+            for i, sentence in enumerate(torn_log(live), 1):
+                event = LoggedEvent(number + i, time_ns, "log_torn", None, readings, {"sentence": sentence})
                 connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
+            connection.execute("COMMIT")
             connection.execute("PRAGMA journal_mode=DELETE")
     except sqlite3.Error as error:
         if error.sqlite_errorcode & 0xFF not in (

@@ -73,6 +73,7 @@ TABLES = (
 # Columns of a ReadingBlock in the order of the blobs, with the type of one number.
 COLUMNS = {"sequence": "<i8", "counter": "<i8", "status": "<i8", "time": "<f8", "received_ns": "<i8", "raw": "<f8"}
 BYTES_A_READING = 11 * 8  # five columns of one number, and the six of `raw`
+SUMMARY = "readings, sequence_first, sequence_last, counter_first, counter_last, received_first_ns, received_last_ns"
 
 
 def text_crc(text: str) -> int:
@@ -103,6 +104,12 @@ def blobs_crc(columns: tuple[bytes, ...]) -> int:
     for column in columns:
         crc = zlib.crc32(column, crc)
     return crc
+
+
+def summary(block: ReadingBlock) -> tuple[int, ...]:
+    """Return the columns `SUMMARY` of a block that holds a reading."""
+    ends = [int(column[i]) for column in (block.sequence, block.counter) for i in (0, -1)]
+    return len(block), *ends, int(block.received_ns.min()), int(block.received_ns.max())
 
 
 def block_from_blobs(columns: tuple[bytes, ...]) -> ReadingBlock:

@@ -93,9 +93,7 @@ class SessionWriter:
                 take_reserve(folder, reserve)
             path.touch(exist_ok=False)
         except OSError as error:
-            release_reserve(folder)
-            with suppress(OSError):  # where something lies in it
-                folder.rmdir()
+            _leave(folder)
             raise RecordingError(
                 f"{folder} cannot hold a recording ({error.strerror}); "
                 f"{remedy(error, new=True)}, or give another folder"
@@ -105,7 +103,9 @@ class SessionWriter:
             _prepare(connection, head, durable=cls.durable)
         except sqlite3.Error as error:
             connection.close()
-            release_reserve(folder)
+            for side in folder.glob(f"{schema.LIVE_FILE}*"):  # nothing is recorded in it
+                side.unlink()
+            _leave(folder)
             raise RecordingError(
                 f"{path} cannot be begun ({error}); {remedy(error)}, or give a folder on a local disk"
             ) from error
@@ -132,9 +132,9 @@ class SessionWriter:
             _make_durable(connection)
             writer = cls(connection, path, clock)
             (writer._block_rows, writer._readings) = connection.execute(
-                "SELECT count(*), coalesce(sum(readings), 0) FROM blocks"
+                "SELECT coalesce(max(rowid), 0), coalesce(sum(readings), 0) FROM blocks"
             ).fetchone()
-            (writer._event_count,) = connection.execute("SELECT count(*) FROM events").fetchone()
+            (writer._event_count,) = connection.execute("SELECT coalesce(max(rowid), 0) FROM events").fetchone()
         except sqlite3.Error as error:
             connection.close()
             release_reserve(folder)
@@ -224,14 +224,16 @@ class SessionWriter:
 
     def close(self) -> None:
         """Commit, fold the write-ahead log into the file and let go of it. Harmless when repeated."""
-        if self._failure is None:
-            self.commit()
-            self._failure = "it was closed"
-            # One plain file that any reader opens without side files; when this fails the log simply stays beside it.
-            with suppress(sqlite3.Error):
-                self._connection.execute("PRAGMA journal_mode=DELETE")
-        self._connection.close()
-        release_reserve(self.folder)
+        try:
+            if self._failure is None:
+                self.commit()
+                self._failure = "it was closed"
+                # One plain file that any reader opens without side files; when this fails the log stays beside it.
+                with suppress(sqlite3.Error):
+                    self._connection.execute("PRAGMA journal_mode=DELETE")
+        finally:
+            self._connection.close()
+            release_reserve(self.folder)
 
     def _write_waiting(self) -> int:
         """Write what waits in one transaction, and return the number of the last row of readings."""
@@ -297,9 +299,7 @@ class SessionWriter:
             block = waiting.between(start, start + LARGEST_BLOCK)
             rows += 1
             columns = schema.blobs(block)
-            ends = [int(column[i]) for column in (block.sequence, block.counter) for i in (0, -1)]
-            received = int(block.received_ns.min()), int(block.received_ns.max())
-            values = (rows, len(block), *ends, *received, *columns, schema.blobs_crc(columns))
+            values = (rows, *schema.summary(block), *columns, schema.blobs_crc(columns))
             self._connection.execute(f"INSERT INTO blocks VALUES ({','.join('?' * len(values))})", values)
         return rows
 
@@ -321,6 +321,13 @@ class FleetingWriter(SessionWriter):
     """Writes an invented session: nothing waits for the disk, so a power cut may lose all of it."""
 
     durable = False
+
+
+def _leave(folder: Path) -> None:
+    """Remove what was made for a recording that cannot be begun."""
+    release_reserve(folder)
+    with suppress(OSError):  # where something lies in it
+        folder.rmdir()
 
 
 def _prepare(connection: sqlite3.Connection, head: Mapping[str, str], *, durable: bool) -> None:

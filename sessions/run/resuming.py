@@ -22,6 +22,7 @@ from sessions.run.steps import Command, Refuse
 CUT_SHORT = "the recording was cut short in the middle of it"
 OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded", "take_restored", "left_out"})
 RESUMABLE = frozenset({"device", "client", "disk"})  # causes of an end that cut a session short
+CLOCKS_AGREE = 1.0  # wall clock and session clock drift apart by less within a session [s]
 LEAST_GAP_NS = 1_000_000  # where the wall clock shows none: the session clock never stands still or runs backwards
 
 
@@ -67,8 +68,7 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
 
 def check_resumable(recording: Recording) -> None:
     """Raise RecordingError unless the session was cut short, its log is whole and its clock can go on."""
-    numbers = [event.number for event in recording.events]
-    if numbers != list(range(1, len(numbers) + 1)):
+    if not recording.log_is_whole:
         raise RecordingError(f"{recording.folder} cannot be resumed: its log is damaged; it can still be analysed")
     end = recording.end
     if end is not None and end.get("cause") not in RESUMABLE:
@@ -147,7 +147,7 @@ def continue_clock(recording: Recording, last: ReadingBlock, clock: Clock, now: 
     # A simulated clock ran faster; while nothing ran, time passed as on the wall.
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
     offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()
-    duration = gap_ns * 1e-9 if elapsed_ns >= 0 else None
+    duration = gap_ns * 1e-9 if gap_ns * 1e-9 > -CLOCKS_AGREE else None
     resumed_utc = now.astimezone(UTC).isoformat(timespec="milliseconds")
     gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, resumed_utc)
     return ContinuedClock(clock, offset_ns), gap

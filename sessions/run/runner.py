@@ -1,6 +1,7 @@
 """Runs a session: carries out the machine's commands with a transducer, a writer and a clock, and feeds events back."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, Protocol
 
@@ -304,18 +305,18 @@ class _Run:
         )
 
     def _end(self, cause: Cause, reason: str) -> SessionEnd:
-        """Stop the stream, keep its last readings, and write the end."""
-        health = self._last_readings()
-        if not isinstance(self._state, Ended):
-            self._state, commands = advance(self._state, Abort(reason))
-            for command in commands:
-                if (line := line_of(command)) is not None:
-                    self.writer.event(*line, commit=False)
-        complete = isinstance(self._state, Ended) and self._state.complete
-        self._report_losses(now=True)
-        end = SessionEnd(reason, cause, complete, self._readings, health)
-        self.writer.event("ended", data=asdict(end))
-        self.writer.close()
+        """Stop the stream, keep its last readings, write the end, and close the writer even where that fails."""
+        with closing(self.writer):
+            health = self._last_readings()
+            if not isinstance(self._state, Ended):
+                self._state, commands = advance(self._state, Abort(reason))
+                for command in commands:
+                    if (line := line_of(command)) is not None:
+                        self.writer.event(*line, commit=False)
+            complete = isinstance(self._state, Ended) and self._state.complete
+            self._report_losses(now=True)
+            end = SessionEnd(reason, cause, complete, self._readings, health)
+            self.writer.event("ended", data=asdict(end))
         return end
 
     def _last_readings(self) -> Health:

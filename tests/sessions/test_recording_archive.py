@@ -3,8 +3,10 @@ import itertools
 import json
 import math
 import shutil
+import sqlite3
 import stat
 import tracemalloc
+from contextlib import closing
 from dataclasses import replace
 
 import h5py
@@ -208,6 +210,21 @@ def test_a_session_that_is_still_written_is_not_sealed(tmp_path):
     assert problems(tmp_path / "s") == ()
 
 
+def test_a_session_whose_commit_is_half_written_when_somebody_seals_it_goes_on_unaltered(tmp_path):
+    writer = begun(tmp_path / "s")
+    writer.event("started")
+    log = tmp_path / "s" / "session.sqlite-wal"
+    page = int.from_bytes(log.read_bytes()[8:12], "big")
+    with log.open("ab") as file:
+        file.write(log.read_bytes()[32 : 32 + 24] + bytes(page // 2))  # half a frame of this run
+    assert any("hold no whole commit" in sentence for sentence in Recording.open(tmp_path / "s").losses)
+    with pytest.raises(RecordingError, match="end the program that still writes"):
+        seal(tmp_path / "s")
+    writer.event("ended")
+    writer.close()
+    assert [event.kind for event in Recording.open(tmp_path / "s").events] == ["started", "ended"]
+
+
 def test_a_copy_that_came_out_different_is_never_called_sealed(tmp_path, monkeypatch):
     folder = ended(tmp_path / "s")
     from sessions.recording import archive
@@ -349,3 +366,20 @@ def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its
     assert losses[1].startswith("the session has no end")
     assert problems(folder) == tuple(losses)
     assert not log.exists()
+
+
+def test_a_torn_log_behind_a_damaged_event_is_sealed_with_both_named(tmp_path):
+    folder = crashed(tmp_path / "crashed", commits=3)
+    log = folder / "session.sqlite-wal"
+    note = "INSERT INTO events VALUES (1, 0, 'note', NULL, 0, '{}', 7)"  # a check sum of nothing
+    with closing(sqlite3.connect(folder / "session.sqlite", isolation_level=None)) as connection:
+        connection.execute(note)
+        whole = log.read_bytes()
+        torn = shutil.copytree(folder, tmp_path / "torn", ignore=shutil.ignore_patterns("*-shm"))
+    page = int.from_bytes(whole[8:12], "big")
+    (torn / log.name).write_bytes(whole + whole[32 : 32 + 24] + bytes(page // 2))
+    seal(torn)
+    recording = Recording.open(torn)
+    assert [(event.number, event.kind) for event in recording.events] == [(2, "log_torn")]
+    assert recording.losses[0] == "event 1 is damaged and left out (CRC-32 differs)"
+    assert "hold no whole commit" in recording.losses[1]

@@ -2,7 +2,6 @@
 
 import os
 import random
-import shutil
 from functools import partial
 from io import BytesIO
 
@@ -113,7 +112,7 @@ def test_a_full_disk_gives_one_sentence_and_all_that_was_acknowledged_can_be_rea
     assert recording.losses[-1].startswith("the session has no end")
 
 
-def test_a_disk_that_is_full_from_the_beginning_is_told_so(tmp_path):
+def test_a_disk_that_is_full_from_the_beginning_is_told_so_and_no_folder_is_left(tmp_path):
     def write(report):
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
         try:
@@ -125,4 +124,4 @@ def test_a_disk_that_is_full_from_the_beginning_is_told_so(tmp_path):
     os.waitpid(process, 0)
     ((sentence,),) = reported(reading)
     assert "cannot be begun" in sentence
-    shutil.rmtree(tmp_path / "s")
+    assert list(tmp_path.iterdir()) == []

@@ -100,9 +100,10 @@ def test_a_missing_block_is_named(tmp_path):
     assert Recording.open(folder).losses == ("blocks 2 to 2 of the readings are missing",)
 
 
-def test_a_row_that_tells_of_other_readings_than_it_holds_is_named(tmp_path):
+@pytest.mark.parametrize("column", ["sequence_last", "counter_first", "received_first_ns", "received_last_ns"])
+def test_a_row_that_tells_of_other_readings_than_it_holds_is_named(tmp_path, column):
     folder = ended(tmp_path / "s")
-    change(folder, "UPDATE blocks SET sequence_last = 7 WHERE number = 3")
+    change(folder, f"UPDATE blocks SET {column} = 7 WHERE number = 3")
     assert "not those that its row describes" in Recording.open(folder).losses[0]
 
 
@@ -113,6 +114,40 @@ def test_a_changed_and_a_missing_event_are_named_and_the_others_read(tmp_path):
     recording = Recording.open(folder)
     assert recording.losses == ("events 1 to 1 are missing", "event 3 is damaged and left out (CRC-32 differs)")
     assert recording.trials[0].score is None
+
+
+def damage_definition(folder, before, after):
+    with closing(sqlite3.connect(folder / "session.sqlite")) as connection:
+        connection.execute("PRAGMA writable_schema=1")
+        connection.execute("UPDATE sqlite_master SET sql = replace(sql, ?, ?)", (before, after))
+        connection.commit()
+
+
+def test_all_is_read_of_tables_whose_definition_no_longer_says_what_numbers_them(tmp_path):
+    folder = ended(tmp_path / "s")
+    events = Recording.open(folder).events
+    damage_definition(folder, "number INTEGER", "number INTEGES")
+    recording = Recording.open(folder)
+    assert (recording.events, recording.losses) == (events, ())
+    assert recording.readings().sequence.tolist() == list(range(300))
+
+
+def test_a_take_whose_readings_a_damaged_definition_hides_is_named(tmp_path):
+    folder = ended(tmp_path / "s")
+    damage_definition(folder, "received_last_ns", "received_lasu_ns")
+    recording = Recording.open(folder)
+    assert len(recording.readings(1)) == 0
+    assert [sentence.split(" and ")[0] for sentence in recording.losses] == [
+        f"block {number} of the readings is damaged" for number in (1, 2, 3)
+    ]
+
+
+@pytest.mark.parametrize("name", ["simulated", "format", "plan", "transducer", "provenance"])
+def test_a_head_that_lacks_a_row_is_refused(tmp_path, name):
+    folder = ended(tmp_path / "s")
+    change(folder, "UPDATE head SET name = 'damaged' WHERE name = ?", (name,))
+    with pytest.raises(RecordingError, match=r"its head is damaged|it holds no format|damaged in its head"):
+        Recording.open(folder)
 
 
 def test_a_changed_plan_is_refused(tmp_path):

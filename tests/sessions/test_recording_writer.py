@@ -17,6 +17,7 @@ from stand_ins import CALIBRATION, INFO, SimulatedClock
 
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording, RecordingError, Setting, provenance
+from sessions.recording.head import without_home
 
 REAL = replace(INFO, simulated=False)
 
@@ -110,6 +111,13 @@ def test_provenance_holds_versions_clock_and_marked_settings_and_no_name_of_pers
     assert told["clock"]["factor"] == 1.0
     assert platform.node() not in told["machine"].values()
     assert getpass.getuser() not in told["machine"].values()
+
+
+def test_the_users_home_is_no_part_of_an_address_and_another_folder_that_begins_alike_stays(monkeypatch):
+    monkeypatch.setattr(Path, "home", lambda: Path("/home/ann"))
+    assert without_home("nidaq://Dev1?cal=/home/ann/a.cal") == "nidaq://Dev1?cal=~/a.cal"
+    assert without_home("nidaq://Dev1?cal=%2Fhome%2Fann%2Fa.cal") == "nidaq://Dev1?cal=~%2Fa.cal"
+    assert without_home("nidaq://Dev1?cal=/home/anna/a.cal") == "nidaq://Dev1?cal=/home/anna/a.cal"
 
 
 # ---- the bytes are those the format page tells

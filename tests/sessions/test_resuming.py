@@ -2,13 +2,14 @@ import dataclasses
 import math
 import os
 import random
-from datetime import UTC, datetime
+from datetime import datetime, timedelta
 from functools import partial
 
 import msgspec
 import pytest
 from hypothesis import given, settings
 from killed_process import forked, kill, lines_of, reported, whole_session
+from recordings import change
 from stand_ins import INFO, SimulatedClock
 from told_session import Session, resume
 from walks import FORCES, steps, walks
@@ -155,6 +156,13 @@ def test_a_session_on_time_that_moves_when_it_is_waited_on_is_refused(tmp_path, 
         check_resumable(Recording.open(tmp_path / "s"))
 
 
+def test_a_session_whose_last_event_is_damaged_is_not_resumed(tmp_path):
+    Session(tmp_path / "s", link_lost_after=1000).run()
+    change(tmp_path / "s", "UPDATE events SET crc32 = 7 WHERE number = (SELECT max(number) FROM events)")
+    with pytest.raises(RecordingError, match="its log is damaged"):
+        check_resumable(Recording.open(tmp_path / "s"))
+
+
 def test_ended_and_sealed_sessions_are_refused(tmp_path):
     recording = Session(tmp_path / "s").run()
     with pytest.raises(RecordingError, match="has ended"):
@@ -187,10 +195,11 @@ def test_a_rate_that_can_only_be_measured_may_be_another_by_a_few_per_cent():
         check_same_transducer(controller, dataclasses.replace(controller, rate=147.0))
 
 
-def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forward(tmp_path):
+@pytest.mark.parametrize("later", [timedelta(days=-9000), timedelta(seconds=1)])  # the session took five seconds
+def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forward(tmp_path, later):
     Session(tmp_path / "s", link_lost_after=1000).run()
     recording = Recording.open(tmp_path / "s")
-    earlier = datetime(2001, 1, 1, tzinfo=UTC)
+    earlier = datetime.fromisoformat(recording.provenance["created_utc"]) + later
     clock, gap = continue_clock(recording, recording.last_block(), SimulatedClock(7), earlier)
     assert gap.duration is None
     assert clock.now_ns() > recording.events[-1].time_ns

@@ -7,7 +7,8 @@ import pytest
 from told_session import Session, once
 
 from drivers.transducer import SetupError
-from sessions.recording import Recording
+from sessions.recording import Recording, RecordingError
+from sessions.recording.archive import seal
 from sessions.run.steps import Abort, AskMount, AskScore, AskStroke, MeasureZero
 
 
@@ -97,3 +98,19 @@ def test_an_interrupted_take_is_kept_as_one_that_does_not_count(tmp_path):
     record = recording.trials[0]
     assert (record.outcome, record.take) == ("open", None)
     assert record.other_takes[0].discarded == "ill"
+
+
+def test_a_session_whose_end_cannot_be_written_lets_go_of_its_file(tmp_path):
+    session = Session(tmp_path / "s")
+    write = session.writer.event
+
+    def full(kind, *arguments, **options):
+        if kind == "ended":
+            raise RecordingError("the disk took no more")
+        return write(kind, *arguments, **options)
+
+    session.writer.event = full
+    with pytest.raises(RecordingError, match="the disk took no more"):
+        session.run()
+    seal(tmp_path / "s")  # refused while anybody has it open
+    assert Recording.open(tmp_path / "s").end is None

@@ -104,6 +104,21 @@ def test_no_two_enrolled_subjects_ever_hold_the_same_place_and_no_place_stays_em
     assert free_slot(list(members.values())) == min(set(range(len(held) + 1)) - set(held))
 
 
+def test_of_two_programs_that_make_one_study_at_once_one_is_refused_and_takes_nothing_away(tmp_path, monkeypatch):
+    new_key = study._new_key
+
+    def another_is_faster(protocol):
+        monkeypatch.setattr(study, "_new_key", new_key)
+        create_study(tmp_path / "study", TEXT, 5, blinded=True)
+        return new_key(protocol)
+
+    monkeypatch.setattr(study, "_new_key", another_is_faster)
+    with pytest.raises(StudyError, match="is a study already"):
+        create_study(tmp_path / "study", TEXT, 7, blinded=True)
+    assert open_study(tmp_path / "study").seed == 5
+    assert study_key(tmp_path / "study") is not None
+
+
 def _enrol_many(folder, first):
     for number in range(first, first + 10):
         enrol(folder, f"P{number}", Body())
