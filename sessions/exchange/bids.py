@@ -173,7 +173,7 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                     folder / f"{stem}.json",
                     {
                         **recording.mark,
-                        "SamplingFrequency": recording.info.rate,
+                        "SamplingFrequency": _sampling_frequency(recording.info.rate, block),
                         "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
                         "PhysioType": "generic",
                         "TaskName": names.task,
@@ -192,6 +192,14 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
     finally:
         if file is not None:
             file.close()
+
+
+def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
+    """Return the rate that the device states [Hz], else that of the readings; None of one reading alone."""
+    if math.isfinite(rate):
+        return rate
+    span = float(block.time[-1] - block.time[0])
+    return (len(block) - 1) / span if span > 0.0 else None
 
 
 def _stretches(recording: Recording) -> Iterator[tuple[ReadingBlock, bool]]:

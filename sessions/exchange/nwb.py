@@ -117,8 +117,10 @@ def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: st
         wrench = calibration.wrench(block.raw, np.zeros(6))
     start = (int(block.received_ns[0]) - first_ns) * 1e-9
     clock: dict[str, Any] = {"timestamps": block.time - block.time[0] + start}
-    if len(set(np.diff(block.time).round(9).tolist())) == 1:  # no gap, and no reading off its place
-        clock = {"starting_time": start, "rate": info.rate}
+    steps = set(np.diff(block.time).round(9).tolist())
+    if len(steps) == 1 and steps != {0.0}:  # no gap, and no reading off its place
+        rate = (len(block) - 1) / float(block.time[-1] - block.time[0])  # which the device may state wrongly, or not
+        clock = {"starting_time": start, "rate": info.rate if math.isclose(rate, info.rate, rel_tol=1e-5) else rate}
     unit = "see comments" if calibration.raw_unit == RAW_WRENCH else calibration.raw_unit
     raw = TimeSeries(
         name="raw",

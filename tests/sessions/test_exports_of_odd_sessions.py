@@ -2,11 +2,13 @@
 
 import gzip
 import importlib
+import json
 import math
 from dataclasses import replace
 
 import pytest
 from recordings import PLAN, TRIAL, begun, ended, readings
+from stand_ins import INFO
 
 from sessions.exchange import FORMATS, ExportSource, export
 from sessions.exchange.exported import import_session, read_export
@@ -32,6 +34,20 @@ def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back
     ):
         made = import_session(read_export(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
         assert made.differences == named
+
+
+def test_a_rate_that_the_device_does_not_state_is_that_of_the_readings_in_bids_and_nwb(tmp_path):
+    writer = begun(tmp_path / "s", info=replace(INFO, rate=math.nan))
+    writer.readings(readings(0, 200))
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    source = ExportSource(Recording.open(tmp_path / "s"), BARE, None)
+    rate = pytest.approx(1.0 / (source.recording.readings().time[1]))
+    (sidecar,) = export(source, "bids", tmp_path / "bids").rglob("*_physio.json")
+    assert json.loads(sidecar.read_text(encoding="utf-8"))["SamplingFrequency"] == rate
+    pynwb = pytest.importorskip("pynwb")
+    with pynwb.NWBHDF5IO(str(next(export(source, "nwb", tmp_path / "nwb").rglob("*.nwb"))), "r") as file:
+        assert file.read().acquisition["raw"].rate == rate
 
 
 @pytest.mark.parametrize("form", ["csv", "bids", "hdf5"])
