@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # multiprocessing takes a while to import, and most verbs sta
 
 BELOW = 5  # on POSIX, nice's steps towards the end of the queue
 BELOW_NORMAL = 0x4000  # on Windows, its name for the same
+MOST_WORKERS = 61  # on Windows, which waits for no more processes at once (Python's ProcessPoolExecutor)
 SAFE_PATH = "PYTHONSAFEPATH"  # a Python that finds this in its environment starts as with -P
 
 
@@ -82,6 +83,7 @@ def process_pool(workers: int) -> "ProcessPoolExecutor":
     """Return a pool of processes that leave Ctrl-C to this one and end with it, however it ends."""
     from concurrent.futures import ProcessPoolExecutor
 
+    workers = min(workers, MOST_WORKERS) if sys.platform == "win32" else workers
     return ProcessPoolExecutor(workers, fresh_processes(), initializer=_attend_parent)
 
 

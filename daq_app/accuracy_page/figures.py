@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -28,41 +28,10 @@ PARTS = (
 )  # of a solve  # fmt: skip
 
 
-def plates(measured: RunResults) -> dict[str, style.Plate]:
-    """Return the figures that there are numbers for, by name."""
-    drawings = (speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate)
-    with style.look():
-        drawn = [make(measured) for make in drawings]
-    return {plate.name: plate for plate in drawn if plate.panels}
-
-
-def _plate(name: str, caption: str, *panels: style.Panel | None) -> style.Plate:
-    return style.Plate(name, caption, tuple(panel for panel in panels if panel is not None))
-
-
 def _panel(
     drawn: style.Sheet, name: str, title: str, header: tuple[str, ...], rows: Sequence[tuple[style.Cell, ...]]
 ) -> style.Panel:
     return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, tuple(rows))
-
-
-def speed_plate(measured: RunResults) -> style.Plate:
-    """Draw time against true error, one curve a way of solving."""
-    rows, truths = measured.of(Speed), [truth for truth in measured.of(Truth) if truth.case in JUDGED]
-    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
-    caption = (
-        f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
-        "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
-        "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
-        "and estimate included: filled by the largest estimate, hollow by the largest true error."
-    )
-    return _plate(
-        "speed",
-        caption,
-        _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
-        _speed_panel(rows, doubt, "next_s", "each further surface"),
-        _guaranteed_panel(measured.of(GuaranteedCost)),
-    )
 
 
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
@@ -70,19 +39,18 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
-        points = [(r.judged_error, getattr(r, time), r) for r in rows if r.kinematics == kinematics]
-        known = [(error, 1e3 * span, r) for error, span, r in points if error is not None and span is not None]
+        timed = [(r.judged_error, getattr(r, time), r) for r in rows if r.kinematics == kinematics]
+        known = [(error, 1e3 * span, r) for error, span, r in timed if error is not None and span is not None]
         if not known:
             continue
-        colour, mark = COLOURS[kinematics], MARKS[kinematics]
-        axes.plot([100 * e for e, _, _ in known], [s for _, s, _ in known], color=colour, linewidth=0.8)
-        for error, span, row in known:
-            words = f"{kinematics} strain: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"
-            face = "white" if error < 3.0 * doubt[row.kinematics] else colour
-            gid = drawn.note(words)
-            axes.plot(100 * error, span, mark, color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
-            table.append((kinematics, row.dofs, error, 1e-3 * span))
-        error, span, row = known[-1]
+        colour = COLOURS[kinematics]
+        points = [
+            (error, span, error < 3.0 * doubt[kinematics], f"{kinematics} strain: {row.dofs} unknowns, ", "")
+            for error, span, row in known
+        ]
+        _curve(drawn, kinematics, points)
+        table += [(kinematics, row.dofs, error, 1e-3 * span) for error, span, row in known]
+        error, span, _ = known[-1]
         axes.annotate(
             f"{kinematics} strain", (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour
         )
@@ -94,24 +62,31 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     return _panel(drawn, f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
 
 
+def _curve(drawn: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
+    """Draw times [ms] against errors [-], with a mark at each, hollow or not, and words around its numbers."""
+    axes, colour = drawn.axes[0], COLOURS[kinematics]
+    axes.plot([100 * error for error, *_ in points], [span for _, span, *_ in points], color=colour, linewidth=0.8)
+    for error, span, hollow, before, behind in points:
+        gid = drawn.note(f"{before}{100 * error:.2g} %, {span:.3g} ms{behind}")
+        face = "white" if hollow else colour
+        axes.plot(100 * error, span, MARKS[kinematics], color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
+
+
 def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
     if not rows:
         return None
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
-        mine = [row for row in rows if row.kinematics == kinematics]
-        colour, mark = COLOURS[kinematics], MARKS[kinematics]
-        sure = [(100 * row.worst_estimate, 1e3 * row.took_s / row.surfaces, row) for row in mine]
-        true = [(100 * row.worst_error, 1e3 * row.took_s / row.surfaces, row) for row in mine if row.worst_error]
-        for points, face, words in ((sure, colour, "guaranteed"), (true, "white", "true")):
-            axes.plot([x for x, _, _ in points], [y for _, y, _ in points], color=colour, linewidth=0.8)
-            for error, span, row in points:
-                gid = drawn.note(
-                    f"{row.surfaces} surfaces, {row.dofs} unknowns: {words} {error:.2g} %, {span:.3g} ms each"
-                )
-                axes.plot(error, span, mark, color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
-        axes.plot([], [], mark, color=colour, markersize=4, label=f"{kinematics} strain")
+        for error_of, words in (("worst_estimate", "guaranteed"), ("worst_error", "true")):
+            points = [
+                (error, 1e3 * r.took_s / r.surfaces, words == "true",
+                 f"{r.surfaces} surfaces, {r.dofs} unknowns: {words} ", " each")
+                for r in rows
+                if r.kinematics == kinematics and (error := getattr(r, error_of))
+            ]  # fmt: skip
+            _curve(drawn, kinematics, points)
+        axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper right")
     title = "surfaces solved to a tolerance"
@@ -128,27 +103,7 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
     return _panel(drawn, "speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
 
 
-def benchmark_plate(measured: RunResults) -> style.Plate:
-    """Draw time against true error on the published problems."""
-    caption = (
-        "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
-        "half-plane under a round body, and the finger at its ending. The table of orders names every point."
-    )
-    title = "Time against true error on published problems"
-    return _plate("benchmarks", caption, _order_panel(measured.of(Order), "benchmarks", title, timed=True))
-
-
-def order_plate(measured: RunResults) -> style.Plate:
-    """Draw errors against element size."""
-    caption = (
-        "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
-        "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size."
-    )
-    title = "Error against element size"
-    return _plate("orders", caption, _order_panel(measured.of(Order), "orders", title, timed=False))
-
-
-def _order_panel(rows: Sequence[Order], name: str, title: str, *, timed: bool) -> style.Panel | None:
+def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel | None:
     if not rows:
         return None
     drawn = style.sheet(*WIDE)
@@ -175,14 +130,12 @@ def _order_panel(rows: Sequence[Order], name: str, title: str, *, timed: bool) -
         axes.plot([], [], "--", color=style.GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     _logarithmic(axes)
-    labels = (
-        ("error [–]", "time of a solve [s]")
-        if timed
-        else ("element size, by the unit of each problem [–]", "error [–]")
-    )
-    axes.set(xlabel=labels[0], ylabel=labels[1])
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
-    return _panel(drawn, name, title, header, table)
+    if timed:
+        axes.set(xlabel="error [–]", ylabel="time of a solve [s]")
+        return _panel(drawn, "benchmarks", "Time against true error on published problems", header, table)
+    axes.set(xlabel="element size, by the unit of each problem [–]", ylabel="error [–]")
+    return _panel(drawn, "orders", "Error against element size", header, table)
 
 
 def _mark(problem: str) -> str:
@@ -191,20 +144,8 @@ def _mark(problem: str) -> str:
     return marks.get(problem.split(",")[0], "x")
 
 
-def estimate_plate(measured: RunResults) -> style.Plate:
-    """Draw estimates against true errors, a panel a number."""
-    rows = measured.of(Estimate)
-    caption = (
-        "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
-        "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
-        "the truth is too doubtful to tell."
-    )
-    panels = (_estimate_panel([row for row in rows if row.number == number], number) for number in NUMBERS)
-    return _plate("estimates", caption, *panels)
-
-
-def _estimate_panel(rows: Sequence[Estimate], number: str) -> style.Panel | None:
-    if not rows:
+def _estimate_panel(every: Sequence[Estimate], number: str) -> style.Panel | None:
+    if not (rows := [row for row in every if row.number == number]):
         return None
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
@@ -229,12 +170,6 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> style.Panel | None
     table = [(r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows]
     name = "estimate-" + number.split()[0].lower()
     return _panel(drawn, name, f"Estimated against true error of the {number}", header, table)
-
-
-def cost_plate(measured: RunResults) -> style.Plate:
-    """Draw where the time of one solve goes."""
-    caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
-    return _plate("costs", caption, _cost_panel(measured.of(Cost)))
 
 
 def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
@@ -264,15 +199,6 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
     return _panel(drawn, "costs", "Where the time of a solve goes", header, table)
 
 
-def growth_plate(measured: RunResults) -> style.Plate:
-    """Draw the time of one linear system against its unknowns."""
-    caption = (
-        "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
-        f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5."
-    )
-    return _plate("growth", caption, _growth_panel(measured.of(Growth)))
-
-
 def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
     if not rows:
         return None
@@ -295,6 +221,69 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
     table = [(r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows]
     return _panel(drawn, "growth", "Growth of the time with the unknowns", header, table)
+
+
+def _speed_panels(measured: RunResults) -> tuple[style.Panel | None, ...]:
+    rows, truths = measured.of(Speed), [truth for truth in measured.of(Truth) if truth.case in JUDGED]
+    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
+    return (
+        _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
+        _speed_panel(rows, doubt, "next_s", "each further surface"),
+        _guaranteed_panel(measured.of(GuaranteedCost)),
+    )
+
+
+# Name, caption, and what draws the panels.
+PLATES: tuple[tuple[str, str, Callable[[RunResults], Iterable[style.Panel | None]]], ...] = (
+    (
+        "speed",
+        f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
+        "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
+        "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
+        "and estimate included: filled by the largest estimate, hollow by the largest true error.",
+        _speed_panels,
+    ),
+    (
+        "benchmarks",
+        "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
+        "half-plane under a round body, and the finger at its ending. The table of orders names every point.",
+        lambda measured: [_order_panel(measured.of(Order), timed=True)],
+    ),
+    (
+        "estimates",
+        "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
+        "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
+        "the truth is too doubtful to tell.",
+        lambda measured: [_estimate_panel(measured.of(Estimate), name) for name in NUMBERS],
+    ),
+    (
+        "orders",
+        "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
+        "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size.",
+        lambda measured: [_order_panel(measured.of(Order), timed=False)],
+    ),
+    (
+        "costs",
+        "Where the time of one solve through the front door goes, mesh and error estimate included.",
+        lambda measured: [_cost_panel(measured.of(Cost))],
+    ),
+    (
+        "growth",
+        "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
+        f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5.",
+        lambda measured: [_growth_panel(measured.of(Growth))],
+    ),
+)
+
+
+def plates(measured: RunResults) -> dict[str, style.Plate]:
+    """Return the figures that there are numbers for, by name."""
+    with style.look():
+        drawn = {
+            name: style.Plate(name, caption, tuple(panel for panel in draw(measured) if panel is not None))
+            for name, caption, draw in PLATES
+        }
+    return {name: plate for name, plate in drawn.items() if plate.panels}
 
 
 def _logarithmic(axes: Axes) -> None:

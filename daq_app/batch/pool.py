@@ -9,13 +9,13 @@ import multiprocessing
 import os
 import tempfile
 import time
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from daq_app.child_process import process_pool
 from daq_app.console import Console
@@ -36,7 +36,16 @@ NUMBERS_BY = ("daq-app", "numpy", "scipy", "numba")  # whose other versions may 
 # All that a visit's numbers come from.
 CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)
 
-Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
+A = TypeVar("A")
+Jobs = Mapping[str, tuple[Any, ...]]  # arguments of each piece of work, by its name
+Answer = dict[str, Any] | str  # what a session brings, or why it brings nothing
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """A job was not done."""
+
+    why: str
 
 
 def content_of(session: Path) -> dict[str, bytes]:
@@ -48,10 +57,15 @@ def content_of(session: Path) -> dict[str, bytes]:
 def compute_visit(folder: Path, options: VisitOptions) -> Answer:
     """Return what the session in a folder brings; for a worker: nothing is raised."""
     try:
-        return folder.name, asdict(visit_of(Recording.open(folder), options, software_versions()))
+        return asdict(visit_of(Recording.open(folder), options, software_versions()))
     except Exception as error:  # noqa: BLE001  one bad session must not stop the rest
         sentence = " ".join(str(error).split()) or type(error).__name__
-        return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed
+        return sentence.replace(str(folder), folder.name)  # the same wherever it was computed
+
+
+def _contents(folder: Path, options: VisitOptions) -> tuple[Any, ...]:
+    """Return the arguments of `compute_sent_visit` for a session on this disk. Raises RecordingError."""
+    return folder.name, content_of(folder), options
 
 
 def compute_sent_visit(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
@@ -90,17 +104,18 @@ def cluster_client(address: str) -> Generator[Any]:
             client.close()
 
 
-def by_cluster(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:
-    """Yield answers as they come, from the workers of a cluster. Raises SchedulerError."""
+def by_cluster(
+    work: Callable[..., A],
+    jobs: Jobs,
+    address: str,
+    prepare: Callable[..., tuple[Any, ...]] = lambda *arguments: arguments,
+) -> Generator[tuple[str, A | Lost]]:
+    """Yield each job's name and what `work` makes of it, as it comes from the workers of a cluster.
+
+    `prepare` turns a job's arguments into those that are sent, when its turn comes. Raises SchedulerError.
+    """
     with cluster_client(address) as client:
-        answers = importlib.import_module("distributed").as_completed(loop=client.loop)
-        yield from _by_client(client, answers, folders, options, address)
-
-
-def refuse_other_versions(answer: Answer, address: str) -> None:
-    """Raise SchedulerError for what was computed by other versions: one study holds the numbers of one program."""
-    if not isinstance(answer[1], str):
-        _refuse_unlike(answer[1]["made_by"], address, "a worker")
+        yield from _by_client(client, work, jobs, prepare, address)
 
 
 def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> None:  # noqa: ANN401
@@ -116,10 +131,11 @@ def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> N
                 "is here, and run this again: what is done is kept"
             )
         if isinstance(versions, dict):
-            _refuse_unlike(cast("dict[str, str]", versions), address, f"the worker {worker}")
+            refuse_unlike(cast("dict[str, str]", versions), address, f"the worker {worker}")
 
 
-def _refuse_unlike(there: Mapping[str, Any], address: str, who: str) -> None:
+def refuse_unlike(there: Mapping[str, Any], address: str, who: str) -> None:
+    """Raise SchedulerError for what was computed by other versions: one study holds the numbers of one program."""
     here = software_versions()
     differ = [name for name in NUMBERS_BY if there.get(name) != here.get(name)]
     if differ:
@@ -145,15 +161,15 @@ async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: 
 
 def _by_client(
     client: Any,  # noqa: ANN401
-    answers: Any,  # noqa: ANN401
-    folders: Sequence[Path],
-    options: VisitOptions,
+    work: Callable[..., A],
+    jobs: Jobs,
+    prepare: Callable[..., tuple[Any, ...]],
     address: str,
-) -> Iterator[Answer]:
-    """Yield answers as they come to a client of the cluster."""
-    names: dict[Any, str] = {}
-    waiting = list(reversed(folders))
-    under_way: dict[str, Any] = {}
+) -> Generator[tuple[str, A | Lost]]:
+    """Yield names and answers as they come to a client of the cluster."""
+    answers: Any = importlib.import_module("distributed").as_completed(loop=client.loop)
+    waiting = list(jobs)[::-1]
+    under_way: dict[Any, tuple[str, Any]] = {}  # by the key of the cluster
     checked = set[str]()  # workers whose versions are ours
     seen = time.monotonic()  # when a worker was last there
     try:
@@ -172,14 +188,14 @@ def _by_client(
                 )
             # Files are read and sent as workers come free: never those of a thousand sessions at once.
             while waiting and threads and len(under_way) < 2 * threads:
-                folder = waiting.pop()
+                name = waiting.pop()
                 try:
-                    content = content_of(folder)
+                    arguments = prepare(*jobs[name])
                 except RecordingError as error:
-                    yield folder.name, str(error)
+                    yield name, Lost(str(error))
                     continue
-                future = client.submit(compute_sent_visit, folder.name, content, options, pure=False, retries=1)
-                names[future.key], under_way[future.key] = folder.name, future
+                future = client.submit(work, *arguments, pure=False, retries=1)
+                under_way[future.key] = name, future
                 answers.add(future)
             if not answers.has_ready():
                 time.sleep(LOOK)
@@ -187,16 +203,12 @@ def _by_client(
             future = next(answers)
             if future.cancelled():  # nobody cancels but a client that has lost its scheduler
                 raise ConnectionError("the connection was lost")
-            del under_way[future.key]
-            if future.status == "finished":
-                answer: Answer = future.result()
-                refuse_other_versions(answer, address)
-                yield answer
-            else:
-                yield names[future.key], f"no worker could compute it ({future.exception()})"
+            name, _ = under_way.pop(future.key)
+            done = future.status == "finished"
+            yield name, future.result() if done else Lost(f"no worker could compute it ({future.exception()})")
     finally:
         with suppress(OSError, TimeoutError):  # the scheduler may be gone
-            client.cancel(list(under_way.values()))
+            client.cancel([future for _, future in under_way.values()])
 
 
 KILLED = 0.1  # that a killed process may take to end [s]
@@ -260,14 +272,8 @@ def visits(
     What is on the shelf already is not computed again; what is done stays there whatever comes. Raises SchedulerError,
     RecordingError where the shelf cannot be written.
     """
-    keys: dict[Path, str] = {}
-    failed: list[tuple[str, str]] = []
-    for folder in folders:
-        try:
-            keys[folder] = shelf.key(folder)
-        except RecordingError as error:
-            failed.append((folder.name, str(error)))
-            console.note(f"{folder.name}: {error}")
+    keys, failed = _keys(folders, shelf)
+    console.note(*(f"{name}: {why}" for name, why in failed))
     kept = {folder: shelf.load(key) for folder, key in keys.items()}
     done = [visit for visit in kept.values() if visit is not None]
     missing = [folder for folder, visit in kept.items() if visit is None]
@@ -280,14 +286,21 @@ def visits(
     start = time.monotonic()
     if missing:
         console.progress(0.0, f"0 of {len(missing)} sessions")
-    here = scheduler is None or not missing
-    answers = _local(missing, options, workers) if here else by_cluster(missing, options, scheduler or "")
+    jobs = {folder.name: (folder, options) for folder in missing}
+    address = scheduler if missing else None  # it is not asked for nothing
+    answers = (
+        by_processes(compute_visit, jobs, workers)
+        if address is None
+        else by_cluster(compute_sent_visit, jobs, address, _contents)
+    )
     try:
         for count, (name, answer) in enumerate(answers, 1):
-            if isinstance(answer, str):
-                failed.append((name, answer))
-                console.note(f"{name}: {answer}")
+            if isinstance(answer, str | Lost):
+                failed.append((name, answer if isinstance(answer, str) else answer.why))
+                console.note(": ".join(failed[-1]))
             else:
+                if address is not None:
+                    refuse_unlike(answer["made_by"], address, "a worker")
                 shelf.keep(named[name], answer)
                 done.append(as_type(answer, Visit))
             left = (time.monotonic() - start) / count * (len(missing) - count)
@@ -299,41 +312,44 @@ def visits(
     return done, failed
 
 
-def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) -> Iterator[Answer]:
-    """Yield answers as they come, from processes of this computer."""
-    if not folders:
-        return
-    left = {folder.name: folder for folder in folders}
-    try:
-        for answer in _in_pool(list(left.values()), options, workers):
-            del left[answer[0]]
-            yield answer
-    except BrokenProcessPool:  # a worker died, and nobody knows over which session: each gets a worker of its own
-        for folder in list(left.values()):
-            try:
-                yield from _in_pool([folder], options, 1)
-            except BrokenProcessPool:
-                yield folder.name, "the process that computed it died, perhaps for want of memory"
+def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[tuple[str, str]]]:
+    """Return the key of each session, and the name of and the reason for each that cannot be read."""
+    keys: dict[Path, str] = {}
+    failed: list[tuple[str, str]] = []
+    for folder in folders:
+        try:
+            keys[folder] = shelf.key(folder)
+        except RecordingError as error:
+            failed.append((folder.name, str(error)))
+    return keys, failed
 
 
-def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int | None) -> Iterator[Answer]:
-    with local_pool(len(folders), workers) as pool:
-        waiting: set[Future[Answer]] = {pool.submit(compute_visit, folder, options) for folder in folders}
-        while waiting:
-            ready, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
-            for future in ready:
-                yield future.result()
+def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A | Lost]]:
+    """Yield each job's name and what `work` makes of it, as it comes from processes of this computer.
 
-
-@contextmanager
-def local_pool(work: int, workers: int | None = None) -> Generator[ProcessPoolExecutor]:
-    """Give a pool for so many pieces of work: `workers` processes, or as many as there are cores.
-
-    At the end the work is waited for. Where an exception leaves, as on Ctrl-C, the processes are killed.
+    There are `workers` processes, or as many as there are cores.
     """
-    pool = process_pool(workers or min(os.cpu_count() or 1, work))
+    left = dict(jobs)
     try:
-        yield pool
+        for name, answer in _in_pool(work, dict(left), workers):
+            del left[name]
+            yield name, answer
+    except BrokenProcessPool:  # a worker died, and nobody knows over which job: each gets a worker of its own
+        for name, arguments in left.items():
+            try:
+                yield from _in_pool(work, {name: arguments}, 1)
+            except BrokenProcessPool:
+                yield name, Lost("the process that computed it died, perhaps for want of memory")
+
+
+def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A]]:
+    """Yield names and answers. Where an exception leaves, as on Ctrl-C, the processes are killed."""
+    pool = process_pool(workers or min(os.cpu_count() or 1, max(len(jobs), 1)))
+    try:
+        waiting = {pool.submit(work, *arguments): name for name, arguments in jobs.items()}
+        while waiting:
+            for future in wait(waiting, LOOK, FIRST_COMPLETED).done:
+                yield waiting.pop(future), future.result()
         pool.shutdown()
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)

@@ -8,9 +8,8 @@ import errno
 import hashlib
 import json
 import math
-from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing, nullcontext, suppress
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,8 +18,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.batch.pool import cluster_client, local_pool, refuse_other_workers
-from daq_app.batch.sensitivity import Index, sobol_indices
+from daq_app.batch.pool import Lost, by_cluster, by_processes
+from daq_app.batch.sensitivity import Index, TooFewAnswers, sobol_indices
 from sessions.file_access import json_object
 from sessions.prediction.surface_series import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions
@@ -167,7 +166,8 @@ def answers_of(
 ) -> list[Answer | str]:
     """Return the answer of each finger, from processes of this computer or a Dask cluster.
 
-    With `keep` what is done is written there, and not computed again by the next run. Raises SchedulerError, OSError.
+    With `keep` what is done is written there, and not computed again by the next run. Raises SchedulerError, OSError,
+    and TooFewAnswers where a finger was not computed.
     """
     versions = software_versions()
     keys = [trial.key(versions) for trial in trials]
@@ -175,14 +175,17 @@ def answers_of(
     missing = [number for number, key in enumerate(keys) if key not in known]
     done = len(trials) - len(missing)
     if missing:
+        jobs = {keys[number]: (trials[number],) for number in missing}
+        far = scheduler is not None
+        answers = by_cluster(finger_answer, jobs, scheduler) if far else by_processes(finger_answer, jobs, workers)
         log = nullcontext() if keep is None else keep.open("a", encoding="utf-8", buffering=1)
-        with log as file, _executor(scheduler, len(missing), workers) as pool:
-            waiting = {pool.submit(finger_answer, trials[number]): keys[number] for number in missing}
-            for future in as_completed(waiting):
-                key = waiting[future]
-                known[key] = future.result()
+        with log as file, closing(answers):
+            for key, answer in answers:
+                if isinstance(answer, Lost):
+                    raise TooFewAnswers(f"a finger has no answer: {answer.why}; run this again, with --keep from there")
+                known[key] = answer
                 if file is not None:
-                    file.write("\n" + json.dumps({"key": key, "answer": known[key]}))
+                    file.write("\n" + json.dumps({"key": key, "answer": answer}))
                 done += 1
                 progress(done / len(trials))
     return [known[key] for key in keys]
@@ -199,18 +202,6 @@ def _load_answers(keep: Path | None) -> dict[str, Any]:
             one = json_object(line)
             answers[one["key"]] = one["answer"]
     return answers
-
-
-@contextmanager
-def _executor(scheduler: str | None, work: int, workers: int | None) -> Generator[Executor]:
-    """Give what runs the work: processes of this computer, or the workers of a cluster. Raises SchedulerError."""
-    if scheduler is None:
-        with local_pool(work, workers) as pool:
-            yield pool
-        return
-    with cluster_client(scheduler) as client:
-        refuse_other_workers(client, list(client.nthreads()), scheduler)
-        yield client.get_executor(pure=False)
 
 
 def kept_signs(answers: Sequence[Answer | str], as_published: Answer) -> Array:

@@ -11,7 +11,7 @@ import pytest
 
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.state import Problem
-from daq_app.batch.pool import _in_pool
+from daq_app.batch.pool import by_processes, compute_visit
 from daq_app.child_process import interpreter
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, Failed, Gone
@@ -103,9 +103,8 @@ def test_the_analysts_work_runs_nothing_that_lies_in_the_current_folder(tmp_path
 @pytest.mark.slow
 @pytest.mark.usefixtures("malicious")
 def test_the_pool_of_a_study_runs_nothing_that_lies_in_the_current_folder(tmp_path):
-    (answer,) = _in_pool([tmp_path / "none"], VisitOptions(), 1)
-    assert answer[0] == "none"
-    assert "holds no recording" in answer[1]
+    ((_, answer),) = by_processes(compute_visit, {"none": (tmp_path / "none", VisitOptions())}, 1)
+    assert "holds no recording" in answer
 
 
 @pytest.mark.slow

@@ -1,12 +1,15 @@
 """Fingers that keep the published signs: counted right, kept as they come, and never asked twice."""
 
 import json
+import os
+import signal
 
 import numpy as np
 import pytest
 
 from daq_app.batch import pool, sign_map
-from daq_app.batch.sensitivity import saltelli_points
+from daq_app.batch.sensitivity import TooFewAnswers, saltelli_points
+from daq_app.child_process import process_pool
 from daq_app.cli.main import run
 
 
@@ -60,7 +63,7 @@ def test_what_is_kept_is_not_computed_again_and_a_line_cut_short_is(tmp_path, mo
     assert parts[-1] == 1.0
     lines = keep.read_text().strip().splitlines()
     assert len(lines) == 3
-    monkeypatch.setattr(sign_map, "_executor", lambda *_: pytest.fail("all was kept"))
+    monkeypatch.setattr(sign_map, "by_processes", lambda *_: pytest.fail("all was kept"))
     assert sign_map.answers_of(trials, parts.append, keep=keep) == first
     monkeypatch.undo()
     keep.write_text("\n".join([*lines[:2], lines[2][:40]]))  # as a crash leaves it
@@ -112,3 +115,30 @@ def test_an_address_without_a_scheduler_is_a_sentence(monkeypatch):
         sign_map.answers_of(
             list(sign_map.single_changes("small").values())[:1], lambda _: None, scheduler="tcp://127.0.0.1:9"
         )
+
+
+def test_a_cluster_without_workers_is_given_up_in_a_sentence(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(pool, "WITHOUT_WORKERS", 0.5)
+    trials = list(sign_map.single_changes("small").values())[:1]
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster,
+        pytest.raises(pool.SchedulerError, match="has had no worker"),
+    ):
+        sign_map.answers_of(trials, lambda _: None, scheduler=cluster.scheduler_address)
+
+
+def _dies(_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills a process")
+def test_a_process_that_dies_over_a_finger_ends_in_a_sentence(monkeypatch):
+    monkeypatch.setattr(sign_map, "finger_answer", _dies)
+    with pytest.raises(TooFewAnswers, match="died, perhaps for want of memory"):
+        sign_map.answers_of(list(sign_map.single_changes("small").values())[:1], lambda _: None, workers=1)
+
+
+def test_windows_is_not_asked_for_more_processes_than_it_can_wait_for(monkeypatch):
+    monkeypatch.setattr("sys.platform", "win32")
+    process_pool(1024).shutdown()

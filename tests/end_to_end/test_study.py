@@ -150,17 +150,17 @@ def test_another_recording_or_other_options_are_another_key(study):
 
 
 def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):
-    name, sent = compute_sent_visit("S01", content_of(study / "S01"), STEADY)
+    sent = compute_sent_visit("S01", content_of(study / "S01"), STEADY)
     stored = next(visit for visit in pool["visits"] if visit["session"] == "S01")  # from the disk, by another process
-    assert (name, json.loads(json.dumps(sent))) == ("S01", stored)
+    assert json.loads(json.dumps(sent)) == stored
 
 
 def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeypatch):
-    def dying(folders, *_):
-        for folder in folders:
-            if folder.name == "S02":
+    def dying(_work, jobs, _workers):
+        for name, arguments in jobs.items():
+            if name == "S02":
                 raise pooling.BrokenProcessPool
-            yield compute_visit(folder, QUICK)
+            yield name, compute_visit(*arguments)
 
     monkeypatch.setattr(pooling, "_in_pool", dying)
     done, failed = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
@@ -232,7 +232,7 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
             Console(as_json=True),
             scheduler=workers.scheduler_address,
         )
-    here = [msgspec.convert(compute_visit(study / name, STEADY)[1], Visit) for name in ("S01", "S02")]
+    here = [msgspec.convert(compute_visit(study / name, STEADY), Visit) for name in ("S01", "S02")]
     assert sorted(far, key=lambda visit: visit.session) == here
 
 
@@ -335,10 +335,9 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(study, tmp_path
 
 def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in():
     here = software_versions()
-    pooling.refuse_other_versions(("S01", {"made_by": here | {"blas": "that of another processor"}}), "tcp://host:1")
-    pooling.refuse_other_versions(("S01", "it is damaged"), "tcp://host:1")
+    pooling.refuse_unlike(here | {"blas": "that of another processor"}, "tcp://host:1", "a worker")
     with pytest.raises(pooling.SchedulerError, match=r"daq-app 0\.0\.9 \(here .*versions that are here"):
-        pooling.refuse_other_versions(("S01", {"made_by": here | {"daq-app": "0.0.9"}}), "tcp://host:1")
+        pooling.refuse_unlike(here | {"daq-app": "0.0.9"}, "tcp://host:1", "a worker")
 
 
 @pytest.mark.usefixtures("pool")
