@@ -132,7 +132,7 @@ def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
     if stroke.onset is None and trace is None:
         return ()
     begin = stroke.onset if stroke.onset is not None else 0.0 if trace is None else trace.origin
-    end = stroke.lift if stroke.lift is not None else begin + (trace.time[-1] if trace and trace.time else 0.0)
+    end = stroke.lift if stroke.lift is not None else begin + (0.0 if trace is None else float(trace.time[-1]))
     steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
     times = dict(zip(EDGES, (begin, *steady, end), strict=True))
     there = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}

@@ -6,8 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import NAMES, compare_reports, film_words, name_and_errors
 from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Parts
@@ -33,7 +31,6 @@ from solver.arrays import Array
 from solver.equilibrium.load_path import Instant as Step
 from solver.mesh import Mesh
 from solver.prediction import ROW, Skin
-from solver.quantities import SED
 from solver.response.fields import Fields, Sketch, Still, fields_of, place_of_least_stretch, stills, way_until
 
 if TYPE_CHECKING:
@@ -367,24 +364,8 @@ def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
 def field_at(experiment: str, index: int, film: Film, at: int) -> Field:
     """Return one state of a film as the figures of a report draw it."""
     frame = film.frames[at]
-    contact = frame.contact
-    return Field(
-        experiment=experiment,
-        index=index,
-        nodes=_pairs(frame.nodes),
-        triangles=tuple((int(a), int(b), int(c)) for a, b, c in film.parts.triangles),
-        sed=tuple(frame.values[SED.name].tolist()),
-        outlines={name: _pairs(line) for name, line in frame.outlines.items()},
-        patch=_pairs(frame.patch),
-        contact=_pairs(np.column_stack([contact.x, contact.gap])),
-        pressure=tuple(contact.pressure.tolist()),
-        traction=tuple(contact.traction.tolist()),
-        state=contact.state,
-    )
-
-
-def _pairs(points: Array) -> tuple[tuple[float, float], ...]:
-    return tuple((float(x), float(y)) for x, y in points)
+    drawn = Fields(frame.nodes, film.parts.triangles, frame.values, frame.outlines, frame.patch)
+    return Field(experiment, index, drawn, frame.contact)
 
 
 def _frame(drawn: Fields, skin: Skin, row: Array) -> Frame:

@@ -146,9 +146,8 @@ class StrokeView(QWidget):
         self._origin = 0.0 if trace is None else trace.origin
         word = tr("no stroke") if stroke is None else tr("stroke {number}", number=stroke.number)
         self.setAccessibleName(tr("forces and friction of {word}", word=word))
-        values = ((), (), ()) if trace is None else (trace.normal, trace.tangential, trace.mu)
-        self._time = np.array(() if trace is None else trace.time, np.float64)
-        self._columns = [np.array([np.nan if v is None else v for v in column], np.float64) for column in values]
+        self._time = np.empty(0) if trace is None else trace.time
+        self._columns = [self._time] * 3 if trace is None else [trace.normal, trace.tangential, trace.mu]
         for plot in self._plots:
             plot.show_numbers(shown=len(self._time) > 0)
         self._plots[1].setLabel("bottom", tr("time since contact [s]") if len(self._time) else word)

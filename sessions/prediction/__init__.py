@@ -7,15 +7,18 @@ from sessions.prediction.options import BY_NAME, PredictionOptions, finger_in, s
 from sessions.prediction.scenes import Progress, part_of, predict
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from solver import Friction, Prediction, Scene
-from solver.prediction import Response
+from solver.prediction import History, Response, Skin
 from solver.quantities import QUANTITIES, SED, Quantity
+from solver.response.fields import Fields
 from solver.response.nearby import Nearby
 
 __all__ = [
     "BY_NAME",
     "QUANTITIES",
     "SED",
+    "Fields",
     "Friction",
+    "History",
     "Nearby",
     "Prediction",
     "PredictionOptions",
@@ -24,6 +27,7 @@ __all__ = [
     "Response",
     "Scene",
     "SessionPrediction",
+    "Skin",
     "TrialPrediction",
     "finger_in",
     "part_of",

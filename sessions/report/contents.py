@@ -1,10 +1,13 @@
-"""What a report holds: plain data, ready for any export. Null numbers carry their reason."""
+"""What a report holds, ready for any export. Numbers that are missing carry their reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from sessions.prediction import Response
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction import Fields, History, Response, Skin
 from sessions.prediction.stored import Ends, TrialNumbers
 from sessions.statistics.correlations import Relation
 from sessions.statistics.multiverse import PathFinding
@@ -16,6 +19,7 @@ from sessions.strokes import Stroke
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 
 
@@ -66,17 +70,16 @@ class Experiment:
     response: str = "sed"  # the quantity at the ending whose relations these are, one of `solver.quantities`
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """The forces of one stroke; m instants. mu is None where too little normal force makes it meaningless."""
+    """The course of one stroke at m instants. Ratio and speed are nan where they mean nothing."""
 
     origin: float  # contact onset, or the recording's beginning where it begins in contact [s, device time]
-    time: Numbers  # since `origin` [s]
-    normal: Numbers  # [N]
-    tangential: Numbers  # [N]
-    mu: tuple[float | None, ...]  # [-]
-    speed: tuple[float | None, ...]  # of the centre of pressure, along the stroke [mm/s]
-    every: int  # one reading in so many is kept
+    time: Array  # (m,) since `origin` [s]
+    normal: Array  # (m,) [N]
+    tangential: Array  # (m,) [N]
+    mu: Array  # (m,) T/N [-]
+    speed: Array  # (m,) of the centre of pressure, along the stroke [mm/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,14 +95,6 @@ class StrokeFinding(Stroke):
     direction_agrees: float | None = None  # share of the bootstrap's repeats with that direction [-]
 
 
-@dataclass(frozen=True, slots=True)
-class History:
-    """Response of the ending in the course of one predicted stroke."""
-
-    time: Numbers  # [s], pressing from 0 to 1, then sliding
-    sed: Numbers  # [MPa]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictionFinding(TrialNumbers):
     """The prediction of a trial in a report: its `stroke` is that stroke's number."""
@@ -113,26 +108,19 @@ class PredictionFinding(TrialNumbers):
     settled_rate: float | None = None  # likewise
     peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
     settled_rate_interval: Ends | None = None  # likewise
-    row: tuple[tuple[float, float], ...] = ()  # SED [MPa] of the same ending at arc positions along the skin [mm]
+    row: Mapping[float, float] = field(default_factory=dict[float, float])  # SED [MPa] by place along the skin [mm]
     doubt: str = ""  # why no finger can be in the state of the model's numbers, as `Alternative.doubt`
     opposite_doubt: str = ""  # likewise of the state slid the other way
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """The finger of one trial in its settled state, k nodes, in the world: surface at y = 0, finger above it [mm]."""
+    """The finger of one trial in its settled state."""
 
     experiment: str
     index: int
-    nodes: tuple[tuple[float, float], ...]  # deformed, as the picture shows them (lengths true)
-    triangles: tuple[tuple[int, int, int], ...]
-    sed: Numbers  # at the nodes [MPa]
-    outlines: dict[str, tuple[tuple[float, float], ...]]  # deformed layer boundaries by name
-    patch: tuple[tuple[float, float], ...]  # the ending's outline
-    contact: tuple[tuple[float, float], ...]  # skin points in and beside the contact
-    pressure: Numbers  # at those [MPa]
-    traction: Numbers  # along +x, on the skin [MPa]
-    state: tuple[str, ...]  # "open", "stick", "slip" or "cap": slips at the bound
+    drawn: Fields
+    skin: Skin
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,13 +134,13 @@ class GroundTruth:
     direction: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Course:
     """Forces over the whole recording, thinned to the least and the greatest of each stretch of time."""
 
-    time: Numbers  # [s, device time]
-    normal: tuple[float | None, ...]  # [N]; None where readings are missing
-    tangential: tuple[float | None, ...]  # [N]
+    time: Array  # [s, device time]
+    normal: Array  # [N]; nan where readings are missing
+    tangential: Array  # [N]
 
 
 @dataclass(frozen=True, slots=True)

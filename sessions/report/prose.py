@@ -95,8 +95,8 @@ def _by_place(report: Report) -> str:
     """Return how far along the skin the ending may lie without another sign of r."""
     ranges: list[str] = []
     for experiment in report.experiments:
-        rows = [dict(p.row) for p in report.predictions if p.experiment == experiment.name and p.row]
-        arcs = rows[0] if rows else {}
+        rows = [p.row for p in report.predictions if p.experiment == experiment.name and p.row]
+        arcs = rows[0] if rows else ()
         places = sorted(arc for arc in arcs if abs(arc) <= REACH and all(arc in row for row in rows))
         by_place = {arc: _relation(report, experiment, _at(arc)) for arc in places}
         known = {arc: related.pearson for arc, related in by_place.items() if related.pearson is not None}
@@ -112,7 +112,7 @@ def _by_place(report: Report) -> str:
 
 
 def _at(arc: float) -> _Value:
-    return lambda one: dict(one.row).get(arc)
+    return lambda one: one.row.get(arc)
 
 
 def _alike(known: Mapping[float, float]) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from sessions.prediction import PredictionOptions, SessionPrediction, TrialPredi
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.scenes import doubt_of
 from sessions.recording.reader import Recording
-from sessions.report.contents import Course, Fact, Field, History, PredictionFinding, StrokeFinding, Trace, same_fields
+from sessions.report.contents import Course, Fact, Field, PredictionFinding, StrokeFinding, Trace, same_fields
 from sessions.report.wording import plural
 from sessions.statistics.scores import by_key
 from sessions.strokes.analysis import Analysis
@@ -81,11 +81,7 @@ def course(recording: Recording) -> Course | None:
     kept = np.union1d(np.union1d(*map(_extremes, forces)), [gaps, gaps + 1])
     behind = np.searchsorted(kept, gaps) + 1
     normal, tangential = (np.insert(force[kept], behind, np.nan) for force in forces)
-    return Course(
-        _numbers(np.insert(block.time[kept], behind, block.time[gaps])),
-        _none_for_nan(normal),
-        _none_for_nan(tangential),
-    )
+    return Course(np.insert(block.time[kept], behind, block.time[gaps]), normal, tangential)
 
 
 def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:
@@ -109,17 +105,11 @@ def _trace(stroke: Stroke) -> Trace | None:
     begin = float(curve.time[0]) if stroke.onset is None else stroke.onset
     end = float(curve.time[-1]) if stroke.lift is None else stroke.lift
     inside = np.flatnonzero((curve.time >= begin) & (curve.time <= end))
-    every = max(1, -(-len(inside) // MOST_INSTANTS))
-    kept = inside[::every]
-    return Trace(
-        origin=begin,
-        time=_numbers(curve.time[kept] - begin),
-        normal=_numbers(curve.normal[kept]),
-        tangential=_numbers(curve.tangential[kept]),
-        mu=_none_for_nan(curve.ratio[kept]),
-        speed=_none_for_nan(curve.speed[kept]),
-        every=every,
-    )
+    if not len(inside):
+        return None
+    kept = inside[:: max(1, -(-len(inside) // MOST_INSTANTS))]
+    columns = (curve.time - begin, curve.normal, curve.tangential, curve.ratio, curve.speed)
+    return Trace(begin, *(column[kept] for column in columns))
 
 
 def _extremes(values: Array) -> NDArray[np.int64]:
@@ -138,15 +128,6 @@ def _extremes(values: Array) -> NDArray[np.int64]:
         if not np.isnan(piece).all():
             kept |= {start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))}
     return np.array(sorted(kept))
-
-
-def _numbers(values: Array) -> tuple[float, ...]:
-    return tuple(values.tolist())
-
-
-def _none_for_nan(values: Array) -> tuple[float | None, ...]:
-    """Return the values with None for nan, which JSON does not have."""
-    return tuple(None if np.isnan(value) else float(value) for value in values)
 
 
 _NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
@@ -224,14 +205,13 @@ def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
 
 def finding_of(row: TrialPrediction, firing: Firing | None = None) -> PredictionFinding:
     """Return the finding of one trial, with the rates of an afferent where it was computed."""
-    history = row.history
     reasons = {name: row.reasons[other] for name, other in _FROM_ROW.items() if other in row.reasons}
     numbers: dict[str, Any] = {
         "stroke": None if row.stroke is None else row.stroke + 1,
         "experiment": row.block or "",
         "index": None if row.stimulus is None else row.stimulus.index,
         "code": "" if row.stimulus is None else row.stimulus.code,
-        "history": None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
+        "history": row.history,
         "reasons": {**reasons, **row.reasons},
         "responses": row.responses,
         "row": _row(row),
@@ -244,12 +224,12 @@ def finding_of(row: TrialPrediction, firing: Firing | None = None) -> Prediction
     return PredictionFinding(**{**same_fields(row, PredictionFinding), **numbers})
 
 
-def _row(row: TrialPrediction) -> tuple[tuple[float, float], ...]:
-    """Return arc position and SED of every ending of the row that has one."""
+def _row(row: TrialPrediction) -> dict[float, float]:
+    """Return the SED of every ending of the row that has one, by its arc position."""
     if row.prediction is None:
-        return ()
-    pairs = zip(row.prediction.row.arc.tolist(), row.prediction.row.sed.tolist(), strict=True)
-    return tuple((arc, sed) for arc, sed in pairs if np.isfinite(sed))
+        return {}
+    endings = row.prediction.row
+    return {arc: sed for arc, sed in zip(endings.arc.tolist(), endings.sed.tolist(), strict=True) if np.isfinite(sed)}
 
 
 def field_of(experiment: str, row: TrialPrediction) -> Field | None:
@@ -257,20 +237,7 @@ def field_of(experiment: str, row: TrialPrediction) -> Field | None:
     picture = row.picture()
     if picture is None or row.stimulus is None:
         return None
-    drawn, skin = picture
-    return Field(
-        experiment=experiment,
-        index=row.stimulus.known_index,
-        nodes=_pairs(drawn.nodes),
-        triangles=tuple((int(a), int(b), int(c)) for a, b, c in drawn.triangles),
-        sed=_numbers(drawn.sed),
-        outlines={name: _pairs(line) for name, line in drawn.outlines.items()},
-        patch=_pairs(drawn.patch),
-        contact=_pairs(np.column_stack([skin.x, skin.gap])),
-        pressure=_numbers(skin.pressure),
-        traction=_numbers(skin.traction),
-        state=skin.state,
-    )
+    return Field(experiment, row.stimulus.known_index, *picture)
 
 
 def _share(entries: Sequence[Mapping[str, Any]]) -> str:
@@ -291,7 +258,3 @@ def _plain(value: float) -> str:
     if value == 0.0 or value >= 10.0:
         return f"{value:.0f}"
     return "below 0.01" if value < 0.01 else f"{value:.2g}"
-
-
-def _pairs(points: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:
-    return tuple((float(x), float(y)) for x, y in points)

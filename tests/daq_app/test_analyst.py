@@ -279,7 +279,7 @@ def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
     answered = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
     assert set(other.fingers) == set(answered) != set()
     for key, finger in other.fingers.items():
-        np.testing.assert_allclose(finger.frame.row, [sed for _, sed in answered[key].row])
+        np.testing.assert_allclose(finger.frame.row, list(answered[key].row.values()))
 
 
 def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):

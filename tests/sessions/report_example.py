@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from sessions.prediction import Fields, History, Skin
 from sessions.prediction.stored import Alternative, SedInterval, variants
 from sessions.report.contents import (
     Course,
@@ -12,7 +13,6 @@ from sessions.report.contents import (
     Fact,
     Field,
     GroundTruth,
-    History,
     PredictionFinding,
     Report,
     StrokeFinding,
@@ -117,12 +117,11 @@ def trace(mu, speed, onset):
     v = speed * np.clip((t - 0.4) / 0.2, 0, 1) * (1 + 0.06 * np.sin(11 * t))
     return Trace(
         origin=onset,
-        time=tuple(t.tolist()),
-        normal=tuple(normal.tolist()),
-        tangential=tuple((ratio * normal).tolist()),
-        mu=tuple(float(r) if f else None for r, f in zip(ratio, felt, strict=True)),
-        speed=tuple(float(x) if f else None for x, f in zip(v, felt, strict=True)),
-        every=1,
+        time=t,
+        normal=normal,
+        tangential=ratio * normal,
+        mu=np.where(felt, ratio, np.nan),
+        speed=np.where(felt, v, np.nan),
     )
 
 
@@ -214,7 +213,7 @@ def prediction(number, descriptor, index):
         matching_depth=1.93 if number != 10 else None,
         opposite_sed=sed * 0.7,
         wall_s=0.05,
-        history=History(tuple(t.tolist()), tuple(course.tolist())),
+        history=History(t, *[np.zeros_like(t)] * 2, course, *[course] * 5, course[:, None]),
         reasons={} if number != 10 else {"matching_depth": "at no depth up to 3 mm does the model press so hard"},
         interval=SedInterval(
             0.995 * sed, 1.005 * sed, "derivatives", normal_force=(2.9, 3.1), tangential_force=(1.9, 2.1)
@@ -254,7 +253,7 @@ def finger_field(descriptor, index):
     sed = 0.012 * np.exp(-(((world[:, 0]) / 2.5) ** 2) - ((world[:, 1] - 1.0) / 1.6) ** 2)
     arc = np.linspace(-math.pi / 2, math.pi / 2, 91)
     outlines = {
-        name: _pairs(_placed(radius * np.column_stack([np.cos(arc), np.sin(arc)])))
+        name: _placed(radius * np.column_stack([np.cos(arc), np.sin(arc)]))
         for name, radius in (("skin", 5.0), ("epidermis", 4.25), ("dermis", 3.0), ("bone", 1.5))
     }
     around = -math.pi / 4 + np.array([-0.16, 0.16, 0.16, -0.16])
@@ -268,15 +267,8 @@ def finger_field(descriptor, index):
     return Field(
         experiment=descriptor,
         index=index,
-        nodes=_pairs(world),
-        triangles=tuple(triangles),
-        sed=tuple(sed.tolist()),
-        outlines=outlines,
-        patch=_pairs(patch),
-        contact=tuple((float(v), 0.0) for v in x),
-        pressure=tuple(pressure.tolist()),
-        traction=tuple(traction.tolist()),
-        state=tuple(state),
+        drawn=Fields(world, np.array(triangles), {"sed": sed}, outlines, patch),
+        skin=Skin(x, np.zeros_like(x), pressure, traction, tuple(state)),
     )
 
 
@@ -286,10 +278,6 @@ def _placed(local):
     world[:, 1] += 5.0 - 2.0
     world[:, 1] = np.maximum(world[:, 1], 0.0)
     return world
-
-
-def _pairs(points):
-    return tuple((float(x), float(y)) for x, y in points)
 
 
 def example(**changes):
@@ -317,7 +305,7 @@ def _made():
         "remarks": ("Trial 7 has no score: the subject did not answer.",),
         "flaws": (Fact("speed_not_measurable", "The centre of pressure moves in steps.", "trial 7"),),
         "experiments": tuple(experiment(d, score_tables) for d in TABLES),
-        "course": Course(tuple(t.tolist()), tuple(force.tolist()), tuple((0.5 * force).tolist())),
+        "course": Course(t, force, 0.5 * force),
         "strokes": strokes,
         "predictions": tuple(prediction(k, *which) for k, which in enumerate(numbered, 1)),
         "fields": (finger_field("stickiness", 100), finger_field("slipperiness", 100)),

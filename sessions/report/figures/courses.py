@@ -7,9 +7,10 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 
-from sessions.report.contents import Course, PredictionFinding, StrokeFinding, Trace
+from sessions.report.contents import Array, Course, PredictionFinding, StrokeFinding, Trace
 from sessions.report.figures.style import (
     GREEN,
     GREY,
@@ -22,6 +23,7 @@ from sessions.report.figures.style import (
     Panel,
     Sheet,
     label_right,
+    rows_of,
     shades,
     sheet,
     svg,
@@ -32,7 +34,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
     """Return both forces against time; strokes are grey bands with their number."""
     drawn = sheet(672, 270, (1.0, 1.0), share_x=True)
     upper, lower = drawn.axes
-    first, last = (course.time[0], course.time[-1]) if course.time else (0.0, 1.0)
+    first, last = (float(course.time[0]), float(course.time[-1])) if len(course.time) else (0.0, 1.0)
     for axes, values, colour, name in (
         (upper, course.normal, SKY, "normal force"),
         (lower, course.tangential, VERMILLION, "tangential force"),
@@ -41,7 +43,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
             begin, end = _ends(stroke, first, last)
             text = f"stroke {stroke.number}: {begin:.3f} s to {end:.3f} s"
             axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=drawn.note(text))
-        axes.plot(course.time, [math.nan if v is None else v for v in values], color=colour, linewidth=0.8)
+        axes.plot(course.time, values, color=colour, linewidth=0.8)
         axes.axhline(0.0, color=GREY, linewidth=0.4)
         axes.set(ylabel=f"{name}\n[N]", xlim=(first, last if last > first else first + 1.0))
         axes.margins(y=0.08)
@@ -51,7 +53,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
         _mark(upper, str(stroke.number), (middle, 1.0), (0, 2), ha="center", va="bottom", color=INK, fontsize=7.5)
     name, title = "course", "Normal and tangential force over the whole recording"
     header = ("time [s]", "normal force [N]", "tangential force [N]")
-    rows = tuple(zip(course.time, course.normal, course.tangential, strict=True))
+    rows = rows_of(course.time, course.normal, course.tangential)
     return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
 
 
@@ -137,27 +139,25 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
     rows: list[Row] = []
     labels: list[Label] = []
     for (stroke, trace), shade in zip(ordered, shades(of.colour, max(len(ordered), 1)), strict=False):
-        values: Sequence[float | None] = getattr(trace, of.values)
+        values: Array = getattr(trace, of.values)
         first, last = stroke.steady or (math.inf, -math.inf)
-        inside = [first <= trace.origin + t <= last for t in trace.time]
-        y = [math.nan if v is None else v for v in values]
+        inside = (first <= trace.origin + trace.time) & (trace.origin + trace.time <= last)
         level: float | None = getattr(stroke, of.level)
         text = _name(stroke) + (f", {of.word} {level:.3g} over the steady window" if level is not None else "")
         style = "solid" if level is not None else (0, (3, 2))
-        axes.plot(trace.time, y, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
-        steady = [v if within else math.nan for v, within in zip(y, inside, strict=True)]
-        axes.plot(trace.time, steady, color=shade, linewidth=2.2, solid_capstyle="butt")
-        drawn_values = [
-            (t, v, within) for t, v, within in zip(trace.time, values, inside, strict=True) if v is not None
-        ]
-        rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in drawn_values]
-        if drawn_values:
-            at = [(t, v) for t, v, within in drawn_values if within] or [(t, v) for t, v, _ in drawn_values]
-            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at[-1]))
+        axes.plot(trace.time, values, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
+        axes.plot(trace.time, np.where(inside, values, np.nan), color=shade, linewidth=2.2, solid_capstyle="butt")
+        known = ~np.isnan(values)
+        points = zip(*(column[known].tolist() for column in (trace.time, values, inside)), strict=True)
+        rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in points]
+        if known.any():
+            last_known = np.flatnonzero(known & inside if (known & inside).any() else known)[-1]
+            at = float(trace.time[last_known]), float(values[last_known])
+            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at))
     axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
     if rows:  # from 0 on where nothing lies below
-        values = [v for _, _, _, v, _ in rows]
-        low, high = min(*values, 0.0), max(values)
+        greatest = [v for _, _, _, v, _ in rows]
+        low, high = min(*greatest, 0.0), max(greatest)
         axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
     if len(labels) <= MOST_LABELLED:
         label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
@@ -183,11 +183,11 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
     whole, sliding = drawn.axes
     labels: list[Label] = []
     rows: list[tuple[int | None, int | None, float, float]] = []
-    seen: list[float] = []
+    sliding_values: list[float] = []
     kind = "stroke" if courses[0][0].index is None else "index"
-    end = max(history.time[-1] for _, history in courses)
+    end = max(float(history.time[-1]) for _, history in courses)
     for (prediction, history), shade in zip(courses, shades(GREEN, len(courses)), strict=True):
-        kilopascal = [1e3 * value for value in history.sed]
+        kilopascal = 1e3 * history.sed_ending
         label = str(prediction.stroke if prediction.index is None else prediction.index)
         text = f"{kind} {label}: {kilopascal[-1]:.3f} kPa in the end"
         for axes in drawn.axes:
@@ -195,17 +195,19 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
             if history.time[-1] < end:  # settled: it stays
                 rest = [history.time[-1], end], [kilopascal[-1]] * 2
                 axes.plot(*rest, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
-        labels.append(Label(label, end, kilopascal[-1]))
-        rows += [(prediction.trial, prediction.index, t, v) for t, v in zip(history.time, history.sed, strict=True)]
-        seen += [v for t, v in zip(history.time, kilopascal, strict=True) if t >= PRESSED]
+        labels.append(Label(label, end, float(kilopascal[-1])))
+        course = zip(history.time.tolist(), history.sed_ending.tolist(), strict=True)
+        rows += [(prediction.trial, prediction.index, *instant) for instant in course]
+        sliding_values += kilopascal[history.time >= PRESSED].tolist()
     whole.axvline(PRESSED, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
     whole.set_ylim(0.0, 1.25 * max(row[3] for row in rows) * 1e3)
     for text, offset, side in (("pressing", -4, "right"), ("sliding", 4, "left")):
         _mark(whole, text, (PRESSED, 0.98), (offset, 0), ha=side, va="top", color=GREY)
     whole.set_title(name)
     sliding.set_xlim(PRESSED, end)
-    margin = 0.06 * (max(seen) - min(seen) or max(seen))
-    sliding.set(ylim=(min(seen) - margin, max(seen) + margin), ylabel="SED while sliding [kPa]", xlabel="time [s]")
+    low, high = min(sliding_values), max(sliding_values)
+    margin = 0.06 * (high - low or high)
+    sliding.set(ylim=(low - margin, high + margin), ylabel="SED while sliding [kPa]", xlabel="time [s]")
     whole.set(xlim=(0.0, end), ylabel="SED [kPa]")
     label_right(drawn, sliding, labels, kind)
     title = f"Predicted response in time, {name or 'all strokes'}"

@@ -14,7 +14,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation, TriContourSet
 
 from sessions.report.contents import Field
-from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, sheet, svg
+from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, rows_of, sheet, svg
 
 # Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.
 COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
@@ -35,7 +35,7 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
     whole, close = sheet(328, 330), sheet(328, 330)
     filled = _tissue(whole.axes[0], field, levels)
     _tissue(close.axes[0], field, levels)
-    x, y = np.array(field.nodes).T
+    x, y = field.drawn.nodes.T
     whole.axes[0].set(xlim=(x.min() - 0.5, x.max() + 0.5), ylim=(-1.2, y.max() + 0.5))
     if filled is not None:
         bar = whole.figure.colorbar(
@@ -44,8 +44,8 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
         bar.set_ticks(levels[:: -(-len(levels) // 6)])
     _name_layers(whole.axes[0], field)
     _tractions(close, field)
-    inside = np.mean(np.asarray(field.patch), axis=0)
-    close.axes[0].annotate("ending", tuple(inside), xytext=(0, 7), textcoords="offset points", ha="center", va="bottom")
+    inside = tuple(field.drawn.patch.mean(axis=0).tolist())
+    close.axes[0].annotate("ending", inside, xytext=(0, 7), textcoords="offset points", ha="center", va="bottom")
     middle = _middle(field)
     close.axes[0].set(xlim=(middle - HALF_WIDTH, middle + HALF_WIDTH), ylim=(-3.1, 4.4))
     for drawn in (whole, close):
@@ -54,16 +54,19 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
     stem = f"finger-{field.experiment}-{field.index}"
     of = f"index {field.index} of {field.experiment}"
     title, near = f"Strain-energy density in the finger, {of}", f"Contact and receptor, {of}"
-    nodes = tuple((*place, sed) for place, sed in zip(field.nodes, field.sed, strict=True))
-    skin = tuple(
-        (*place, p, t, state)
-        for place, p, t, state in zip(field.contact, field.pressure, field.traction, field.state, strict=True)
-    )
+    skin = field.skin
+    touched = rows_of(skin.x, skin.gap, skin.pressure, skin.traction)
     other, header = f"{stem}-contact", ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state")
     picture = svg(whole, stem, title, simulated=simulated)
     return (
-        Panel(stem, title, picture, ("x [mm]", "y [mm]", "SED [MPa]"), nodes),
-        Panel(other, near, svg(close, other, near, simulated=simulated), header, skin),
+        Panel(stem, title, picture, ("x [mm]", "y [mm]", "SED [MPa]"), rows_of(x, y, field.drawn.sed)),
+        Panel(
+            other,
+            near,
+            svg(close, other, near, simulated=simulated),
+            header,
+            tuple((*row, state) for row, state in zip(touched, skin.state, strict=True)),
+        ),
     )
 
 
@@ -73,7 +76,7 @@ def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
     They rise from 0 in steps of 1, 2 or 5 times a power of ten. Nodes without an SED (nan) count for nothing; where no
     node has one above 0, the colours end at 1 kPa.
     """
-    values = np.concatenate([np.asarray(field.sed) for field in fields]) * 1e3
+    values = np.concatenate([field.drawn.sed for field in fields]) * 1e3
     values = values[np.isfinite(values)]
     high = float(np.quantile(values, 0.97)) if len(values) else 0.0
     if high <= 0.0:
@@ -88,13 +91,12 @@ def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSe
     Returns the filling; None where no triangle has an SED at all its corners, which the picture then says.
     """
     filled = _filling(axes, field, levels)
-    for name, outline in field.outlines.items():
-        line = np.asarray(outline)
+    for name, line in field.drawn.outlines.items():
         if name == "bone":
             axes.fill(line[:, 0], line[:, 1], facecolor="#f2f2f2", edgecolor=INK, linewidth=0.4)
         else:
             axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=0.8 if name == "skin" else 0.4)
-    patch = np.asarray([*field.patch, field.patch[0]])
+    patch = np.vstack([field.drawn.patch, field.drawn.patch[:1]])
     axes.plot(patch[:, 0], patch[:, 1], color="white", linewidth=2.2)
     axes.plot(patch[:, 0], patch[:, 1], color=INK, linewidth=1.0)
     axes.axhline(0.0, color=INK, linewidth=1.0)
@@ -107,9 +109,7 @@ def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSe
 
 def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
     """Fill the triangles whose corners all have a finite SED; return None where there are none."""
-    nodes = np.asarray(field.nodes)
-    sed = np.asarray(field.sed) * 1e3
-    corners = np.asarray(field.triangles)
+    nodes, sed, corners = field.drawn.nodes, field.drawn.sed * 1e3, field.drawn.triangles
     missing = ~np.isfinite(sed[corners]).all(axis=1)
     if missing.all():
         return None
@@ -123,12 +123,11 @@ def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourS
 
 def _name_layers(axes: Axes, field: Field) -> None:
     """Write the layers' names beside the finger's back, each with a line into its layer, and the bone's on it."""
-    if "bone" in field.outlines:
-        x, y = np.asarray(field.outlines["bone"]).mean(axis=0).tolist()
+    outlines = field.drawn.outlines
+    if "bone" in outlines:
+        x, y = outlines["bone"].mean(axis=0).tolist()
         axes.text(x, y, "bone", ha="center", va="center", clip_on=True)
-    lines = [
-        np.asarray(field.outlines[name]) for name in ("skin", "epidermis", "dermis", "bone") if name in field.outlines
-    ]
+    lines = [outlines[name] for name in ("skin", "epidermis", "dermis", "bone") if name in outlines]
     if len(lines) < 4 or len({len(line) for line in lines}) > 1:
         return  # the outlines have no points in common that would lie across the layers
     line = {"arrowstyle": "-", "color": INK, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
@@ -139,24 +138,23 @@ def _name_layers(axes: Axes, field: Field) -> None:
 
 
 def _middle(field: Field) -> float:
-    touching = [x for (x, _), state in zip(field.contact, field.state, strict=True) if state != "open"]
-    return (min(touching) + max(touching)) / 2 if touching else 0.0
+    touching = field.skin.x[[state != "open" for state in field.skin.state]]
+    return float(touching.min() + touching.max()) / 2 if len(touching) else 0.0
 
 
 def _tractions(drawn: Sheet, field: Field) -> None:
     """Draw what the surface does to the skin: arrows that end where it acts, and how each part of it moves."""
-    axes = drawn.axes[0]
-    touching = [i for i, state in enumerate(field.state) if state != "open"]
+    axes, skin = drawn.axes[0], field.skin
+    touching = [i for i, state in enumerate(skin.state) if state != "open"]
     if not touching:
         axes.text(0.5, 0.02, "no contact", transform=axes.transAxes, ha="center", va="bottom")
         return
-    strongest = max(float(np.hypot(field.pressure[i], field.traction[i])) for i in touching)
+    strongest = float(np.hypot(skin.pressure[touching], skin.traction[touching]).max())
     scale = LONGEST_ARROW / strongest
     for i in touching[:: max(1, -(-len(touching) // ARROWS))]:
-        x = field.contact[i][0]
-        vector = (scale * field.traction[i], scale * field.pressure[i])
-        text = f"pressure {1e3 * field.pressure[i]:.1f} kPa, traction {1e3 * field.traction[i]:.1f} kPa"
-        start = (x - vector[0], -0.08 - vector[1])
+        vector = (scale * skin.traction[i], scale * skin.pressure[i])
+        text = f"pressure {1e3 * skin.pressure[i]:.1f} kPa, traction {1e3 * skin.traction[i]:.1f} kPa"
+        start = (skin.x[i] - vector[0], -0.08 - vector[1])
         axes.quiver(*start, *vector, color=INK, gid=drawn.note(text), **_ARROW)
     _states(axes, field)
     unit = _nice(strongest)
@@ -167,10 +165,11 @@ def _tractions(drawn: Sheet, field: Field) -> None:
 
 def _states(axes: Axes, field: Field) -> None:
     """Draw a line under the surface for each stretch that slips or sticks, and name the stretches with room for it."""
-    for state, run in itertools.groupby(range(len(field.state)), key=lambda i: field.state[i]):
+    states = field.skin.state
+    for state, run in itertools.groupby(range(len(states)), key=lambda i: states[i]):
         if state == "open":
             continue
-        places = [field.contact[i][0] for i in run]
+        places = field.skin.x[list(run)].tolist()
         level = -LONGEST_ARROW - 0.35
         axes.plot([places[0], places[-1]], [level, level], color=GREY, linewidth=1.6, linestyle=_STYLE[state])
         if places[-1] - places[0] > 0.16 * len(_WORDS[state]):

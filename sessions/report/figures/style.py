@@ -20,6 +20,7 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from scipy.optimize import isotonic_regression
 
+from sessions.report.contents import Array
 from sessions.report.wording import identifier
 
 SKY = "#56B4E9"  # normal force
@@ -152,6 +153,12 @@ def in_pixels(note: str = "") -> Generator[dict[str, bytes]]:
     finally:
         _PIXELS.reset(before)
         _NOTE.reset(noted)
+
+
+def rows_of(*columns: Array) -> tuple[tuple[Cell, ...], ...]:
+    """Return columns of numbers as the rows of a panel, None for nan."""
+    cells = ([None if np.isnan(value) else value for value in column.tolist()] for column in columns)
+    return tuple(zip(*cells, strict=True))
 
 
 def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
