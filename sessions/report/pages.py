@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
-from itertools import chain
+from itertools import count
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
@@ -23,7 +23,7 @@ from sessions.report.contents import Report
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.relation import study_plates
 from sessions.report.prose import distinctions, doubts, question, summary
-from sessions.report.tables import Table, split_off_appendix
+from sessions.report.tables import split_off_appendix
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_models, missing_scores
@@ -59,22 +59,32 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
 
     `drawings` are its `plates`, where they were drawn already.
     """
-    figures = {plate.name: plate for plate in (plates(report) if drawings is None else drawings)}
     tables, further = split_off_appendix(session_tables(report), BODY)
-    return template("report.html.jinja").render(
+    return _page(
+        "report.html.jinja",
+        plates(report) if drawings is None else drawings,
+        report.head if report.simulated else "",
         report=report,
         question=question(report),
         summary=summary(report),
         doubts=doubts(report),
         distinctions=distinctions(report),
-        figures=figures,
-        drawing=embed,
-        text_address=text_address,
-        csv_of=partial(panel_csv, head=report.head if report.simulated else ""),
-        numbers=_numbers(figures, {**tables, "further": further}),
-        contents=_contents(report, figures, tables, further=bool(further)),
         tables=tables,
         further=further,
+    )
+
+
+def _page(file: str, drawings: Iterable[Plate], head: str, **values: object) -> str:
+    """Return a page of a template; figures and tables are numbered in the order in which they stand on it."""
+    return template(file).render(
+        figures={plate.name: plate for plate in drawings},
+        figure_number=count(1).__next__,
+        table_number=count(1).__next__,
+        headings=partial(re.findall, r'<h2 id="(\w+)">([^<]*)</h2>'),
+        drawing=embed,
+        text_address=text_address,
+        csv_of=partial(panel_csv, head=head),
+        **values,
     )
 
 
@@ -112,39 +122,6 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
                 swap_in(path, text)
                 written.append(path)
     return tuple(written)
-
-
-def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
-    """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
-    order = ("relation", "scores", "course", "friction", "speed", "finger", "response", "paths", "forces")
-    return _numbers_by_name([name for name in order if name in figures], chain.from_iterable(tables.values()))
-
-
-def _numbers_by_name(figures: Iterable[str], tables: Iterable[Table]) -> dict[str, int]:
-    """Return the numbers of figures and of tables, each counted from 1, by their names."""
-    return {name: n for n, name in enumerate(figures, 1)} | {table.name: n for n, table in enumerate(tables, 1)}
-
-
-def _contents(
-    report: Report, figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]], *, further: bool
-) -> tuple[tuple[str, str], ...]:
-    """Return anchor and words of the sections that the page has."""
-    parts = (
-        ("relation", "prediction against score", "relation" in figures or bool(tables["relation"])),
-        ("friction", "friction", bool(tables["strokes"])),
-        ("predictions", "predicted responses", bool(tables["predictions"])),
-        ("rivals", "rivals", bool(tables["rivals"])),
-        ("who", "appendix: who and what", True),
-        ("excluded", "excluded", True),
-        ("scores", "scores", "scores" in figures),
-        ("course", "forces in time", "course" in figures or "friction" in figures),
-        ("responses", "responses", "finger" in figures or "response" in figures),
-        ("paths", "many paths", "paths" in figures),
-        ("model", "the model", bool(report.modelled or report.left_out)),
-        ("again", "to do it again", True),
-        ("further", "further tables", further or "forces" in figures),
-    )
-    return tuple((anchor, words) for anchor, words, there in parts if there)
 
 
 def embed(panel: Panel) -> Markup:
@@ -189,10 +166,11 @@ STUDY_BODY = {"table-relation", "table-scores", "table-surfaces", "table-rivals"
 
 def study_page(study: StudyFindings, name: str) -> str:
     """Return the page of the study called `name`; the same findings give the same bytes."""
-    figures = {plate.name: plate for plate in study_plates(study)}
     tables, further = split_off_appendix(study_tables(study), STUDY_BODY)
-    trials = tables.pop("trials")
-    return template("study.html.jinja").render(
+    return _page(
+        "study.html.jinja",
+        study_plates(study),
+        study.simulated,
         study=study,
         name=name,
         prose=study_prose,
@@ -201,13 +179,8 @@ def study_page(study: StudyFindings, name: str) -> str:
         columns_csv=columns_csv(study),
         unmodelled=missing_models(study),
         untold=missing_scores(study),
-        figures=figures,
-        tables={**tables, "trials": trials},
+        tables=tables,
         further=further,
-        numbers=_numbers_by_name(figures, (*chain.from_iterable(tables.values()), *further, *trials)),
-        drawing=embed,
-        text_address=text_address,
-        csv_of=partial(panel_csv, head=study.simulated),
     )
 
 
