@@ -86,7 +86,10 @@ class SessionWriter:
         }
         path = folder / schema.LIVE_FILE
         try:
+            new = [place for place in (folder, *folder.parents) if not place.exists()]
             folder.mkdir(parents=True, exist_ok=True)
+            for place in new:
+                sync_folder(place.parent)
             if any(folder.iterdir()):
                 raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
             if reserve:
@@ -189,7 +192,7 @@ class SessionWriter:
         self._check()
         instant_ns = self.instant_ns(kind, trial) if time_ns is None else time_ns
         event = LoggedEvent(self._event_count + 1, instant_ns, kind, trial, self._readings, dict(data or {}))
-        json_text(event.data)  # what JSON cannot hold is refused here, before it spoils a commit
+        schema.event_row(event)  # what JSON or UTF-8 cannot hold is refused here, before it spoils a commit
         self._events.append(event)
         self._event_count += 1
         if commit:
@@ -240,16 +243,19 @@ class SessionWriter:
         if not self._blocks and not self._events:
             return self._block_rows
         self._connection.execute("BEGIN IMMEDIATE")
-        rows = self._insert_blocks()
-        for event in self._events:
-            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", schema.event_row(event))
-        self._connection.execute("COMMIT")
+        try:
+            rows = self._insert_blocks()
+            for event in self._events:
+                self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", schema.event_row(event))
+            self._connection.execute("COMMIT")
+        except BaseException:
+            with suppress(sqlite3.Error):
+                self._connection.execute("ROLLBACK")
+            raise
         return rows
 
     def _written_again(self, error: sqlite3.Error) -> int:
-        """Undo a commit that failed, and try it once more: elsewhere, or in the room that was kept back."""
-        with suppress(sqlite3.Error):
-            self._connection.execute("ROLLBACK")
+        """Try a commit that failed once more: elsewhere, or in the room that was kept back."""
         if self._lost_sight():
             self._rescue()
         elif not self._has_reserve or self.must_end is not None:
@@ -262,8 +268,6 @@ class SessionWriter:
         try:
             return self._write_waiting()
         except sqlite3.Error as again:
-            with suppress(sqlite3.Error):
-                self._connection.execute("ROLLBACK")
             self._fail(again)
 
     def _lost_sight(self) -> bool:

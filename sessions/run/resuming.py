@@ -139,18 +139,23 @@ def continue_clock(recording: Recording, last: ReadingBlock, clock: Clock, now: 
     much as the wall clock says has passed, a second more or less: no two clocks of a computer survive its restart.
     """
     known = [(str(recording.provenance["created_utc"]), int(recording.provenance["clock"]["now_ns"]))]
-    known += [(e.data["resumed_utc"], e.time_ns) for e in recording.events if e.kind == "resumed"]
+    known += [(e.data["resumed_utc"], _clock_at_resumption(e.data)) for e in recording.events if e.kind == "resumed"]
     utc, at_ns = known[-1]
     instants = [at_ns, *(event.time_ns for event in recording.events), *last.received_ns.tolist()]
     last_ns = max(instants)
     elapsed_ns = round((now - datetime.fromisoformat(utc)).total_seconds() * 1e9)
     # A simulated clock ran faster; while nothing ran, time passed as on the wall.
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
-    offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()
+    offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()  # as `_clock_at_resumption` reads it again
     duration = gap_ns * 1e-9 if gap_ns * 1e-9 > -CLOCKS_AGREE else None
     resumed_utc = now.astimezone(UTC).isoformat(timespec="milliseconds")
     gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, resumed_utc)
     return ContinuedClock(clock, offset_ns), gap
+
+
+def _clock_at_resumption(resumed: Mapping[str, Any]) -> int:
+    """Return the session clock [ns] at the date of a `resumed`, which is written once the device is open."""
+    return int(resumed["last_ns"]) + max(round((resumed.get("gap") or 0.0) * 1e9), LEAST_GAP_NS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from stand_ins import CALIBRATION, INFO, SimulatedClock
 
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording, RecordingError, Setting, provenance
+from sessions.recording import writer as writer_module
 from sessions.recording.head import without_home
 
 REAL = replace(INFO, simulated=False)
@@ -187,6 +188,18 @@ def test_the_store_writes_ahead_and_waits_for_the_disk(tmp_path):
     writer.close()
 
 
+def test_the_names_of_new_folders_are_safe_before_anything_is_recorded_in_them(tmp_path, monkeypatch):
+    places = []
+    monkeypatch.setattr(writer_module, "sync_folder", places.append)
+    begun(tmp_path / "study" / "visit" / "s").close()
+    assert set(places) == {
+        tmp_path,
+        tmp_path / "study",
+        tmp_path / "study" / "visit",
+        tmp_path / "study" / "visit" / "s",
+    }
+
+
 def test_readings_are_committed_once_a_second_of_the_session_clock(tmp_path):
     clock = SimulatedClock()
     writer = begun(tmp_path / "s", clock=clock)
@@ -236,13 +249,16 @@ def test_nothing_is_ever_written_over(tmp_path):
         begun(tmp_path / "file")
 
 
-def test_an_event_that_json_cannot_hold_is_refused_before_it_spoils_anything(tmp_path):
+def test_an_event_that_json_or_utf_8_cannot_hold_is_refused_before_it_spoils_anything(tmp_path):
     writer = begun(tmp_path / "s")
-    with pytest.raises(ValueError, match="JSON"):
-        writer.event("scored", 1, {"score": math.nan})
+    writer.readings(readings(0, 10))
+    for data, why in (({"score": math.nan}, "JSON"), ({"text": "\udcff"}, "surrogates")):
+        with pytest.raises(ValueError, match=why):
+            writer.event("note", data=data)
     writer.event("scored", 1, {"score": None})
     writer.close()
-    assert [event.number for event in Recording.open(tmp_path / "s").events] == [1]
+    recording = Recording.open(tmp_path / "s")
+    assert ([event.number for event in recording.events], len(recording.readings())) == ([1], 10)
 
 
 def test_a_closed_recording_takes_no_more_and_closing_again_does_no_harm(tmp_path):

@@ -23,6 +23,7 @@ from sessions.run.resuming import (
     check_resumable,
     check_same_transducer,
     continue_clock,
+    resumed_data,
     resumption,
 )
 from sessions.run.states import Ended
@@ -203,6 +204,20 @@ def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forw
     clock, gap = continue_clock(recording, recording.last_block(), SimulatedClock(7), earlier)
     assert gap.duration is None
     assert clock.now_ns() > recording.events[-1].time_ns
+
+
+def test_the_time_that_opening_the_device_takes_is_no_part_of_the_next_gap(tmp_path):
+    Session(tmp_path / "s", link_lost_after=1000).run()
+    recording = Recording.open(tmp_path / "s")
+    at = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(minutes=10)
+    clock, gap = continue_clock(recording, recording.last_block(), SimulatedClock(7), at)
+    resumed_ns = clock.now_ns()
+    writer = SessionWriter.open(tmp_path / "s", clock)
+    writer.event("resumed", data=resumed_data(gap, INFO, {}), time_ns=resumed_ns + 5_000_000_000)
+    writer.close()
+    recording = Recording.open(tmp_path / "s")
+    clock, _ = continue_clock(recording, recording.last_block(), SimulatedClock(7), at + timedelta(minutes=1))
+    assert clock.now_ns() - resumed_ns == pytest.approx(60e9, abs=1e6)
 
 
 def test_the_seam_alters_nothing_the_device_said(tmp_path):
