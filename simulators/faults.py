@@ -24,22 +24,15 @@ Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]  # in a timetable file [s]
 
 
 class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One kind of fault for a stretch of the box's time.
+    """One kind of fault for a stretch of the box's time. `docs/how-to/simulate-a-box.md` says what each kind does.
 
-    On the way, for a share of the datagrams: `lose`, `repeat` (sent twice), `reorder` (swapped with the next),
-    `corrupt` (other bytes, same length), `shorten` (fewer bytes), `delay` (sent later). In the box: `stall` (the same
-    reading again and again), `saturate` (status says the values are invalid), `status` (it sets the bits of `status`,
-    as its manual numbers them), `units` (it is set to count `share` times as much to a unit; networked box only),
-    `drift` (the zero of every axis walks off by `share` of its range, and stays there), `miscalibrate` (it feels the
-    wrench `1 + share` times as large as its calibration says), `slow` (its own clock runs only `1 - share` as fast),
-    `steal` (another client takes the stream each time it is asked for; networked box only), `reboot` (switched off,
-    then on), `unplug` (nothing comes through, and the box does not notice).
+    The first six of KINDS befall datagrams on the way, the others the box itself.
     """
 
     kind: Kind
     start: Time = msgspec.field(name="from")
     stop: Time = msgspec.field(name="to")
-    share: float = 1.0  # of the datagrams in the stretch [-]
+    share: float = 1.0  # of the datagrams in the stretch, or how far the box goes wrong [-]
     delay: float = 0.05  # of a datagram that is delayed [s]
     status: int = 0  # bits that are set
 
@@ -58,18 +51,14 @@ class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Faults:
     """The timetable of one box. The same seed hurts the same datagrams in the same way."""
 
-    def __init__(
-        self, timetable: Iterable[Fault] = (), *, seed: int = 0, repeat: float = 0.0, remember: bool = False
-    ) -> None:
-        """Begin the timetable anew every `repeat` seconds, if above 0. `remember` keeps what was sent, for tests."""
+    def __init__(self, timetable: Iterable[Fault] = (), *, seed: int = 0, repeat: float = 0.0) -> None:
+        """Begin the timetable anew every `repeat` seconds, if above 0."""
         self._timetable = tuple(timetable)
         self._seed = seed
         self._repeat = repeat
         self._clock = _device_clock([fault for fault in self._timetable if fault.kind == "slow"], repeat)
         self._swapped: bytes | None = None
         self._delayed: list[tuple[float, bytes]] = []  # when each leaves
-        self.datagrams: list[bytes] | None = [] if remember else None  # every datagram the box made
-        self.delivered: list[bytes] | None = [] if remember else None  # every datagram that left, in that order
 
     def put(self, *timetable: Fault) -> None:
         """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""
@@ -133,15 +122,10 @@ class Faults:
         """
         leaving: list[bytes] = []
         for time, datagram in datagrams:
-            if self.datagrams is not None:
-                self.datagrams.append(datagram)
             leaving += self._overdue(time)
             hurt = self._hurt(time, datagram)
             leaving += [] if self.active("unplug", time) else hurt
-        leaving += self._overdue(now)
-        if self.delivered is not None:
-            self.delivered += leaving
-        return leaving
+        return leaving + self._overdue(now)
 
     def _overdue(self, time: float) -> list[bytes]:
         leaving: list[bytes] = []

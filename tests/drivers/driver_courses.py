@@ -1,5 +1,6 @@
 """The two courses that every driver goes through: an undisturbed one, and one full of faults, one after the other."""
 
+import math
 import threading
 import time
 from contextlib import contextmanager
@@ -183,15 +184,15 @@ class Metronome:
         self._thread.join()
 
 
-def uninterrupted(run, whole=lambda _: True):
-    """Return what `run` returns; it runs again where the machine stood still, no device answered, or not `whole`."""
+def uninterrupted(run, whole=lambda _: True, pause=PAUSE):
+    """Return what `run` returns; again where the machine stood still for `pause`, a device was lost, or not `whole`."""
     for _ in range(AGAIN):
         try:
             with Metronome() as metronome:
                 came = run()
         except LinkLost:  # as of a device that had no time to answer
             continue
-        if metronome.longest < PAUSE and whole(came):
+        if metronome.longest < pause and whole(came):
             return came
     return run()
 
@@ -263,7 +264,12 @@ def refusal(transducer):
 
 
 def disturbed_course(name, folder):
-    """Go through all that can go wrong with one driver, and lose the device at the end."""
+    """Go through all that can go wrong; again where the device is given up too early, as by a faulty driver always."""
+    return uninterrupted(lambda: disturbed_run(name, folder), pause=math.inf)
+
+
+def disturbed_run(name, folder):
+    """Go through all that can go wrong with one driver, once, and lose the device at the end."""
     clock, faults, threads = PacedClock(simulator(name).factor), Faults(seed=1), set(threading.enumerate())
     with started(name, faults, clock, folder) as device:
         before = handles(device)

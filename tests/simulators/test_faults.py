@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ledger import Ledger
 
 from simulators.bench import Bench, BenchSettings
 from simulators.faults import KINDS, Fault, Faults
@@ -73,7 +74,7 @@ def test_the_share_is_kept_and_the_same_seed_hurts_the_same(share, seed):
     )
 )
 def test_whatever_the_timetable_nothing_is_made_up_and_the_ledger_knows_all(timetable):
-    faults = Faults(timetable, remember=True)
+    faults = Ledger(timetable)
     leaving = [d for i in range(100) for d in faults.route(i / 100, [(i / 100, bytes([i]) * 36)])] + faults.route(
         99, []
     )

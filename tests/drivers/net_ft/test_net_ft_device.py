@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ledger import Ledger
 
 from drivers import deadline
 from drivers.calibration import Calibration
@@ -19,7 +20,7 @@ from drivers.net_ft.device import NetFtTransducer
 from drivers.net_ft.wire import NET_FT
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 from simulators.bench import Bench
-from simulators.faults import Fault, Faults
+from simulators.faults import Fault
 from simulators.net_ft_electronics import Electronics
 
 START = bytes.fromhex("1234 0002 00000000")
@@ -149,7 +150,7 @@ FAULTS = st.lists(
 @settings(max_examples=30, deadline=None)
 @given(timetable=FAULTS, seed=st.integers(0, 1000))
 def test_every_reading_is_received_or_named_as_lost_whatever_befalls_it(timetable, seed):
-    faults = Faults(timetable, seed=seed, remember=True)
+    faults = Ledger(timetable, seed=seed)
     box = Electronics(Bench(seed), faults, rate=200, first_tick=0)
     for k in range(200):
         faults.route(k / 200, [(k / 200, struct.pack(">I", k + 1) + box.readings([35 * k])[0])])

@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from hostile_devices import web
+from ledger import Ledger
 
 from drivers import links
 from drivers.catalog import open_transducer, reachable
@@ -54,7 +55,7 @@ def test_a_stream_in_real_time_arrives_whole(box, rate):
 def test_7000_readings_a_second_are_each_received_or_named_as_lost_over_a_bad_network(box):
     timetable = [Fault("lose", 0.3, 0.6, 0.1), Fault("reorder", 0.3, 1.0, 0.05), Fault("repeat", 0.3, 0.8, 0.1)]
     timetable += [Fault("corrupt", 0.4, 0.9, 0.05), Fault("shorten", 0.4, 0.9, 0.05), Fault("unplug", 1.2, 1e6)]
-    faults = Faults(timetable, seed=3, remember=True)
+    faults = Ledger(timetable, seed=3)
     one = box(clock=RealClock(), rate=7000, faults=faults)
     transducer = open_transducer(one.uri, RealClock())
     transducer.start()
