@@ -3,12 +3,15 @@
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import TypeVar
 from urllib.parse import parse_qsl, urlsplit
 
 from drivers.clock import Clock
 from drivers.deadline import Deadline
 from drivers.notation import number
 from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
+
+Word = TypeVar("Word", bound=str)
 
 
 class AddressError(SetupError):
@@ -32,6 +35,13 @@ class Address:
         if not (text.isascii() and text.isdecimal() and len(text) < 10 and lowest <= int(text) <= highest):
             raise AddressError(f"{self.uri}: {option}={text} must be a whole number from {lowest} to {highest}")
         return int(text)
+
+    def word(self, option: str, words: tuple[Word, ...]) -> Word:
+        """Return an option that is one of `words`, the first where it is not given. Raises AddressError for another."""
+        text = self.options.get(option, words[0])
+        if text not in words:
+            raise AddressError(f"{self.uri}: {option}={text} must be {' or '.join(words)}")
+        return words[words.index(text)]
 
 
 def parse_address(uri: str) -> Address:

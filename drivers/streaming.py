@@ -1,5 +1,6 @@
 """A transducer that streams records without full numbers: thread, times, loss, return. A `Conversation` runs it."""
 
+import contextlib
 import math
 import time
 from collections import deque
@@ -65,7 +66,7 @@ class Conversation(Protocol):
         ...
 
     def end(self, link: Link) -> None:
-        """Bring the stream to an end within 0.1 s."""
+        """Bring the stream to an end within 0.1 s. Raises LinkLost when the device is gone, and streams no more."""
         ...
 
     def decoder(self) -> RecordDecoder:
@@ -106,10 +107,15 @@ def measured_rate(
             if alike or deadline.remaining <= 0.0:
                 break
     finally:
-        conversation.end(Deadline(ENDING).bound(link))
+        _end(conversation, link)
     if math.isnan(rate):
         raise LinkLost("it sends no readings when asked to stream; switch it off and on, and check the cable")
     return rate
+
+
+def _end(conversation: Conversation, link: Link) -> None:
+    with contextlib.suppress(LinkLost):
+        conversation.end(Deadline(ENDING).bound(link))
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +216,7 @@ class StreamingTransducer(ThreadedTransducer):
             try:
                 self._listen(link, self._decoder, first)
             finally:
-                self._conversation.end(Deadline(ENDING).bound(link))
+                _end(self._conversation, link)
         finally:
             link.close()
 

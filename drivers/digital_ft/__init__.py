@@ -112,14 +112,11 @@ def _info(place: _Where, stored: wire.StoredCalibration, status: int | None, mea
 
 def _where(address: Address) -> _Where:
     check_options(address, _OPTIONS)
-    parity = address.options.get("parity", "even")
-    if parity not in ("even", "none"):
-        raise SetupError(f"{address.uri}: parity={parity} must be even, as the transducer's, or none")
     return _Where(
         address,
         port_of(address),
         address.number("baud", 1_250_000, 300, 4_000_000),
-        parity,
+        address.word("parity", ("even", "none")),
         address.number("calibration", 1, 1, wire.CALIBRATIONS),
     )
 
@@ -165,11 +162,10 @@ class _DigitalConversation:
         return response.partition(started)[2]
 
     def end(self, link: Link) -> None:
-        with contextlib.suppress(LinkLost):  # whoever is gone streams no more
-            link.send(wire.JAM)
-            deadline = time.monotonic() + _END
-            while time.monotonic() < deadline and link.receive(_SILENT) is not None:
-                pass
+        link.send(wire.JAM)
+        deadline = time.monotonic() + _END
+        while time.monotonic() < deadline and link.receive(_SILENT) is not None:
+            pass
 
 
 def hold(link: Link) -> int:

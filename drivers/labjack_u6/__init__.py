@@ -168,12 +168,11 @@ class _GaugeConversation:
 
     def end(self, link: Link) -> None:
         """Let the stream end and drop what it had still sent."""
-        with contextlib.suppress(LinkLost):  # whoever is gone streams no more
-            code = wire.normal_error(_reply(link, wire.STOP), 0xB1)
-            if code not in (0, wire.STREAM_IS_OFF):
-                raise DeviceFault(f"the converter does not stop: {wire.meaning(code)}; pull its plug")
-            while link.receive(0.002):
-                pass
+        code = wire.normal_error(_reply(link, wire.STOP), 0xB1)
+        if code not in (0, wire.STREAM_IS_OFF):
+            raise DeviceFault(f"the converter does not stop: {wire.meaning(code)}; pull its plug")
+        while link.receive(0.002):
+            pass
 
 
 def _identity(link: Link) -> wire.Identity:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.address import Address, AddressError, Driver, check_options
+from drivers.address import Address, Driver, check_options
 from drivers.clock import Clock
 from drivers.deadline import Deadline
 from drivers.links import UdpLink, http_get, resolve, tcp_answer
@@ -19,7 +19,6 @@ from drivers.transducer import LinkLost, SetupError, TransducerInfo
 _AT_ONCE = 0.18  # for one web page while a stream is silent, and so for a stop [real s]
 _SETTLING = 0.05  # after a bias was asked for [real s]
 _OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
-_WORDS = {"mode": ("single", "buffered"), "bias": ("keep", "set"), "latch": ("keep", "reset")}  # the first: untold
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +26,14 @@ class _Where:
     """The address of a box and the settings that the address requests."""
 
     address: Address
-    host: str  # IPv4 address
     http_port: int
     rdt_port: int
     tcp_port: int
     rate: int | None  # requested in the address [Hz]; None leaves the box as it is
-    buffered: bool = False  # several records a datagram: fewer datagrams, later
-    set_bias: bool = False  # the load at opening reads as zero from then on
-    reset_latch: bool = False  # of the monitor condition
+    buffered: bool  # several records a datagram: fewer datagrams, later
+    set_bias: bool  # the load at opening reads as zero from then on
+    reset_latch: bool  # of the monitor condition
+    host: str  # its IPv4 address
 
 
 def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
@@ -60,23 +59,16 @@ def _where(address: Address, deadline: Deadline) -> _Where:
     check_options(address, _OPTIONS)
     if not address.host:
         raise SetupError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
-    chosen = {name: address.options.get(name, words[0]) for name, words in _WORDS.items()}
-    for name, word in chosen.items():
-        if word not in _WORDS[name]:
-            raise AddressError(f"{address.uri}: {name}={word} must be {' or '.join(_WORDS[name])}")
-    http, rdt, tcp = (
-        address.number(name, usual, 1, 65535) for name, usual in (("http", 80), ("rdt", 49152), ("tcp", 49151))
-    )
     return _Where(
         address,
-        resolve(address.host, deadline),
-        http_port=http,
-        rdt_port=rdt,
-        tcp_port=tcp,
+        http_port=address.number("http", 80, 1, 65535),
+        rdt_port=address.number("rdt", 49152, 1, 65535),
+        tcp_port=address.number("tcp", 49151, 1, 65535),
         rate=address.number("rate", 0, 1, int(COUNTER_RATE)) or None,
-        buffered=chosen["mode"] == "buffered",
-        set_bias=chosen["bias"] == "set",
-        reset_latch=chosen["latch"] == "reset",
+        buffered=address.word("mode", ("single", "buffered")) == "buffered",
+        set_bias=address.word("bias", ("keep", "set")) == "set",
+        reset_latch=address.word("latch", ("keep", "reset")) == "reset",
+        host=resolve(address.host, deadline),
     )
 
 

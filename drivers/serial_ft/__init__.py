@@ -125,9 +125,7 @@ def _is_simulated(address: Address, reply: str) -> bool:
 def _where(address: Address) -> _Where:
     check_options(address, _OPTIONS)
     port = port_of(address)
-    form = address.options.get("format", "binary")
-    if form not in ("binary", "ascii"):
-        raise SetupError(f"{address.uri}: format={form} must be binary or ascii")
+    form = address.word("format", ("binary", "ascii"))
     baud = address.number("baud", 0, 300, 921600)
     counts = [_above_zero(address, option) for option in ("counts_per_N", "counts_per_Nm")]
     if not np.all(np.isfinite(counts)):
@@ -190,15 +188,14 @@ class _ControllerConversation:
 
     def end(self, link: Link) -> None:
         """Let the stream end: any carriage return does it."""
-        with contextlib.suppress(LinkLost):  # whoever is gone streams no more
-            link.send(wire.RETURN)
-            deadline = time.monotonic() + _END
-            response = b""
-            while time.monotonic() < deadline:
-                data = link.receive(_SILENT)
-                if data is None and response.endswith(wire.PROMPT):
-                    break
-                response = data or response
+        link.send(wire.RETURN)
+        deadline = time.monotonic() + _END
+        response = b""
+        while time.monotonic() < deadline:
+            data = link.receive(_SILENT)
+            if data is None and response.endswith(wire.PROMPT):
+                break
+            response = data or response
 
     def _streaming(self, link: Link) -> bytes:
         """Ask for the stream, and return what follows the echo of the request."""
