@@ -74,7 +74,7 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(1423.4, 2), number(99.96, 2)
     ('0.00526', '–', '12.0', '1,423', '100')
     """
-    if value is None:
+    if value is None or not isfinite(value):
         return "–"
     value *= factor
     shown = f"{value:#.{digits}g}".rstrip(".")

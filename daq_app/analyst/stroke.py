@@ -98,9 +98,9 @@ class RawFile:
 def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBlock, place: str) -> RawReadings:
     """Return readings with the forces that they are, the mean of what came before contact taken off."""
     assert recording.info is not None  # there is a stroke, so there is a transducer
-    calibration, rate, onset = recording.info.calibration, recording.info.rate, stroke.onset
-    before = np.flatnonzero(block.time < (-np.inf if onset is None else onset))
-    free = before[-max(round(MOST_FOR_ZERO * rate), 1) :]
+    calibration, end = recording.info.calibration, -np.inf if stroke.onset is None else stroke.onset
+    before = np.flatnonzero((block.time < end) & (block.status == 0))
+    free = before[block.time[before] > block.time[before].max(initial=-np.inf) - MOST_FOR_ZERO]
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
     words = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)

@@ -127,7 +127,8 @@ class Terminal:
 
     def _parse_answer(self, line: str) -> steps.Event | None:
         """Return the answer that was typed; what a keyboard cannot tell stays open."""
-        number = float(line) if line.replace(".", "", 1).isdecimal() else None
+        text = line.replace(",", ".")  # as many keyboards have it
+        number = float(text) if text.replace(".", "", 1).isdecimal() else None
         if number is None and line != "-":
             return None
         match self._command:

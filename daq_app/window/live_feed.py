@@ -142,7 +142,7 @@ class LiveFeed:
         wrench = in_face_frame(live.wrench, frame)
         normal = -wrench[:, 2]
         tangential = np.hypot(wrench[:, 0], wrench[:, 1])
-        pressed = normal >= FLOOR
+        pressed = (normal >= FLOOR) & (live.status == 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(pressed, tangential / normal, np.nan)
         position = np.where(pressed[:, None], centre_of_pressure(wrench, frame.height), np.nan)

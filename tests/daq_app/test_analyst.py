@@ -20,9 +20,12 @@ from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_words, session_pictures, words_of
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
-from daq_app.analyst.stroke import APART, EDGES, decision_of, edges_of, history, reversal, within
+from daq_app.analyst.stroke import APART, EDGES, RawFile, decision_of, edges_of, history, reversal, within
 from daq_app.analyst.work import Work
+from sessions.recording import Recording
 from sessions.recording.derived import set_gain_error
+from sessions.report import findings
+from sessions.strokes import AnalysisSettings, analyse
 from sessions.strokes.decisions import Decision, Decisions, read
 from solver.prediction import Skin
 from tests.sessions.report_example import example
@@ -297,6 +300,17 @@ def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_wor
         np.testing.assert_array_equal(file["readings/raw"][first : last + 1], shown.raw)
         np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], shown.sequence)
         np.testing.assert_array_equal(file["readings/counter"][first : last + 1], shown.counter)
+
+
+def test_the_zero_of_shown_readings_is_that_of_the_last_moments_before_contact_whatever_the_rate_is_said_to_be():
+    recording = Recording.open(SESSION)
+    finding = findings(recording, analyse(recording, AnalysisSettings())).strokes[0]
+    shown = RawFile(recording).around(finding)
+    unknown = replace(recording, info=replace(recording.info, rate=float("nan")))
+    assert RawFile(unknown).around(finding).zero == shown.zero
+    free = (shown.time < finding.onset) & (shown.time > shown.time[shown.time < finding.onset][-1] - 0.3)
+    assert shown.zero == f"mean before contact, readings: {free.sum()}"
+    assert shown.normal[free].mean() == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_calibration_error_that_was_set_for_a_session_is_followed_in_its_window_too(tmp_path):

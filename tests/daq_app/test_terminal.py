@@ -47,6 +47,7 @@ def meant(command, line, *, forces=True):
     [
         (AskMount(TRIAL), "", StimulusMounted(TRIAL.stimulus.code)),
         (AskScore(TRIAL, ENDS), "37.5", Scored(37.5, input_device="keyboard")),
+        (AskScore(TRIAL, ENDS), "37,5", Scored(37.5, input_device="keyboard")),
         (AskScore(TRIAL, ENDS), "-", Scored(None, input_device="keyboard")),
         (AskScore(TRIAL, ENDS), "redo wrong finger", Redo("wrong finger")),
         (AskStroke(TRIAL), "abort ill", Abort("ill")),

@@ -1,5 +1,6 @@
 """What a translator fills in: whole, kept where it was done, and taken back by the program."""
 
+import json
 from xml.etree import ElementTree
 
 import pytest
@@ -72,3 +73,10 @@ def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
     capsys.readouterr()
     assert run(["translate", "--program", "--language", "nl", "--out", str(tmp_path / "none" / "nl.xlf")]) == 1
     assert "check its name" in capsys.readouterr().err
+
+
+def test_a_script_that_names_no_file_gets_the_text_in_the_document(capsys):
+    assert run(["translate", "--program", "--language", "nl", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["out"] is None
+    assert len(list(ElementTree.fromstring(told["text"]).iterfind(".//{*}trans-unit"))) == len(SubjectText)

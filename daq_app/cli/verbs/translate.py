@@ -62,7 +62,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
             raise RecordingError(
                 f"{options.out} cannot be written ({error.strerror}); {remedy(error, new=True)}"
             ) from error
-    console.result({"language": options.language, "missing": missing, "out": options.out and str(options.out)})
+    where = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
+    console.result({"language": options.language, "missing": missing, **where})
     console.note(f"texts yet to be translated: {missing}" if missing else "every text is translated")
     return DONE
 

@@ -70,6 +70,17 @@ def test_readings_the_device_calls_invalid_are_not_drawn():
     assert np.isfinite(channel(feed, "N")[:40]).all()
 
 
+def test_a_reading_that_the_device_calls_invalid_moves_no_speed():
+    feed = LiveFeed()
+    feed.device(INFO)
+    wrench, status = sliding(7000), np.zeros(7000, np.int64)
+    wrench[3000, 3:], status[3000] = 1e5, 2
+    feed.add(live(0, wrench, status=status), FRAME)
+    speed = channel(feed, "speed")
+    assert np.isnan(speed[3000:3300]).all()  # its mean of 50 ms holds the reading
+    assert speed[np.isfinite(speed)] == pytest.approx(25.0, rel=1e-6)
+
+
 def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
     feed = LiveFeed()
     feed.device(INFO)
