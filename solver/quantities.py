@@ -25,6 +25,15 @@ class Quantity:
     small: Callable[[LocalState], Array]
     finite: Callable[[LocalState], Array]
 
+    @property
+    def shown_unit(self) -> tuple[str, float]:
+        """Return the unit in which people read it, and a number in that by the one in `unit`.
+
+        >>> SED.shown_unit, SHEAR.shown_unit
+        (('kPa', 1000.0), ('1', 1.0))
+        """
+        return ("kPa", 1e3) if self.unit == "MPa" else ("1", 1.0)
+
 
 def _small_energy(at: LocalState) -> Array:
     """Return W = G eps:eps + lambda/2 theta^2 [MPa]."""

@@ -3,7 +3,7 @@
 Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger.
 """
 
-from sessions.prediction.options import BY_NAME, PredictionOptions, finger_in, shown_unit, with_own_finger
+from sessions.prediction.options import BY_NAME, PredictionOptions, finger_in, with_own_finger
 from sessions.prediction.scenes import Progress, part_of, predict
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from solver import Friction, Prediction, Scene
@@ -32,6 +32,5 @@ __all__ = [
     "finger_in",
     "part_of",
     "predict",
-    "shown_unit",
     "with_own_finger",
 ]

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from sessions.prediction import BY_NAME, SED, shown_unit
+from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import Ends
 from sessions.report.contents import Numbers, PredictionFinding
 from sessions.statistics.correlations import Relation
@@ -220,6 +220,6 @@ class ShownResponse:
 def shown_response(name: str) -> ShownResponse:
     """Return how texts describe the quantity of that name; the names are those of `solver.quantities`."""
     one = BY_NAME[name]
-    unit, factor = shown_unit(one)
+    unit, factor = one.shown_unit
     places, step = (3, "Pa") if unit == "kPa" else (4, "10⁻⁶")
     return ShownResponse(one.name, one.label, one.unit, unit, factor, places, step)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sessions.prediction import SED, Quantity, shown_unit
+from sessions.prediction import SED, Quantity
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.findings import (
     CARRY_OVER,
@@ -182,7 +182,7 @@ def response_term(quantity: Quantity) -> str:
     >>> response_term(SED)
     'SED [kPa]'
     """
-    return f"{quantity.label} [{shown_unit(quantity)[0]}]"
+    return f"{quantity.label} [{quantity.shown_unit[0]}]"
 
 
 def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *what: str) -> MixedModel | str:
@@ -198,7 +198,7 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *w
         return f"it takes three subjects with {own}, and {there}"
     columns = {
         INDEX: [row.index - 50.0 for row in rows],
-        response_term(quantity): [shown_unit(quantity)[1] * (row.response(quantity.name) or 0.0) for row in rows],
+        response_term(quantity): [quantity.shown_unit[1] * (row.response(quantity.name) or 0.0) for row in rows],
         FRICTION: [row.mu or 0.0 for row in rows],
         DRIFT: [float(row.place) for row in rows],
         CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],

@@ -35,6 +35,19 @@ def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_pa
     assert {"bone compliance", "viscosity", "the third dimension"} <= {line[:19].strip() for line in said.splitlines()}
 
 
+def test_solve_tells_people_stresses_in_kilopascal_at_the_ending_along_the_row_and_over_the_course(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE + '[solve]\ncourse = "history"\n')
+    assert run(["solve", str(scene), "--row", "1.9", "--json"]) == 0
+    document = printed(capsys)
+    assert run(["solve", str(scene), "--row", "1.9"]) == 0
+    said = capsys.readouterr().out
+    assert "MPa" not in said
+    expected = f"{1e3 * document['sed_ending']:.3f}"
+    lines = [line for line in said.splitlines() if line.startswith("SED ")]
+    assert sum(f" {expected} ± " in line for line in lines) == 3  # at the ending, and twice over the course
+
+
 def test_a_tolerance_that_no_mesh_meets_gives_the_best_answer_its_interval_a_warning_and_exit_code_3(
     tmp_path, capsys, monkeypatch
 ):

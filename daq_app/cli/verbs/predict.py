@@ -30,16 +30,15 @@ from daq_app.wording import number, span
 from sessions.prediction import (
     BY_NAME,
     PredictionOptions,
-    Quantity,
     SessionPrediction,
     TrialPrediction,
     finger_in,
-    shown_unit,
 )
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
 from sessions.prediction.sealed_predictions import SEAL, seal_prediction
 from sessions.prediction.stored import Alternative, SedInterval
 from sessions.prediction.surface_series import other_signs
+from solver.prediction import percent
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 
@@ -89,7 +88,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({**prediction.to_dict(), **seal, **firing})
     console.say(recording.simulated_sentence)
     quantity = BY_NAME[options.quantity]
-    unit, _ = shown_unit(quantity)
+    unit, factor = quantity.shown_unit
     head = ["trial", "surface", "mu", "tau_max [kPa]", f"{quantity.label} [{unit}]", "error"]
     rows = [
         [
@@ -97,7 +96,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             "–" if row.stimulus is None else row.stimulus.display_name,
             number(row.mu),
             number(row.tau_max, factor=1e3),
-            *_response(row, quantity),
+            *_response(row, quantity.name, factor),
             number(row.normal_force),
             number(row.measured_normal),
             number(row.matching_depth),
@@ -136,13 +135,12 @@ def _print_once(console: Console, sentences: Iterable[tuple[str, str]]) -> None:
     console.say(*(f"{', '.join(names)}: {sentence}" for sentence, names in by_sentence.items()))
 
 
-def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
-    """Return the value of a quantity at the ending, stresses in kPa, and its relative error."""
-    if quantity.name not in row.responses:
+def _response(row: TrialPrediction, name: str, factor: float) -> tuple[str, str]:
+    """Return the value of a quantity at the ending, times a factor, and its relative error."""
+    if name not in row.responses:
         return "–", "–"
-    value, error = row.responses[quantity.name]
-    share = f"{100 * error / abs(value):.2g} %" if value else "–"
-    return number(value, 4, factor=1e3 if quantity.unit == "MPa" else 1.0), share
+    value, error = row.responses[name]
+    return number(value, 4, factor=factor), percent(error / abs(value)) if value else "–"
 
 
 def _print_variants(prediction: SessionPrediction, console: Console) -> None:

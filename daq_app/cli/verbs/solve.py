@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from daq_app.console import DONE, FLAWED, STOPPED, Console, WrongValue, table
 from daq_app.wording import number
-from solver.quantities import NAMES, QUANTITIES, Quantity
+from solver.quantities import NAMES, QUANTITIES, SED
 
 if TYPE_CHECKING:
     from solver import Prediction, Receptor, Scene
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
+UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (one.shown_unit for one in QUANTITIES)]
+# What a course tells beside the quantities, and the units of both.
 COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
+COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *UNITS]
 AUDITS = {
     "equilibrium_x": "forces along the surface are out of balance by",
     "equilibrium_y": "forces across the surface are out of balance by",
@@ -85,7 +88,8 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
     console.say(title)
     corrected = ["corrected", number(prediction.sed_ending_corrected, 5, factor=1e3), "kPa", ""]
-    shift = ["sideways shift", number(prediction.shift, 4), "mm", _length(plain["shift_error"])]
+    off = "–" if plain["shift_error"] is None else f"{number(plain['shift_error'], 2)} mm"
+    shift = ["sideways shift", number(prediction.shift, 4), "mm", off]
     rows = [
         ["SED at the ending", number(prediction.sed_ending, 5, factor=1e3), "kPa", _percent(plain["error_estimate"])],
         *([corrected] if prediction.nested else []),
@@ -102,16 +106,19 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     ]
     console.say(table(rows, head=["", "", "", "error, estimated"]))
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
-    responses = [_response(one, *prediction.responses[one.name]) for one in QUANTITIES]
-    console.say(table(responses, head=["", "", "", "error, estimated"]).lstrip("\n"))
+    responses = [
+        [one.label, _with_error(*prediction.responses[one.name], factor), unit]
+        for one, (unit, factor) in zip(QUANTITIES, UNITS, strict=True)
+    ]
+    console.say(table(responses, head=["", "", ""]).lstrip("\n"))
     if course is not None:
         _say_course(*course, console)
     if row is not None and deep is not None:
         from solver.prediction import ROW
 
-        console.say(f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; MPa, shares):")
+        console.say(f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; kPa, shares):")
         cells = [
-            [_with_error(*pair) for pair in zip(*pairs, strict=True)]
+            [_with_error(*pair, factor) for pair, (_, factor) in zip(zip(*pairs, strict=True), UNITS, strict=True)]
             for pairs in zip(row.values.T, row.errors.T, strict=True)
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
@@ -156,7 +163,6 @@ def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[s
 
 def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
     labels = [*COURSE, *(one.label for one in QUANTITIES)]
-    units = ["MPa", "MPa", "N/mm", "N/mm", "mm", *(one.unit for one in QUANTITIES)]
     ends = "At the ends of the press, of the break-away (full slip) and of the slide:"
     paces = "Mean rates in the press, the break-away and the slide:"
     parts = (
@@ -165,8 +171,10 @@ def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Cons
     )
     for title, values, off, names, per in parts:
         lines = [
-            [name, *(_with_error(*pair) for pair in zip(value, error, strict=True)), f"{unit}{per}"]
-            for name, value, error, unit in zip(names, values.T, off.T, units[-len(names) :], strict=True)
+            [name, *(_with_error(*pair, factor) for pair in zip(value, error, strict=True)), f"{unit}{per}"]
+            for name, value, error, (unit, factor) in zip(
+                names, values.T, off.T, COURSE_UNITS[-len(names) :], strict=True
+            )
         ]
         console.say(f"\n{title}")
         console.say(table(lines, head=["", "press", "break-away", "slide", ""]).lstrip("\n"))
@@ -178,8 +186,8 @@ def _none(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _with_error(value: float, error: float) -> str:
-    return "–" if not isfinite(value) else f"{number(value, 4)} ± {number(_none(error), 2)}"
+def _with_error(value: float, error: float, factor: float) -> str:
+    return f"{number(value, 4, factor=factor)} ± {number(error, 2, factor=factor)}" if isfinite(value) else "–"
 
 
 def _row(prediction: "Prediction", receptor: "Receptor | None") -> "Row | None":
@@ -196,15 +204,6 @@ def _row_in_json(row: "Row") -> dict[str, object]:
         {name: [_none(one) for one in line] for name, line in zip(NAMES, table.tolist(), strict=True)} for table in row
     )
     return {"arc": ROW.tolist(), **values, "errors": errors}
-
-
-def _response(quantity: Quantity, value: float, error: float) -> list[str]:
-    factor, unit = (1e3, "kPa") if quantity.unit == "MPa" else (1.0, "")
-    return [quantity.label, number(value, 4, factor=factor), unit, number(error, 2, factor=factor)]
-
-
-def _length(error: float | None) -> str:
-    return "–" if error is None else f"{number(error, 2)} mm"
 
 
 def _percent(part: float | None) -> str:

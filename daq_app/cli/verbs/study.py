@@ -83,7 +83,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         SURFACES,
         options.studies,
         options.seed,
-        lambda part: console.progress(part, f"{part:.0%} of the designs"),
+        lambda part: console.progress(part, "designs"),
     )
     recoveries = _recovery(options, planted, console)
     designs = [{**asdict(one), "power": one.share} for one in powers]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
-from sessions.prediction import BY_NAME, Quantity, shown_unit
+from sessions.prediction import BY_NAME, Quantity
 from sessions.report.tables import Cell, Notes, Row, Table, range_cell, table
 from sessions.report.trials import model_in_short
 from sessions.report.wording import NONE, digits, p_value, places, plural, sed, significant, tau, three_figures
@@ -88,7 +88,7 @@ def _fit_text(model: MixedModel) -> str:
 
 
 def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
-    first, (unit, _) = model.terms[1].name, shown_unit(quantity)
+    first, (unit, _) = model.terms[1].name, quantity.shown_unit
     units = {response_term(quantity): f"points per {unit}", **UNITS}
     middle = f"{digits(model.middle, 3)} {unit}" if first != INDEX else f"index {digits(50 + model.middle, 1)}"
 
