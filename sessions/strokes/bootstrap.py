@@ -248,15 +248,13 @@ class _Repeats:
             return {}
         curve = self._curve
         inside = (curve.time >= steady[0]) & (curve.time <= steady[1]) & np.isfinite(curve.ratio)
-        columns = np.column_stack(
-            [curve.ratio, 1.0 / curve.normal, curve.time, curve.position, curve.normal, curve.tangential, curve.force]
-        )
+        parts = (curve.ratio, 1.0 / np.where(inside, curve.normal, 1.0), curve.time, curve.position, curve.normal)
+        window = np.column_stack([*parts, curve.tangential, curve.force])[inside]
         length = max(1, round(settings.block / self._step))
-        window = columns[inside]
         count = len(window) // length
         if count < settings.fewest_blocks:
             return {}
-        blocks = window[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
+        blocks = window[: count * length].reshape(count, length, window.shape[1]).mean(axis=1)
         positions, weight, own = self._sample(count)
         sample = blocks[positions]  # (repeats, blocks, 9)
         total = weight.sum(axis=1)

@@ -45,11 +45,6 @@ class SignalQuality:
     dead: tuple[str, ...]  # axes that never moved
     flaws: tuple[tuple[FlawName, str, Grade], ...]
 
-    @property
-    def refused(self) -> bool:
-        """Say whether nothing of the block may be analysed."""
-        return any(grade == "refused" for _, _, grade in self.flaws)
-
 
 def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> SignalQuality:
     """Judge a block of at least two readings."""

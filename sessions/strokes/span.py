@@ -198,8 +198,9 @@ def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
     else:
         origin, flaw = f"unloaded after contact, {zero.when}", FlawName.ZERO_AFTER_CONTACT
     unsure = _unsure(span, contact, idle, level, drift)
-    part = (span.time >= zero.start) & (span.time <= zero.stop)
-    filtered = np.nanstd(span.smooth[part, :3], axis=0)
+    part = span.smooth[(span.time >= zero.start) & (span.time <= zero.stop), :3]
+    part = part[np.isfinite(part).all(axis=1)]
+    filtered = part.std(axis=0) if len(part) > 1 else zero.noise[:3]
     return StrokeZero(level, zero.noise, filtered, zero.stop - zero.start, error, origin, drift, unsure, flaw)
 
 
@@ -261,8 +262,9 @@ def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
 
 
 def mean_vector(vectors: Array) -> Array:
-    """Return the mean (k,) of vectors (n, k), leaving out nan."""
-    return np.asarray(np.nanmean(vectors, axis=0), np.float64)
+    """Return the mean (k,) of vectors (n, k), leaving out nan; nan of none."""
+    finite = vectors[np.isfinite(vectors).all(axis=1)]
+    return finite.mean(axis=0) if len(finite) else np.full(vectors.shape[1], np.nan)
 
 
 def _speed(time: Array, position: Array, span: Span) -> Array:

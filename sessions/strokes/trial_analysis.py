@@ -92,13 +92,17 @@ class TrialAnalysis(NamedTuple):
 
 def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContext) -> TrialAnalysis:
     """Find and measure the strokes in the readings of a trial, and the presses among them."""
-    settings = context.settings
-    if len(block) < settings.detector.baseline_readings:
+    settings, fewest = context.settings, context.settings.detector.baseline_readings
+    if len(block) < fewest:
         sentence = f"Only {len(block)} readings: too few for a stroke."
         return TrialAnalysis(flaws=(Flaw(FlawName.NO_STROKE, sentence, "refused"),))
     quality = signal_quality(block, context.info, settings)
     flaws = [Flaw(name, sentence, grade) for name, sentence, grade in quality.flaws]
-    if quality.refused:
+    usable, refused = int(quality.good.sum()), any(flaw.grade == "refused" for flaw in flaws)
+    if usable < fewest and not refused:
+        sentence = f"Only {usable} of {len(block)} readings can be used: too few for a stroke."
+        flaws.append(Flaw(FlawName.NO_STROKE, sentence, "refused"))
+    if usable < fewest or refused:
         return TrialAnalysis(flaws=tuple(flaws))
     span = span_of(block, quality, context.info.calibration, context.plan.frame, settings)
     zero = _common_zero(span, context)

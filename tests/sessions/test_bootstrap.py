@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import test_planted_truth as planted_truth
+from made_strokes import PLAIN, T, analysed, block, felt
 
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
 from sessions.strokes.event_uncertainty import onset_draws
@@ -42,6 +43,15 @@ def test_every_number_lies_in_its_interval(strokes):
             low, high = getattr(found, name)
             assert low < getattr(stroke, name) < high
         assert found.onset[0] < stroke.onset <= found.onset[1]
+
+
+def test_losses_that_leave_the_zero_no_filtered_reading_leave_the_intervals():
+    kept = np.flatnonzero(((T > 1.0) & (T < 3.0)) | (np.arange(len(T)) % 8 > 0))  # elsewhere seven at a time
+    stroke = analysed(block(T[kept], felt(PLAIN)[kept], sequence=kept)).strokes[0]
+    found = stroke_intervals(stroke, 0)
+    for name in (*NUMBERS, *FORCES):
+        low, high = getattr(found, name)
+        assert low < getattr(stroke, name) < high
 
 
 def test_of_a_calibration_alone_tau_max_has_the_closed_form(strokes):

@@ -219,6 +219,13 @@ def test_a_flaw_withholds_what_it_says_and_leaves_the_rest(name):
     assert all(not flaw.sentence[0].islower() and flaw.sentence.endswith(".") for flaw in analysis.flaws)
 
 
+def test_a_trial_of_which_no_reading_can_be_used_has_no_stroke_and_says_so():
+    analysis = found(Case(block(T, felt(PLAIN) + 100.0)), trial())  # the rated force is 36 N
+    assert analysis.strokes == ()
+    assert {str(flaw.name) for flaw in analysis.flaws} == {"saturated", "no_stroke"}
+    assert "Only 0 of 800 readings can be used" in analysis.flaws[-1].sentence
+
+
 def test_counts_need_an_unloaded_stretch_to_show_even_a_contact():
     raw = felt(made(T, SWAYING, HALF, ALONG))[INSIDE] / np.diag(COUNTS.matrix)
     case = Case(block(T[INSIDE], raw), extra={"info": replace(INFO, calibration=COUNTS)})
