@@ -18,6 +18,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,9 @@ STEEPEST = 100.0  # slope by the spread of levels, beyond which any function is 
 _PSE, _SLOPE, _ORDER, _LAPSE, _SCATTER = range(5)
 _SAME = 1e-6  # difference of log likelihoods that makes none
 _PRECISE, _ENOUGH = 1e-15, 1e-9  # relative change of the likelihood that ends a search: estimate, end of an interval
-_SOME_SCATTER = 0.05  # theta from which a second search begins, since it may not leave an edge
+_SOME_SCATTER = 0.05  # theta from which a search begins, since it may not leave an edge
+_SLOPES = (0.5, 2.0, 8.0, 32.0)  # by the spread of levels, and shares of lapses, from which searches begin
+_LAPSES = (0.01, 0.1, 0.3)
 _DOUBLINGS = 12  # of a step away from the estimate, until the likelihood has dropped enough
 
 
@@ -151,15 +154,20 @@ class _Task:
         return binomial_deviance(self.k, self.n, self._chances(self.best)[0])
 
     def _search(self) -> tuple[Array, float]:
-        """Return the best parameters and their log likelihood, from starts with few lapses and with many."""
-        rough = special.ndtri((self.k + 0.5) / (self.n + 1.0))  # a straight line, were there neither lapses nor chance
-        slope = float(np.polyfit(self.x, rough, 1, w=np.sqrt(self.n))[0])
-        steep = math.copysign(max(abs(slope), 1.0 / self.reach), slope)
-        middle = float(np.mean(self.x)) - float(np.mean(rough)) / steep
-        optima = [
-            self._at({}, np.array([middle, times * slope, 0.0, lapse, 0.01]), _PRECISE)
-            for times, lapse in ((1.0, 0.01), (2.0, 0.15))
-        ]
+        """Return the best parameters and their log likelihood.
+
+        The likelihood has several maxima: of each steepness and share of lapses the likeliest of a grid is followed.
+        """
+        levels = np.unique(self.x)
+        places = np.concatenate([levels, (levels[1:] + levels[:-1]) / 2.0])
+        orders = (-0.5, 0.0, 0.5) if self.ordered else (0.0,)
+        optima: list[tuple[Array, float]] = []
+        for steep, lapse in product(_SLOPES, _LAPSES):
+            grid = [
+                np.array([place, way * steep / self.spread, order * self.spread, lapse, _SOME_SCATTER])
+                for place, way, order in product(places, (-1.0, 1.0), orders)
+            ]
+            optima.append(self._at({}, max(grid, key=lambda at: self._log_likelihood(at)[0]), _PRECISE))
         best, likelihood = max(optima, key=lambda one: one[1])
         step = self._at({_SLOPE: math.copysign(self.steepest, best[_SLOPE])}, best)
         return step if step[1] > likelihood - _SAME else (best, likelihood)

@@ -264,7 +264,7 @@ def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
 def mean_vector(vectors: Array) -> Array:
     """Return the mean (k,) of vectors (n, k), leaving out nan; nan of none."""
     finite = vectors[np.isfinite(vectors).all(axis=1)]
-    return finite.mean(axis=0) if len(finite) else np.full(vectors.shape[1], np.nan)
+    return np.asarray(finite.mean(axis=0) if len(finite) else np.full(vectors.shape[1], np.nan), np.float64)
 
 
 def _speed(time: Array, position: Array, span: Span) -> Array:

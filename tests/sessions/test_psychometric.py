@@ -70,6 +70,30 @@ def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelih
     assert found.log_likelihood + coefficient == pytest.approx(-best.fun, abs=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("answers", "at"),
+    [  # log ratio, chosen, presented, order; and pse, slope, order, lapse, theta that another search found
+        (
+            [(-0.449, 0, 4, 0), (-0.428, 0, 14, 0), (-0.381, 0, 8, 0), (-0.302, 1, 9, 0), (-0.271, 0, 16, 0),
+             (0.055, 1, 7, 0)],
+            (0.43034, 2.72956, 0.0, 0.0, 1e-6),
+        ),
+        (
+            [(-0.484, 0, 19, 1), (-0.484, 0, 16, -1), (-0.134, 0, 8, 1), (-0.134, 3, 17, -1), (0.181, 12, 19, 1),
+             (0.181, 5, 14, -1), (0.251, 14, 14, 1), (0.251, 17, 17, -1), (0.401, 12, 14, 1), (0.401, 16, 16, -1)],
+            (0.181275, 270.713, 0.00131396, 0.0676787, 0.0577828),
+        ),
+    ],
+)  # fmt: skip
+def test_of_several_maxima_the_greatest_is_found(answers, at):
+    pse, slope, order, lapse, theta = at
+    x, chosen, presented, side = np.array(answers).T
+    p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (x - pse + order * side))
+    there = stats.betabinom.logpmf(chosen, presented, p / theta, (1.0 - p) / theta).sum()
+    found = psychometric([Level(*one) for one in answers])
+    assert found.log_likelihood + np.log(special.binom(presented, chosen)).sum() >= there - 1e-5
+
+
 def test_an_end_of_an_interval_is_where_the_likelihood_adjusted_for_three_fitted_parameters_has_dropped():
     def adjusted(at):  # of cells of 20 answers: correlated answers tell less by 1 + 19 times their correlation
         return lost(at, scattered()) - 1.5 * math.log(1.0 + 19.0 * at[3])
