@@ -32,17 +32,6 @@ DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a c
 
 
 @dataclass(frozen=True, slots=True)
-class _Case:
-    """One thing to predict: a planned trial, or a stroke of a recording without a plan."""
-
-    trial: Trial | None
-    block: Block | None
-    friction: FrictionParameters | None
-    number: int | None  # of its stroke
-    stroke: Stroke | None
-
-
-@dataclass(frozen=True, slots=True)
 class ModelInput:
     """The row and the scene of one trial or stroke, before it is solved."""
 
@@ -56,16 +45,12 @@ def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions)
     return {one.row.trial: one.scene for one in prepared if one.scene is not None and one.row.trial is not None}
 
 
-def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> list[ModelInput]:
-    """Return the model's input for every planned trial, or for every stroke where there is no plan."""
-    return [_model_input(case, options) for case in _cases(analysis, plan)]
-
-
-def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
+def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Iterator[ModelInput]:
+    """Yield the model's input for every planned trial, or for every stroke where there is no plan."""
     if not plan.blocks:
         by_stroke = {friction.stroke: friction for friction in analysis.friction}
-        for number, stroke in enumerate(analysis.strokes):
-            yield _Case(None, None, by_stroke.get(number), number, stroke)
+        for number in range(len(analysis.strokes)):
+            yield _model_input(analysis, number, by_stroke.get(number), options)
         return
     if not plan.forces:
         return
@@ -77,21 +62,27 @@ def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
         for trial in block.trials if block.phase == "main" else ():
             friction = of_trial.get(trial.number)
             number = first.get(trial.number) if friction is None else friction.stroke
-            stroke = None if number is None else analysis.strokes[number]
-            yield _Case(trial, block, friction, number, stroke)
+            yield _model_input(analysis, number, friction, options, trial, block)
 
 
-def _model_input(case: _Case, options: PredictionOptions) -> ModelInput:
-    """Return the model's input for one case, with the reason for every number that is missing."""
-    friction, stroke, trial = case.friction, case.stroke, case.trial
+def _model_input(
+    analysis: Analysis,
+    number: int | None,
+    friction: FrictionParameters | None,
+    options: PredictionOptions,
+    trial: Trial | None = None,
+    block: Block | None = None,
+) -> ModelInput:
+    """Return the model's input for the stroke of that number, with the reason for every number that is missing."""
+    stroke = None if number is None else analysis.strokes[number]
     direction = friction.direction if friction is not None else None
     if direction is None and trial is not None:
         direction = trial.direction
-    planned = None if case.block is None else case.block.indentation
+    planned = None if block is None else block.indentation
     row = TrialPrediction(
         trial=None if trial is None else trial.number,
-        stroke=case.number,
-        block=None if case.block is None else case.block.name,
+        stroke=number,
+        block=None if block is None else block.name,
         stimulus=None if trial is None else trial.stimulus,
         mu=None if friction is None else friction.mu,
         mu_rule="" if friction is None else friction.rule,
@@ -290,7 +281,7 @@ def predict(
     options make no scene, Cancelled where `progress` says so.
     """
     chosen = with_own_finger(options or PredictionOptions(), plan)
-    prepared, width = model_inputs(analysis, plan, chosen), template(chosen).finger.width
+    prepared, width = list(model_inputs(analysis, plan, chosen)), template(chosen).finger.width
     rows = [one.row for one in prepared]
     report: Watch = watch or (lambda _number, _row, _way: None)
     for number, one in enumerate(prepared):

@@ -113,8 +113,8 @@ def variants(choice: Literal["none", "small", "both"]) -> Iterator[Variant]:
         yield Variant(kinematics, "computed", "other way")
 
 
-_NOT_STORED = ("prediction", "opposite")  # of a row as plain data: all that the solver found
-_STORED_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
+_OPTIONAL = ("interval", "opposite_interval")  # of a row as plain data: absent where nobody asked for them
+_PARTS = ("stimulus", *_OPTIONAL)
 
 # Options as they were called until 2026-11-26, and what they are called now. Documents hold both names for one release.
 _RENAMED = {"beside": "variants", "beside_intervals": "variant_intervals"}
@@ -204,14 +204,12 @@ class TrialPrediction(TrialNumbers):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_NOT_STORED, *_STORED_OTHERWISE)}
-        row["stimulus"] = None if self.stimulus is None else asdict(self.stimulus)
+        row: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(TrialNumbers)}
+        row |= {name: asdict(row[name]) for name in _PARTS if row[name] is not None}
         row["reasons"] = dict(self.reasons)
         row["alternatives"] = [asdict(one) for one in self.alternatives]
-        optional = {"interval": self.interval, "opposite_interval": self.opposite_interval}
-        row |= {name: asdict(one) for name, one in optional.items() if one is not None}
         row["solver"] = None if self.prediction is None else self.prediction.to_dict()
-        return row
+        return {name: value for name, value in row.items() if value is not None or name not in _OPTIONAL}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -41,7 +41,6 @@ from sessions.prediction.stored import (
 )
 from sessions.strokes import Analysis
 from sessions.strokes.bootstrap import FrictionDraws, friction_draws
-from sessions.strokes.settings import BootstrapSettings
 from solver import Prediction, Scene
 from solver.response.nearby import Nearby
 
@@ -58,7 +57,6 @@ _QUANTILES = (0.025, 0.975)
 def with_intervals(
     analysis: Analysis,
     prediction: SessionPrediction,
-    settings: BootstrapSettings | None = None,
     progress: Progress | None = None,
     *,
     both_ways: bool = True,
@@ -71,7 +69,7 @@ def with_intervals(
     if not prediction.options.intervals:
         return prediction
     rows = prediction.trials
-    drawn = draws_of(analysis, prediction, settings)
+    drawn = draws_of(analysis, prediction)
     column: list[Prediction | str] = [row.prediction or _why(row, "sed") for row in rows]
     if both_ways:
         column += [row.opposite or _why(row, "opposite_sed") for row in rows]
@@ -84,19 +82,16 @@ def with_intervals(
     return replace(prediction, trials=trials)
 
 
-def draws_of(
-    analysis: Analysis, prediction: SessionPrediction, settings: BootstrapSettings | None = None
-) -> list[Drawn]:
+def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[Drawn]:
     """Return for each trial what its friction may have been in each repeat, or why that is not known."""
-    settings = settings or analysis.bootstrap
-    return [_draws(analysis, row, settings) for row in prediction.trials]
+    return [_draws(analysis, row) for row in prediction.trials]
 
 
-def _draws(analysis: Analysis, row: TrialPrediction, settings: BootstrapSettings) -> Drawn:
+def _draws(analysis: Analysis, row: TrialPrediction) -> Drawn:
     if row.stroke is None or row.mu is None or row.tau_max is None:
         return _why(row, "sed")
     rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
-    draws = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, settings)
+    draws = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, analysis.bootstrap)
     return "the stroke is too short for an interval of its friction" if draws is None else draws
 
 

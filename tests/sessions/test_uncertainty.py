@@ -19,6 +19,11 @@ from solver.response.nearby import By
 LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)
 
 
+def drawn_by(analysis, settings):
+    """Return the strokes of an analysis with other settings of the bootstrap."""
+    return SimpleNamespace(strokes=analysis.strokes, bootstrap=settings)
+
+
 @pytest.fixture(scope="module")
 def analysis():
     visit = planted_truth.visit(1)
@@ -36,7 +41,7 @@ def prediction(analysis):
 
 @pytest.fixture(scope="module")
 def intervals(analysis, prediction):
-    return [row.interval for row in with_intervals(analysis, prediction, LEVEL).trials]
+    return [row.interval for row in with_intervals(drawn_by(analysis, LEVEL), prediction).trials]
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +95,7 @@ def test_a_stickier_surface_has_the_wider_interval(intervals):
 
 def test_twice_the_error_of_calibration_makes_the_interval_nearly_twice_as_wide(analysis, prediction, intervals):
     alone = replace(prediction, trials=prediction.trials[:1])
-    doubled = with_intervals(analysis, alone, replace(LEVEL, gain_error=0.02)).trials[0].interval
+    doubled = with_intervals(drawn_by(analysis, replace(LEVEL, gain_error=0.02)), alone).trials[0].interval
     assert (doubled.high - doubled.low) / (intervals[0].high - intervals[0].low) == pytest.approx(2.0, rel=0.1)
 
 
@@ -115,7 +120,7 @@ def interval_of(analysis, prediction, monkeypatch, formula, by_mu=0.0, gain_erro
     slide = Made(formula, by_mu, row)
     monkeypatch.setattr(uncertainty, "slides", lambda found, _=None: iter([slide] * len(found)))
     alone = replace(prediction, trials=(row,))
-    return with_intervals(analysis, alone, replace(LEVEL, gain_error=gain_error)).trials[0].interval
+    return with_intervals(drawn_by(analysis, replace(LEVEL, gain_error=gain_error)), alone).trials[0].interval
 
 
 def test_where_the_sed_bends_draws_are_solved_and_missing_states_are_counted(analysis, prediction, monkeypatch):
@@ -213,7 +218,7 @@ FINITE = PredictionOptions(course="steady", kinematics="finite", intervals=True)
 def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     """Against each draw's own solve from nothing, on a mesh of its own."""
     analysis, plan = shallow(planted_truth.visit(1), number)
-    (row,) = with_intervals(analysis, predict(analysis, plan, FINITE), LEVEL).trials
+    (row,) = with_intervals(drawn_by(analysis, LEVEL), predict(analysis, plan, FINITE)).trials
     found, scene = row.interval, row.prediction.scene
     draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
@@ -232,7 +237,7 @@ def test_intervals_of_200_visits_hold_the_sed_of_the_friction_planted(kinematics
         gains = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         visit = planted_truth.visit(seed, BenchSettings(gains=tuple(gains)))
         analysis, plan = shallow(visit, 2)
-        (row,) = with_intervals(analysis, predict(analysis, plan, options), LEVEL, both_ways=False).trials
+        (row,) = with_intervals(drawn_by(analysis, LEVEL), predict(analysis, plan, options), both_ways=False).trials
         truth = visit.planted[1]
         (planted,) = solved([with_loads(row.prediction.scene, {"mu": truth.mu, "tau_max": truth.tau_max})])
         held.append(row.interval.low <= planted <= row.interval.high)
