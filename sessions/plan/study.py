@@ -362,7 +362,7 @@ def _reading(folder: Path) -> Generator[sqlite3.Connection]:
     path = folder / STUDY_FILE
     with name_failure(StudyError, f"{path} cannot be read", failures=DATABASE_FAILURES):
         path.open("rb").close()  # says why it cannot be read, which SQLite does not
-        address = f"{path.resolve().as_uri()}?mode=ro"
+        address = f"{path.resolve().as_uri()}?mode=rw"  # to undo a change that was cut short; for reading where it must
         with closing(limit_values(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
             yield connection
 

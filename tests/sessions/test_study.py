@@ -4,7 +4,9 @@ import errno
 import json
 import multiprocessing
 import shutil
+import sqlite3
 from collections import Counter
+from contextlib import closing
 from itertools import pairwise
 
 import pytest
@@ -102,6 +104,20 @@ def test_no_two_enrolled_subjects_ever_hold_the_same_place_and_no_place_stays_em
     held = [member.slot for member in members.values() if member.withdrawn is None]
     assert len(set(held)) == len(held)
     assert free_slot(list(members.values())) == min(set(range(len(held) + 1)) - set(held))
+
+
+def test_an_enrolment_that_was_cut_short_is_undone_and_the_study_goes_on(folder, tmp_path):
+    enrol(folder, "P01", Body())
+    with closing(sqlite3.connect(folder / "study.sqlite", isolation_level=None)) as connection:
+        connection.execute("PRAGMA cache_size=1")  # changes go to the file before the commit
+        connection.execute("BEGIN IMMEDIATE")
+        connection.executemany(
+            "INSERT INTO events VALUES (?, 'now', 'enrolled', 'P02', ?)", [(9 + n, "x" * 5000) for n in range(50)]
+        )
+        killed = shutil.copytree(folder, tmp_path / "killed" / "study")
+    assert (killed / "study.sqlite-journal").exists()
+    assert list(open_study(killed).members) == ["P01"]
+    assert enrol(killed, "P02", Body()).slot == 1
 
 
 def test_of_two_programs_that_make_one_study_at_once_one_is_refused_and_takes_nothing_away(tmp_path, monkeypatch):
