@@ -64,9 +64,9 @@ def without_home(address: str) -> str:
     'nidaq://Dev1?cal=~/FT12345.cal'
     """
     home = str(Path.home())
-    for spelling in (home, quote(home, safe=""), quote(home)):
-        if len(spelling) > 1:  # and ends there: /home/anna is not below /home/ann
-            address = re.sub(rf"{re.escape(spelling)}(?![\w.-])", "~", address)
+    for spelling in (home, quote(home, safe=""), quote(home)) if len(home) > 1 else ():
+        # It ends there: /home/anna is not below /home/ann.
+        address = re.sub(rf"{re.escape(spelling)}(?![\w.-])", "~", address)
     return address
 
 

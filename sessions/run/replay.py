@@ -26,7 +26,6 @@ from sessions.run.steps import Command, Event
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
 PART = 16_384  # readings written at once
-LATER = TELL_LOSSES  # written by sealing and the like, not by the course
 Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
 
 
@@ -60,7 +59,7 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
 
 def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
     """Yield a sentence for each event that came out otherwise, is new, or came no more."""
-    then, now = ([event for event in events.events if event.kind not in LATER] for events in (recorded, replayed))
+    then, now = ([event for event in events.events if event.kind not in TELL_LOSSES] for events in (recorded, replayed))
     matcher = SequenceMatcher(None, [_key(event) for event in then], [_key(event) for event in now], autojunk=False)
     for what, i, i_end, j, j_end in matcher.get_opcodes():
         if what == "equal":
@@ -84,7 +83,7 @@ class _Rewriter(FleetingWriter):
 
     def follow(self, recording: Recording) -> None:
         """Begin to follow `recording`."""
-        self._later = [event for event in recording.events if event.kind in LATER]
+        self._later = [event for event in recording.events if event.kind in TELL_LOSSES]
         self._log: Sequence[LoggedEvent] = ()
         self._cut = False
         self._next_event = 0
@@ -295,7 +294,7 @@ def _run(
     recording: Recording, clock: _RecordedClock, writer: _Rewriter, speed: float | None, progress: Progress
 ) -> None:
     """Let the runner conduct the session once more, part by part."""
-    logs = parts([event for event in recording.events if event.kind not in LATER])
+    logs = parts([event for event in recording.events if event.kind not in TELL_LOSSES])
     readings = RecordedReadings(recording.blocks())
     try:
         for number, log in enumerate(logs):
@@ -343,10 +342,10 @@ class _RecordedSeam(Seam):
 
 def _copy(recording: Recording, writer: _Rewriter) -> None:
     """Hand the readings over once more, and write each event where it stood."""
-    writer.follow_part([event for event in recording.events if event.kind not in LATER])
+    writer.follow_part([event for event in recording.events if event.kind not in TELL_LOSSES])
     readings = RecordedReadings(recording.blocks())
     for event in recording.events:
-        if event.kind not in LATER:
+        if event.kind not in TELL_LOSSES:
             writer.readings(readings.up_to(event.readings))
             writer.event(event.kind, event.trial, event.data)
     writer.readings(readings.up_to(None))

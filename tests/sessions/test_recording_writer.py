@@ -119,6 +119,8 @@ def test_the_users_home_is_no_part_of_an_address_and_another_folder_that_begins_
     assert without_home("nidaq://Dev1?cal=/home/ann/a.cal") == "nidaq://Dev1?cal=~/a.cal"
     assert without_home("nidaq://Dev1?cal=%2Fhome%2Fann%2Fa.cal") == "nidaq://Dev1?cal=~%2Fa.cal"
     assert without_home("nidaq://Dev1?cal=/home/anna/a.cal") == "nidaq://Dev1?cal=/home/anna/a.cal"
+    monkeypatch.setattr(Path, "home", lambda: Path("/"))  # of a service
+    assert without_home("nidaq://Dev1?cal=%2F") == "nidaq://Dev1?cal=%2F"
 
 
 # ---- the bytes are those the format page tells
