@@ -16,7 +16,7 @@ changes are added as squares.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import ceil
 from typing import NamedTuple
 
@@ -232,6 +232,22 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
         tangential=None if dragged else estimates.tangential if rubs else 0.0,
         indentation=estimates.indentation if by_force else None,
         shift=estimates.shift if dragged else None,
+    )
+
+
+TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
+
+
+def untried(scene: Scene) -> str:
+    """Return a warning where neighbouring tissues differ more in stiffness than in trials of the estimates, else ""."""
+    names = ("epidermis", "dermis", "fat")
+    pairs = [pair for one, other in pairwise(names) for pair in ((one, other), (other, one))]
+    ratio, stiff, soft = max((scene.materials.of(a).E / scene.materials.of(b).E, a, b) for a, b in pairs)
+    if ratio <= TRIED_RATIO:
+        return ""
+    return (
+        f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials up "
+        f"to {TRIED_RATIO:.0f} times; beyond, errors of up to four times the estimate were seen."
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.accuracy.error_estimate import untried
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
@@ -39,6 +40,7 @@ class Estimate:
     doubt: float  # of the truth, relative
     corrected: float | None = None  # error of the value on the nested mesh, relative
     towards: bool = False  # whether this value lies on the truth's side of the answer
+    warned: bool = False  # whether the answer says that no trial holds for its estimate
 
     @property
     def above(self) -> bool | None:
@@ -147,6 +149,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
         row = Estimate(
             answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
             float(doubt[place]), off and abs(off), off is not None and error * (error - off) > 0.0,
+            bool(untried(answer.scene)),
         )  # fmt: skip
         rows.append(row)
     return rows

@@ -192,3 +192,15 @@ def test_skin_so_stiff_that_one_node_touches_is_estimated_by_contact_that_grows_
     truth = fine_numbers([scene])[:, 0, 0]
     off = abs(found.sed_ending / truth.mean() - 1.0)
     assert off <= found.error_estimate < 10.0 * max(off, 2e-4)
+
+
+@pytest.mark.parametrize(
+    ("dermis", "words"),
+    [(0.08, ""), (3.4, ""), (68.0, "dermis is 2,000 times as stiff as the fat"), (1e-4, "epidermis is 1,400 times")],
+)
+def test_an_answer_warns_where_no_trial_of_the_estimates_had_tissues_so_different(dermis, words):
+    materials = Materials(dermis=Material(dermis, 0.48))
+    found = solve(Scene(materials=materials, friction=Friction(0.3), loading=Loading(0.5, "+x")))
+    said = [warning for warning in found.warnings if "times as stiff" in warning]
+    assert len(said) == bool(words)
+    assert words in "".join(said)

@@ -45,6 +45,7 @@ def test_an_estimate_below_the_true_error_is_counted_and_named_and_one_in_doubt_
 
 def test_a_tolerance_that_is_said_to_be_met_and_is_not_counts_as_missed_unsaid():
     assert cells(estimate(0.009, 0.02), estimate(0.009, 0.003), estimate(0.02, 0.03))["missed unsaid"] == "1 of 2"
+    assert cells(estimate(0.009, 0.02, warned=True), estimate(0.009, 0.003))["missed unsaid"] == "0 of 2"
 
 
 def test_ratio_and_rank_are_those_of_estimates_by_errors():

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
-import numpy as np
+from scipy.stats import spearmanr
 
 from solver.verification.estimates import Estimate
 from solver.verification.truth import NUMBERS
@@ -35,9 +35,9 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         str(len(sed)),
         *(_share([bool(row.above) for row in column]) for column in by_number),
         _share([row.near for row in sed if row.near is not None]),
-        f"{sum(not row.met for row in within)} of {len(within)}",
+        f"{sum(not row.met and not row.warned for row in within)} of {len(within)}",
         f"{median(ratios):.1f}" if ratios else "–",
-        f"{_rank_correlation([row.estimate for row in sed], [row.error for row in sed]):.2f}" if len(sed) > 2 else "–",
+        f"{spearmanr([(row.estimate, row.error) for row in sed]).statistic:.2f}" if len(sed) > 2 else "–",
         _share([bool(row.towards) for row in true]),
         f"{median(halves):.2f}" if halves else "–",
     )
@@ -45,11 +45,6 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
 
 def _share(verdicts: Sequence[bool]) -> str:
     return f"{100.0 * sum(verdicts) / len(verdicts):.0f} %" if verdicts else "–"
-
-
-def _rank_correlation(one: Sequence[float], other: Sequence[float]) -> float:
-    ranks = [np.argsort(np.argsort(values)) for values in (one, other)]
-    return 1.0 - 6.0 * float(np.sum((ranks[0] - ranks[1]) ** 2)) / (len(one) * (len(one) ** 2 - 1))
 
 
 def misses(rows: Iterable[Estimate]) -> Iterator[str]:
