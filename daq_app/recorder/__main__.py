@@ -73,7 +73,7 @@ class Recorder:
                 self._session(lambda: resume(request, self._bench, self._clock))
             case m.Stop() | m.Shutdown():
                 self._inbox.answer_stop()
-                self._bench.end_tare()
+                self._bench.end_tare("stopped by the user")
             case _:
                 raise NotNow("no session is running")
 

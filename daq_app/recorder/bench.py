@@ -115,11 +115,11 @@ class Bench:
             raise NotNow(f"a zero is measured over 0.1 to 60 s, not {duration:g} s")
         self._tare = _Tare(duration)
 
-    def end_tare(self) -> None:
+    def end_tare(self, why: str) -> None:
         """Give up a tare under way."""
         if self._tare is not None:
             self._tare = None
-            self._send(Failed("Tare", "the zero was not measured: stopped by the user", "NotNow"))
+            self._send(Failed("Tare", f"the zero was not measured: {why}", "NotNow"))
 
     def stream(self) -> None:
         """Begin to show what is measured, unless it is shown already. Raises NotNow when a stop broke it off."""
@@ -127,7 +127,7 @@ class Bench:
             try:
                 with _breakable(self.connected.transducer.info.uri):
                     self._start()
-            except (LinkLost, DeviceFault) as error:
+            except (LinkLost, DeviceFault, SetupError) as error:
                 self.lose(str(error))
             except NotNow:
                 self.disconnect()
@@ -135,7 +135,7 @@ class Bench:
 
     def lent(self, clock_offset_ns: int) -> Tap | None:
         """Return the transducer for a session whose clock is so far ahead, not streaming; None where there is none."""
-        self._tare = None
+        self.end_tare("a session began; zero again after it")
         if self.connected is None:
             return None
         self.connected.transducer.stop()
@@ -178,7 +178,7 @@ class Bench:
         self._display.device(opened.transducer.info)
 
     def _close(self) -> None:
-        self._tare = None
+        self.end_tare("the transducer is no longer connected")
         self.connected = None
         self._streaming = False
         self._display.device(None)

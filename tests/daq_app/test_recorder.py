@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from desk import DEADLINE, PACE, SHORT, Desk
 
+from daq_app.recorder.bench import Bench
 from daq_app.recorder.client import Recorder
+from daq_app.recorder.display import Display
 from daq_app.recorder.messages import (
     REPORTS,
     REQUESTS,
@@ -24,6 +26,8 @@ from daq_app.recorder.messages import (
     Failed,
     Gone,
     HealthReport,
+    LinkBack,
+    LinkDown,
     Live,
     NoDevice,
     People,
@@ -36,6 +40,8 @@ from daq_app.recorder.messages import (
     Tare,
     Tared,
 )
+from drivers.clock import RealClock
+from drivers.transducer import SetupError
 from sessions.recording import LoggedEvent, Recording
 from sessions.run.runner import Status
 from sessions.run.steps import (
@@ -280,6 +286,41 @@ def test_a_stop_with_nothing_in_hand_changes_nothing_and_during_a_tare_ends_that
         recorder.send(Stop())
         assert desk.until(Failed).sentence == "the zero was not measured: stopped by the user"
         desk.until(Live)
+
+
+@pytest.fixture
+def bench():
+    """A bench in this process on the simulated transducer, and what it reports."""
+    reports = []
+    made = Bench(RealClock(), Display(reports.append, 1.0), reports.append)
+    made.connect("sim:?seed=7")
+    yield made, reports
+    made.disconnect()
+
+
+def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(bench):
+    made, reports = bench
+    made.begin_tare(60.0)
+    made.lent(0)
+    made.stream()
+    made.begin_tare(60.0)
+    made.lose("the cable is out")
+    words = [report.sentence.partition(": ")[2] for report in reports if isinstance(report, Failed)]
+    assert words == ["a session began; zero again after it", "the transducer is no longer connected"]
+
+
+def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_again(bench, monkeypatch):
+    made, reports = bench
+
+    def refuse():
+        raise SetupError("another program has it")
+
+    made.lent(0)
+    monkeypatch.setattr(made.connected.transducer, "start", refuse)
+    made.stream()
+    assert LinkDown("another program has it") in reports
+    while not any(isinstance(report, LinkBack) for report in reports):
+        made.look()
 
 
 def test_a_stop_breaks_off_a_connection_that_does_not_come_about():
