@@ -221,26 +221,18 @@ def calibration_file(folder: Path, serial: str) -> Path:
 
 
 RATE = 200.0  # readings a second
-MIDDLE = (0.3, 0.7)  # part of a stroke's slide in which it is hurt [-]
+MIDDLE = (0.3, 0.7)  # part of a stroke's slide that is lost or frozen [-]
 _SCALE = np.array([1e-6] * 3 + [1e-3] * 3)  # one count [N, N mm]
-
-
-@dataclass(frozen=True, slots=True)
-class Hurt:
-    """What goes wrong, by number of the stroke on the bench, from 1."""
-
-    lost: frozenset[int] = frozenset()  # readings of its middle never arrive
-    frozen: frozenset[int] = frozenset()  # the sensor repeats one reading through its middle
 
 
 class DirectTransducer:
     """The bench as a transducer without a wire; it reads whatever simulated time has brought, for studies in seconds.
 
-    Readings can be lost, and the sensor can freeze, in the middle of chosen strokes.
+    Readings never arrive, or repeat one, in the middle of a stroke: those of its number on the bench, from 1.
     """
 
-    def __init__(self, bench: Bench, clock: Clock, hurt: Hurt | None = None) -> None:
-        """Feel `bench`, whose time begins with the stream."""
+    def __init__(self, bench: Bench, clock: Clock, *, lost: int = 0, frozen: int = 0) -> None:
+        """Feel `bench`, whose time begins with the stream. Stroke `lost` is not whole, stroke `frozen` stands still."""
         calibration = Calibration(
             f"SIM{bench.seed}", "counts", np.diag(_SCALE), np.array(RATED), "of the simulated bench"
         )
@@ -249,7 +241,7 @@ class DirectTransducer:
         )
         self._bench = bench
         self._clock = clock
-        self._hurt = hurt or Hurt()
+        self._lost_stroke, self._frozen_stroke = lost, frozen
         self._began_ns: int | None = None
         self._stopped = False
         self._sent = 0
@@ -284,10 +276,13 @@ class DirectTransducer:
             self._clock.sleep(timeout)
         numbers = np.arange(self._sent, self._due, dtype=np.int64)
         self._sent += len(numbers)
-        kept = numbers[~self._is_lost(numbers / RATE)]
+        start, stop = self._middle(self._lost_stroke)
+        kept = numbers[(numbers / RATE < start) | (numbers / RATE >= stop)]
         self._lost += len(numbers) - len(kept)
         time = kept / RATE
-        counts = np.rint(self._bench.wrench(self._sampling_times(time)) / _SCALE)
+        start, stop = self._middle(self._frozen_stroke)
+        sampled = np.where((time >= start) & (time < stop), start, time)
+        counts = np.rint(self._bench.wrench(sampled) / _SCALE)
         received = self._began_ns + np.rint(time * 1e9).astype(np.int64)
         return ReadingBlock(kept, kept, np.zeros_like(kept), time, received, counts)
 
@@ -295,22 +290,11 @@ class DirectTransducer:
     def _due(self) -> int:
         return int(self.now() * RATE) + 1
 
-    def _is_lost(self, time: Array) -> NDArray[np.bool_]:
-        """Say of which instants (n,) [s] the reading never arrives."""
-        lost = np.zeros(len(time), np.bool_)
-        for start, stop in self._middles(self._hurt.lost):
-            lost |= (time >= start) & (time < stop)
-        return lost
-
-    def _sampling_times(self, time: Array) -> Array:
-        """Return the instants (n,) [s] of the readings that are returned for `time` (n,) [s]."""
-        at = time.copy()
-        for start, stop in self._middles(self._hurt.frozen):
-            at[(time >= start) & (time < stop)] = start
-        return at
-
-    def _middles(self, strokes: frozenset[int]) -> list[tuple[float, float]]:
-        """Return the middle stretches [s, bench] of those of the strokes that were begun."""
-        begun = self._bench.ground_truth() if strokes else ()
-        chosen = [stroke for number, stroke in enumerate(begun, 1) if number in strokes]
-        return [(s.slip + MIDDLE[0] * (s.lift - s.slip), s.slip + MIDDLE[1] * (s.lift - s.slip)) for s in chosen]
+    def _middle(self, number: int) -> tuple[float, float]:
+        """Return the middle stretch [s, bench] of a stroke that was begun; nothing of another number."""
+        begun = self._bench.ground_truth()
+        if not 0 < number <= len(begun):
+            return np.inf, np.inf
+        stroke = begun[number - 1]
+        first, last = (stroke.slip + part * (stroke.lift - stroke.slip) for part in MIDDLE)
+        return first, last

@@ -35,7 +35,7 @@ from sessions.run.runner import RunnerSettings, SessionEnd, Status, run_session
 from sessions.statistics.findings import Spoilt
 from sessions.statistics.visit import EXCLUSIONS
 from sessions.strokes.stroke import FIXED, AreaLaw
-from simulators.bench import Bench, BenchSettings, DirectTransducer, Hurt
+from simulators.bench import Bench, BenchSettings, DirectTransducer
 from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings
 
@@ -146,6 +146,13 @@ LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
 TICK = 0.1  # between two looks at the transducer [s of the session's clock]: five times as seldom as with people
 
 
+DECISIONS = """# SIMULATED: decisions about a simulated study
+
+[[exclude]]
+subject = "S07"
+why = "used both scales backwards, and said so afterwards"
+who = "simulated experimenter"
+"""
 SPOILT: Mapping[str, Spoilt] = {
     "S02": Spoilt(lost=3, expected="trial 3: lost_readings"),
     "S04": Spoilt(frozen=6, expected="trial 6: frozen_sensor"),
@@ -166,7 +173,7 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
     planted = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
     (out / DAMAGED).mkdir()
     (out / DAMAGED / LIVE_FILE).write_bytes((out / "S01" / LIVE_FILE).read_bytes()[:1000])
-    (out / EXCLUSIONS).write_text(_decisions(), encoding="utf-8")
+    (out / EXCLUSIONS).write_text(DECISIONS, encoding="utf-8")
     write_json(
         out / PLANTED,
         {
@@ -191,14 +198,6 @@ def planted_slopes(people: SubjectSettings) -> dict[str, Any]:
     return {"gain": by_index, "friction": judgements, "drift": people.drift, "carry_over": people.carry_over}
 
 
-def _decisions() -> str:
-    """Return the file of decisions that the experimenter of such a study would keep."""
-    return (
-        "# SIMULATED: decisions about a simulated study\n\n[[exclude]]\n"
-        'subject = "S07"\nwhy = "used both scales backwards, and said so afterwards"\nwho = "simulated experimenter"\n'
-    )
-
-
 def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
     """Record one subject's visit and return what was planted in it, a row a stroke."""
     subject, own = f"S{number:02d}", _seed(seed, number)
@@ -207,8 +206,7 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     a, b, c, d, e, f = gains.tolist()
     bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
     clock = SimulatedClock()
-    hurt = Hurt(frozenset({spoilt.lost} - {0}), frozenset({spoilt.frozen} - {0}))  # 0: no trial
-    transducer = DirectTransducer(bench, clock, hurt)
+    transducer = DirectTransducer(bench, clock, lost=spoilt.lost, frozen=spoilt.frozen)
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
     planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
