@@ -225,24 +225,17 @@ def trials(recording: Recording) -> Table:
     """Return a row for each planned trial, in the plan's order."""
     rows: list[dict[str, Any]] = []
     for record in recording.trials:
-        trial, stimulus = record.trial, record.trial.stimulus
+        trial = record.trial
         zero = _zero(recording, trial.number, record.start_ns)
+        of_stimulus, of_trial = ("descriptor", "index", "code"), ("block", "direction", "repetition", "phase")
         rows.append(
             {
                 "trial": trial.number,
-                "block": trial.block,
-                "descriptor": stimulus.descriptor,
-                "index": stimulus.index,
-                "code": stimulus.code,
-                "direction": trial.direction,
-                "repetition": trial.repetition,
-                "phase": trial.phase,
-                "compared_with": trial.compared_with,
+                **{name: getattr(trial.stimulus, name) for name in of_stimulus},
+                **{name: getattr(trial, name) for name in (*of_trial, "compared_with")},
                 "standard": int(trial.standard),
-                "outcome": record.outcome,
-                "score": record.score,
+                **{name: getattr(record, name) for name in ("outcome", "score", "choice")},
                 "free_number": record.number,
-                "choice": record.choice,
                 "take": record.take.number if record.take else None,
                 "start": record.start_ns,
                 "stop": record.stop_ns,

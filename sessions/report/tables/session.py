@@ -7,8 +7,6 @@ from sessions.prediction import BY_NAME
 from sessions.report.contents import GroundTruth, Report, StrokeFinding
 from sessions.report.tables import (
     Cell,
-    Column,
-    Group,
     Notes,
     Row,
     Rows,
@@ -318,9 +316,6 @@ def _spread(of: Spread | None, paths: int) -> Row:
         return (f"0 of {paths}", *(NONE for _ in range(6)))
     numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
     return (f"{of.correlated} of {paths}", of.distinct, *(correlation(value) for value in numbers))
-
-
-__all__ = ["Cell", "Column", "Group", "Table", "tables"]
 
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
