@@ -30,11 +30,11 @@ _Value = Callable[[PredictionFinding], float | None]
 
 
 def doubts(report: Report) -> tuple[str, ...]:
-    """Return what would change the sign of r between prediction and scores; nothing without a prediction.
+    """Return what would change the sign of r between prediction and scores; nothing where there is no r.
 
     That is the other strain, the ending's place, a given force, and another finger.
     """
-    if all(p.sed is None for p in report.predictions):
+    if all(p.sed is None for p in report.predictions) or not any(e.scores for e in report.experiments):
         return ()
     kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
     other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
@@ -133,6 +133,9 @@ def question(report: Report) -> str:
     judged = " and ".join(dict.fromkeys(e.descriptor for e in report.experiments))
     if not report.experiments:
         return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
+    if not any(e.scale_ends[0] for e in report.experiments):
+        what = shown_response(report.response).in_full if report.predictions else ""
+        return f"People judge the {judged} of surfaces they stroke. {friction_question(what)}"
     if not report.predictions:
         return f"How do people scale {judged}, and with what friction do fingers stroke the same surfaces?"
     return (
@@ -140,6 +143,12 @@ def question(report: Report) -> str:
         "finger model predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow "
         "their scores?"
     )
+
+
+def friction_question(predicted: str) -> str:
+    """Return what a session without scores asks; `predicted` is the quantity that the model says, "" for none."""
+    more = f", and what {predicted} does a finger model predict at a receptor" if predicted else ""
+    return f"With what µ do they stroke them{more}?"
 
 
 def summary(report: Report) -> tuple[str, ...]:

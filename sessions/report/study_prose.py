@@ -12,7 +12,7 @@ from sessions.prediction.stored import UNKNOWNS
 from sessions.recording.head import software_versions
 from sessions.report.contents import Fact
 from sessions.report.facts import area_words, calibration_words, model_words
-from sessions.report.prose import OTHER_FINGERS
+from sessions.report.prose import OTHER_FINGERS, friction_question
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
 from sessions.report.tables.session import paths_sentence
@@ -26,8 +26,12 @@ _FEW = 12  # trials named one by one
 
 def question(study: StudyFindings) -> str:
     """Return what the study asks."""
+    predicted = shown_response(study.response).in_full
+    if not any(one.scores for one in study.descriptors):
+        forces = any(visit.forces for visit in study.visits)
+        return f"People stroke surfaces and judge what they feel. {friction_question(predicted if forces else '')}"
     return (
-        f"People stroke surfaces and scale what they feel. Does the {shown_response(study.response).in_full} that a "
+        f"People stroke surfaces and scale what they feel. Does the {predicted} that a "
         "finger model predicts at a receptor, from the friction of the same people's own strokes, follow their scores?"
     )
 

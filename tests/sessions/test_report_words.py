@@ -82,6 +82,22 @@ def test_the_question_is_of_the_quantity_that_is_held_against_scores(report):
     assert "Does the pressure that a finger model" in study_prose.question(replace(made, response="pressure"))
 
 
+def test_where_nobody_gave_a_score_no_word_is_of_scores_or_of_r(report):
+    chosen = tuple(
+        replace(e, scale_ends=("", ""), scores=(), score_relation=None, answers={}) for e in report.experiments
+    )
+    compared = replace(report, experiments=chosen)
+    assert doubts(compared) == ()
+    words = "People judge the stickiness and slipperiness of surfaces they stroke. With what µ do they stroke them"
+    assert question(compared) == (
+        f"{words}, and what strain-energy density (SED) does a finger model predict at a receptor?"
+    )
+    assert question(replace(compared, predictions=())) == f"{words}?"
+    made = study()
+    unscored = replace(made, descriptors=tuple(replace(one, scores=()) for one in made.descriptors))
+    assert "score" not in study_prose.question(unscored)
+
+
 def test_the_axis_of_many_paths_names_the_quantity_that_they_are_of(report):
     panel = paths_panel("stickiness", report.experiments[0].paths, "pressure", simulated=True)
     assert "correlation of pressure with score [–]" in panel.svg

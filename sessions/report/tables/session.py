@@ -227,9 +227,11 @@ def relation_table(report: Report) -> Table | None:
         f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
         f"exact p of rho | slope [{shown.step} a point] | r without one"
     )
+    any_own = any(e.own_relation is not None for e in report.experiments)
+    own = "The forces are those of one subject, whose scores are the own ones. " if any_own else ""
     caption = (
         f"Relation of the predicted {shown.label} ({report.model}) to scores and to the stimuli's indices. "
-        "The forces are those of one subject, whose scores are the own ones. Intervals: Fisher's z, for rho as by "
+        f"{own}Intervals: Fisher's z, for rho as by "
         "Bonett and Wright (2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its "
         "t interval. Last column: r when the stimulus of that index is left out."
     )
