@@ -162,7 +162,10 @@ def relation_panel(
     values = [shown.factor * numbers[0] for _, numbers, _ in points]
     low, high = min(values), max(values)
     room = 0.18 * (high - low or abs(high))
-    drawn = [*(shown.factor * end for *_, friction in points for end in friction or ()), low - room, high + room]
+    drawn = [low - room, high + room]
+    drawn += [
+        shown.factor * end + side for *_, ends in points if ends for end in ends for side in (-room / 4, room / 4)
+    ]
     axes.set(xlim=(-6, 106), ylim=(min(drawn), max(drawn)), xticks=_TICKS)
     axes.set(xlabel=f"mean score of {experiment.descriptor} [0–100]", ylabel=f"predicted {shown.label} [{shown.unit}]")
     title = f"range of {shown.label}: {shown.text(high - low)} ({spread_share(low, high)})"
