@@ -81,7 +81,7 @@ def _painting(film) -> None:  # noqa: ANN001
     from daq_app.qt.tokens import LIGHT
 
     application = QApplication([])
-    canvas = FingerCanvas(LIGHT, 1.0)
+    canvas = FingerCanvas(LIGHT)
     canvas.resize(520, 560)
     for near in (False, True):
         took: list[float] = []

@@ -50,8 +50,8 @@ def _by_hand():  # noqa: ANN202
     from daq_app.window.live_model import MODEL_CHANNELS
     from daq_app.window.live_trace import CHANNELS, Columns
 
-    plots = [LivePlot(*plot, 1.0) for plot in PLOTS]
-    plots += [LivePlot(*SED, 1.0, MODEL_CHANNELS), *(LivePlot(*plot, 1.0) for plot in AXES)]
+    plots = [LivePlot(*plot) for plot in PLOTS]
+    plots += [LivePlot(*SED, MODEL_CHANNELS), *(LivePlot(*plot) for plot in AXES)]
     _show(plots)
 
     def draw(now: float) -> None:

@@ -159,7 +159,7 @@ def draw(rate: int, pipe: Connection) -> None:
 
     application = QApplication([])
     trace = LiveTrace(float(rate))
-    plots = [LivePlot(*axis, 1.0) for axis in AXES]
+    plots = [LivePlot(*axis) for axis in AXES]
     for plot in plots:
         plot.resize(1200, 500)
         plot.show()

@@ -65,7 +65,7 @@ def write_pictures(folder: Path) -> None:
         shown = _parts()
         shown.setStyle(QStyleFactory.create("Fusion"))
         shown.setPalette(tokens.palette(theme))
-        shown.setStyleSheet(tokens.style_sheet(theme, 1.0))
+        shown.setStyleSheet(tokens.style_sheet(theme))
         shown.resize(640, 260)
         shown.grab().save(str(folder / f"looks-{name}.png"))
     del application

@@ -25,9 +25,8 @@ from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
 from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, scroll_area, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
-from daq_app.qt.preferences import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
-from daq_app.qt.tokens import GRID, MODEL, Tokens
+from daq_app.qt.tokens import GRID, MODEL, Tokens, px
 from daq_app.wording import tr
 from sessions.exchange import FORMATS
 from sessions.prediction import QUANTITIES
@@ -80,7 +79,7 @@ class AnalystWindow(QMainWindow):
         self.setAccessibleName(tr("analyst's window"))
         self.state = AnalystState(folder)
         self._work = work or Analyst(folder)
-        self.keys = KeysPage(self, type_scale(), ANALYST_KEYS)
+        self.keys = KeysPage(self, ANALYST_KEYS)
         self._head = label("", "simulated")
         self.way = LineageLabel(tokens)
         self.way.followed.connect(self._follow)
@@ -88,7 +87,7 @@ class AnalystWindow(QMainWindow):
         self.stroke = StrokeColumn(tokens)
         self.stroke.replayed.connect(self._replay_next)
         self._words = WrappedLabel("quiet", keeps_room=True)
-        self.model = ModelColumn(tokens, type_scale())
+        self.model = ModelColumn(tokens)
         self.model.other_wanted.connect(self._choose_comparison)
         self.model.said.connect(self._words.show_text)
         for column in (self.trials, self.stroke, self.model):
@@ -253,9 +252,9 @@ class AnalystWindow(QMainWindow):
             self._pages.setCurrentIndex(2)
 
     def _lay_out(self) -> QWidget:
-        self.progress.setFixedWidth(round(140 * type_scale()))
+        self.progress.setFixedWidth(px(140))
         self.format.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.format.setFixedWidth(round(90 * type_scale()))
+        self.format.setFixedWidth(px(90))
         window = QWidget()
         window.setObjectName("window")
         window.setMinimumSize(*LEAST)  # the columns find room in less than they would like

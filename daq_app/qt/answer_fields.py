@@ -19,7 +19,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QAbstractSlider, QHBoxLayout, QLineEdit, QPushButton, QSizePolicy, QWidget
 
 from daq_app.qt.parts import button, fill
-from daq_app.qt.tokens import GRID, theme_of
+from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import LEAP, LENGTH, STEP, Answer, Choice, Device, Translate, Which
 from daq_app.window.subject import SubjectText as Text
@@ -231,13 +231,13 @@ class _Field(QWidget):
 class NumberField(_Field):
     """Takes a number above 0; a comma is a point."""
 
-    def __init__(self, scale: float, now: Callable[[], float]) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(now)
         self.field = QLineEdit()
         self.field.setAccessibleName(Text.OWN_NUMBER)
-        self.field.setFixedWidth(round(260 * scale))
+        self.field.setFixedWidth(px(260))
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.field.setStyleSheet(f"font-size: {round(LARGE * scale)}px;")
+        self.field.setStyleSheet(f"font-size: {px(LARGE)}px;")
         self.field.setValidator(QRegularExpressionValidator(NUMBER, self.field))
         self.field.textEdited.connect(self._type)
         fill(QHBoxLayout(self), 1, self.field, 1)
@@ -260,13 +260,13 @@ class NumberField(_Field):
 class ChoiceOfTwo(_Field):
     """Two buttons of the same size; the one that is chosen stays pressed."""
 
-    def __init__(self, scale: float, now: Callable[[], float]) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(now)
         self._pointer: Device = "mouse"  # that pressed a button last
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(Text.OF_TWO)
-        self.first = self._button(Text.FIRST, "first", scale)
-        self.second = self._button(Text.SECOND, "second", scale)
+        self.first = self._button(Text.FIRST, "first")
+        self.second = self._button(Text.SECOND, "second")
         layout = QHBoxLayout(self)
         layout.setSpacing(4 * GRID)
         fill(layout, 1, self.first, self.second, 1)
@@ -296,14 +296,14 @@ class ChoiceOfTwo(_Field):
             self._pointer = _device(event)
         return False
 
-    def _button(self, words: str, which: Which, scale: float) -> QPushButton:
+    def _button(self, words: str, which: Which) -> QPushButton:
         choice = button(words, words, lambda: self._take(self.answer.choose(self.now(), which, self._pointer)))
         choice.installEventFilter(self)
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.
-        size = f"min-width: {round(WIDE * scale)}px; min-height: {round(HIGH * scale)}px;"
-        choice.setStyleSheet(f"font-size: {round(WORDS * scale)}px; {size}")
+        size = f"min-width: {px(WIDE)}px; min-height: {px(HIGH)}px;"
+        choice.setStyleSheet(f"font-size: {px(WORDS)}px; {size}")
         return choice
 
     def _take(self, answer: Choice) -> None:
@@ -327,11 +327,11 @@ def newest_force(trace: LiveTrace) -> float:
 class PressBar(QWidget):
     """A bar from no force, where reading begins, to `FULL`; no number, so that nobody aims at one."""
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self._force = 0.0
         self.setAccessibleName(Text.PRESSING)
-        self.setFixedHeight(round(6 * GRID * scale))
+        self.setFixedHeight(px(6 * GRID))
 
     def show_force(self, trace: LiveTrace) -> None:
         """Show the normal force of the last moment; an empty bar where nothing is known."""

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QComboBox, QPushButton, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp
 from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, label_grid, regrade, say, scroll_area, vbox
-from daq_app.qt.tokens import GRID, theme_of
+from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS
 from daq_app.window.state import Message
@@ -26,7 +26,7 @@ SPOKEN = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the ze
 class BenchPanel(Panel):
     """The right of the experimenter's window."""
 
-    def __init__(self, scale: float, send: Callable[[Message], None], search: Callable[[], None]) -> None:
+    def __init__(self, send: Callable[[Message], None], search: Callable[[], None]) -> None:
         super().__init__(tr("bench"))
         self._send = send
         self._view: BenchView | None = None
@@ -39,7 +39,7 @@ class BenchPanel(Panel):
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         for count in self._counters.values():
             count.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self._bars = {name: LoadBar(name, scale) for name in LOADS}
+        self._bars = {name: LoadBar(name) for name in LOADS}
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
         self._choice.setLineEdit(EntryLine(lambda: self._leave(connecting=True), self._leave))
@@ -153,11 +153,11 @@ def show_connecting(push: QPushButton, view: BenchView) -> None:
 class BenchStrip(Panel):
     """The bench folded: a lamp, and a short bar for each axis."""
 
-    def __init__(self, scale: float, expand: Callable[[], None]) -> None:
+    def __init__(self, expand: Callable[[], None]) -> None:
         super().__init__(tr("bench, folded"), "strip")
         self._lamp = Lamp(tr("transducer"))
-        self._bars = {name: LoadBar(name, scale) for name in LOADS}
-        self.setFixedWidth(round(150 * scale))
+        self._bars = {name: LoadBar(name) for name in LOADS}
+        self.setFixedWidth(px(150))
         self._words = label("", "quiet", wrap=True)
         whole, lamp = button(tr("Bench  B"), tr("show the bench"), expand), hbox(self._lamp, (self._words, 1))
         vbox(whole, lamp, *self._bars.values(), 1, on=self, margins=GRID)
@@ -174,16 +174,15 @@ class LoadBar(QWidget):
 
     NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
 
-    def __init__(self, name: str, scale: float) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__()
-        self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
         self.setAccessibleName(tr("load on {name}", name=tr(name)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFixedHeight(round(2.75 * GRID * scale))
+        self.setFixedHeight(px(2.75 * GRID))
 
     def sizeHint(self) -> QSize:
-        return QSize(round(200 * self._scale), self.height())
+        return QSize(px(200), self.height())
 
     def show_bar(self, bar: Bar) -> None:
         if bar == self._bar:
@@ -200,7 +199,7 @@ class LoadBar(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         t, bar = theme_of(self), self._bar
         painter = QPainter(self)
-        left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)
+        left, right = px(self.NAME), px(self.NOISE)
         if self.width() < left + right + 40:
             right = 0
         colour = QColor(t.wrong if bar.over else t.text)

@@ -116,7 +116,7 @@ class TransducerRow(QWidget):
 class ScreenFields(QWidget):
     """What stands on the card of the subject's screen, be it a second screen or a tablet."""
 
-    def __init__(self, scale: float, act: Callable[[str], None]) -> None:
+    def __init__(self, act: Callable[[str], None]) -> None:
         super().__init__()
         self.words = ""  # the length of the line, and characters that no font here has
         self.missing = ""  # why the subject's page is on no tablet, where it should be
@@ -124,7 +124,7 @@ class ScreenFields(QWidget):
         self._size = QSize(1000, 640)  # of the subject's window
         self.language = choice(tr("language that the subject reads"))
         self._wish = ENGLISH  # language that somebody chose, also while a protocol does not have it
-        self.thumbnail = Thumbnail(scale)
+        self.thumbnail = Thumbnail()
         name = tr("check the subject's line with a ruler")
         self._ruler = button(tr("Check with a ruler  Ctrl+M"), name, lambda: act("ruler"))
         self.camera = QLabel()

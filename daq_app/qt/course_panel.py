@@ -8,8 +8,9 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
 from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, say, stack_pages, vbox
+from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
-from daq_app.qt.tokens import GRID, TARGET
+from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.state import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
 from daq_app.wording import tr, tr_noop
@@ -27,7 +28,7 @@ ROOMY = 560  # at which a picture of the subject's page has room beneath the pla
 class CoursePanel(Panel):
     """The left of the experimenter's window while a session is in hand."""
 
-    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
+    def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__(tr("course of the session"))
         self._send = send
         self._view: CourseView | None = None
@@ -40,17 +41,17 @@ class CoursePanel(Panel):
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
-        acts, columns = QWidget(), 3 if scale <= 1.0 else 2
+        acts, columns = QWidget(), 3 if type_scale() <= 1.0 else 2
         grid = QGridLayout(acts)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(GRID)
         for at, widget in enumerate(self.buttons.values()):
             grid.addWidget(widget, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
-        self._bottom = stack_pages(acts, self._entry_row(scale))
+        self._bottom = stack_pages(acts, self._entry_row())
         self._timer = label("", "quiet")
-        self.mirror = Mirror(scale)
-        self._roomy = round(ROOMY * min(scale, 1.4))
+        self.mirror = Mirror()
+        self._roomy = px(ROOMY, most=1.4)
         head = hbox((label(tr("Plan"), "section"), 1), self._timer)
         around = (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         vbox(head, (self.plan, 1), self.mirror, self._bottom, on=self, margins=around, spacing=GRID)
@@ -105,11 +106,11 @@ class CoursePanel(Panel):
         self.leave()
         self._send(MESSAGES[self._asking](text))
 
-    def _entry_row(self, scale: float) -> QWidget:
+    def _entry_row(self) -> QWidget:
         page, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)
         acts = hbox(keep, button(tr("Leave  Esc"), tr("leave it"), self.leave))
         vbox(1, self._question, self.line, acts, on=page, spacing=GRID)
-        page.setMinimumHeight(round(88 * scale))
+        page.setMinimumHeight(px(88))
         return page
 
     def _show_rows(self, rows: tuple[PlanRow, ...]) -> None:

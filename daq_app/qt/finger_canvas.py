@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFrame, QSizePolicy
 from daq_app.analyst.frame import FIELD_CHOICES, Frame, Line, Parts, View, probe_words
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.plots import name_axis, pg, style_axis
-from daq_app.qt.tokens import SMALL, Tokens, font
+from daq_app.qt.tokens import SMALL, Tokens, font, px
 from daq_app.wording import tr, tr_noop
 
 HELP = tr_noop(
@@ -66,11 +66,11 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     range_chosen = Signal(tuple)  # ends of the colours, as the bar's handles were left
 
-    def __init__(self, tokens: Tokens, scale: float, sight: Sight | None = None) -> None:
+    def __init__(self, tokens: Tokens, sight: Sight | None = None) -> None:
         """Show nothing yet; canvases with the same `sight` move together."""
         pg.GraphicsLayoutWidget.__init__(self)
         self.sight = sight or Sight()
-        self._tokens, self._font = tokens, font(SMALL, scale)
+        self._tokens, self._font = tokens, font(SMALL)
         self.frame: Frame | None = None
         self._parts = NO_PARTS
         self.look = Look(FIELD_CHOICES[0], (0.0, 1.0))
@@ -80,7 +80,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._shades = {signed: _shades(*what) for signed, what in MAPS.items()}
         self.setBackground(tokens.surface)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self._least = round(LEAST * scale)
+        self._least = px(LEAST)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setToolTip(tr(HELP))

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 from daq_app.qt.painting import Lamp, paint_arrow
 from daq_app.qt.parts import Panel, button, hbox, label, regrade, say, set_horizontal
 from daq_app.qt.preferences import name_of
-from daq_app.qt.tokens import GRID, SMALL, font, theme_of
+from daq_app.qt.tokens import GRID, SMALL, font, px, theme_of
 from daq_app.window.state import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
@@ -23,7 +23,7 @@ MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 class Header(QWidget):
     """Whose session it is, by which device and in which language, and whether it is simulated and being recorded."""
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self._heading, self._device = label("", "title", wrap=True), label("", "quiet", wrap=True)
         self._language = label("", "quiet")
@@ -39,10 +39,10 @@ class Header(QWidget):
         self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         subject = hbox((self._heading, 3), (self._device, 2), self._language, spacing=GRID)
         lamp = hbox(1, self._simulated, self._lamp, self._words, self._saved, spacing=GRID)
-        self._one_row = round(ONE_ROW * scale)
+        self._one_row = px(ONE_ROW)
         self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
         longest = tr("saved {age:.1f} s ago", age=99.9)
-        self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance(f"{longest} "))
+        self._saved.setFixedWidth(QFontMetrics(font(SMALL)).horizontalAdvance(f"{longest} "))
 
     def show_view(self, view: View) -> None:
         say(self._heading, view.heading)
@@ -65,9 +65,9 @@ class Header(QWidget):
 class Notice(Panel):
     """One line that is always there: empty, a sentence, or a banner that stays until its cause is gone."""
 
-    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
+    def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
-        self._send, self._scale, self._folds = send, scale, False
+        self._send, self._folds = send, False
         self._banner: Banner | None = None
         self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
         self._said: object = None
@@ -102,7 +102,7 @@ class Notice(Panel):
     def show_folding(self, folds: bool) -> None:
         """Keep the line's place while it is empty; or give it up, where there is no room to keep."""
         self._folds = folds
-        self.setMinimumHeight(0 if folds else round(52 * self._scale))
+        self.setMinimumHeight(0 if folds else px(52))
         self.setVisible(not folds or bool(self._words.text()))
 
     def warn(self, sentence: str) -> None:

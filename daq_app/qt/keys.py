@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
 from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, label_grid, scroll_area, vbox
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import GRID
+from daq_app.qt.tokens import GRID, px
 from daq_app.window.subject import owner
 from daq_app.wording import tr, tr_noop
 
@@ -100,9 +100,9 @@ def name_of(event: QKeyEvent) -> str:
 class KeysPage(Panel):
     """Every key, over the window."""
 
-    def __init__(self, parent: QWidget, scale: float, keys: tuple[Key, ...] = KEYS) -> None:
+    def __init__(self, parent: QWidget, keys: tuple[Key, ...] = KEYS) -> None:
         super().__init__(tr("keys of this window"))
-        self._scale, self._over, self._keys = scale, parent, keys
+        self._over, self._keys = parent, keys
         self.setParent(parent)
         self.hide()
 
@@ -127,7 +127,7 @@ class KeysPage(Panel):
     def fit(self) -> None:
         """Take the middle of the window, as much as there is need for."""
         window = self._over.size()
-        wanted = QSize(round(WIDTH * self._scale), round(HEIGHT * self._scale))
+        wanted = QSize(px(WIDTH), px(HEIGHT))
         size = wanted.boundedTo(window - QSize(4 * GRID, 4 * GRID))
         self.resize(size)
         self.move((window.width() - size.width()) // 2, (window.height() - size.height()) // 2)

@@ -12,7 +12,7 @@ from daq_app.qt.live_pictures import ContactMap, FingerView
 from daq_app.qt.live_plot import Curve, LivePlot
 from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, set_horizontal, vbox
 from daq_app.qt.preferences import settings
-from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font
+from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font, px
 from daq_app.window.course_state import PICTURE, Mark, picture_end
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.live_model import MODEL_CHANNELS, ModelTrace, model_words
@@ -54,15 +54,12 @@ FINITE = "live model/finite strain"  # under which the choice is remembered
 class LiveBar(QWidget):
     """Numbers that are read, and what is shown."""
 
-    def __init__(
-        self, scale: float, length: Callable[[int], None], hold: Callable[[], None], finite: Callable[[bool], None]
-    ) -> None:
+    def __init__(self, length: Callable[[int], None], hold: Callable[[], None], finite: Callable[[bool], None]) -> None:
         """Show no numbers; `length` takes what is chosen [s], `hold` is called at a press, `finite` takes a choice."""
         super().__init__()
         self._forces_shown = True
         self._short = False  # the buttons show their keys alone
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
-        self._scale = scale
         self.values: dict[str, QLabel] = {}
         self._captions: dict[str, QLabel] = {}
         self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold, checkable=True)
@@ -72,13 +69,13 @@ class LiveBar(QWidget):
         self.finite.setToolTip(words)
         self.length = choice(tr("stretch of time that is shown"), (f"{seconds} s" for seconds in LENGTHS))
         self.length.activated.connect(lambda: length(LENGTHS[self.length.currentIndex()]))
-        self.length.setFixedWidth(round(84 * scale))
+        self.length.setFixedWidth(px(84))
         acts = hbox(1, self.finite, self.length, self.hold, spacing=GRID)
         self._rows = hbox(self._numbers(), acts, on=self, spacing=GRID // 2)
         for widget in (self.hold, self.finite, self.length):
             widget.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.
-        self.setMinimumSize(1, QFontMetrics(font(TITLE, scale)).height())
+        self.setMinimumSize(1, QFontMetrics(font(TITLE)).height())
 
     def show_forces(self, shown: bool) -> None:
         """Show the numbers, or keep them from the experimenter where the protocol does."""
@@ -127,7 +124,7 @@ class LiveBar(QWidget):
         return captions + sum(self._widest(channel, size) for channel in self.values)
 
     def _widest(self, channel: str, size: int) -> int:
-        metrics = QFontMetrics(font(size, self._scale, bold=size == TITLE))
+        metrics = QFontMetrics(font(size, bold=size == TITLE))
         return metrics.horizontalAdvance(WIDEST[channel]) + 4
 
     def _numbers(self) -> QHBoxLayout:
@@ -162,7 +159,7 @@ def short_name(channel: str) -> str:
 class LivePanel(Panel):
     """The middle of the experimenter's window."""
 
-    def __init__(self, feed: LiveFeed, model: LiveModel, scale: float) -> None:
+    def __init__(self, feed: LiveFeed, model: LiveModel) -> None:
         super().__init__(tr("live readings"))
         self._feed, self._model, self._model_trace = feed, model, ModelTrace()
         self._seconds = 10
@@ -170,17 +167,17 @@ class LivePanel(Panel):
         self._read_at = 0.0
         self._drawn: object = None  # what the picture was drawn of
         self._forces_shown = True
-        self._least_for_acts = LEAST_FOR_ACTS * scale
-        self.plots = [LivePlot(*plot, scale) for plot in (*PLOTS, *AXES)]
-        self._model_plot = LivePlot(*SED, scale, MODEL_CHANNELS)
+        self._least_for_acts = px(LEAST_FOR_ACTS)
+        self.plots = [LivePlot(*plot) for plot in (*PLOTS, *AXES)]
+        self._model_plot = LivePlot(*SED, MODEL_CHANNELS)
         self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
         self._column = (*self.plots[:3], self._model_plot)  # below each other
-        self.finger = FingerView(scale)
-        self.map = ContactMap(scale)
-        self.bar = LiveBar(scale, self.show_seconds, self._hold, self._finite)
+        self.finger = FingerView()
+        self.map = ContactMap()
+        self.bar = LiveBar(self.show_seconds, self._hold, self._finite)
         self.drawer = Drawer(*self._lay_out())
         self.tab = button("", tr("drawer"), self.toggle_drawer, "handle")
-        self.tab.setFixedWidth(round(TAB * scale))
+        self.tab.setFixedWidth(px(TAB))
         self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self._pictures = QWidget()
         hbox((self.drawer, 1), self.tab, on=self._pictures, spacing=2)

@@ -34,9 +34,8 @@ TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 class ContactMap(PaintedWidget):
     """Where the finger presses now, and where it came from. The drawing is of the face's middle, not to its edges."""
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._scale = scale
         self._trail: Array = np.empty((0, 2))
         self._touching = False
         self._direction = 0
@@ -84,7 +83,7 @@ class ContactMap(PaintedWidget):
 
     def _words_width(self) -> float:
         """Return the width of the column of words at the right of the sample."""
-        metrics = QFontMetricsF(font(SMALL, self._scale))
+        metrics = QFontMetricsF(font(SMALL))
         return max(metrics.horizontalAdvance(words) for words in self._words) + 2 * MARGIN
 
     def _middle(self) -> QPointF:
@@ -106,7 +105,7 @@ class ContactMap(PaintedWidget):
         painter.setPen(QPen(QColor(t.line), 1))
         painter.setBrush(QColor(t.raised))
         painter.drawRoundedRect(box, 4, 4)
-        painter.setFont(font(SMALL, self._scale))
+        painter.setFont(font(SMALL))
         painter.setPen(QColor(t.quiet))
         margin_box = QRectF(box.right() + 2 * MARGIN, box.top(), self.width() - box.right() - 2 * MARGIN, box.height())
         places = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
@@ -131,9 +130,8 @@ class ContactMap(PaintedWidget):
 class FingerView(QWidget):
     """A picture of the last state of a model."""
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._scale = scale
         self._picture: Picture | None = None
         self._row: Array = np.empty(0)
         self._words = ModelWords("", "none")
@@ -163,7 +161,7 @@ class FingerView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter, t = QPainter(self), theme_of(self)
         painter.fillRect(self.rect(), QColor(t.surface))
-        painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond")))
+        painter.setFont(font(SMALL, bold=self._words.state in ("settled", "instead", "beyond")))
         painter.setPen(QColor(t.look if self._words.state in ("instead", "beyond", "failed") else t.quiet))
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height())
@@ -172,7 +170,7 @@ class FingerView(QWidget):
         # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
         line = painter.fontMetrics().height()
         top = max(needed, 3.0 * line) + 4
-        painter.setFont(font(SMALL, self._scale))
+        painter.setFont(font(SMALL))
         room = self.height() - top
         row = room * (1.0 - PART) if room * (1.0 - PART) >= ROW_LINES * line else 0.0
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -13,7 +13,8 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QStaticText
 
 from daq_app.qt.painting import PaintedWidget, blank, draw_line, fine, sheer
-from daq_app.qt.tokens import SMALL, font
+from daq_app.qt.preferences import type_scale
+from daq_app.qt.tokens import SMALL, font, px
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, MARGIN, Columns, PlotScale, ticks, times
 from daq_app.wording import tr, tr_noop
@@ -45,7 +46,6 @@ class LivePlot(PaintedWidget):
         name: str,
         curves: Sequence[Curve],
         scale: PlotScale,
-        type_scale: float,
         channels: Iterable[str] = CHANNELS,
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
@@ -54,7 +54,6 @@ class LivePlot(PaintedWidget):
         self._rows = tuple(tuple(channels).index(curve.channel) for curve in curves)
         self._curves = tuple(curves)
         self._scale = scale
-        self._type_scale = type_scale
         self._seconds: float = 10.0
         self._times_shown: bool = True
         self._end: str = tr("now")  # what the right edge is
@@ -62,7 +61,7 @@ class LivePlot(PaintedWidget):
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
         self._words = {kind: QStaticText(tr(kind)) for kind in tr_noop(("onset", "lift"))}
-        self.setMinimumSize(40, round(LEAST * type_scale))
+        self.setMinimumSize(40, px(LEAST))
         self.setAccessibleName(tr("plot of {name}", name=self._name))
 
     def show_axis(self, seconds: float | None = None, *, times: bool | None = None, end: str | None = None) -> None:
@@ -100,8 +99,8 @@ class LivePlot(PaintedWidget):
             draw_line(painter, x, np.clip(y, -FAR, FAR))
 
     def _inside(self) -> QRectF:
-        left = round(AXIS_WIDTH * self._type_scale)
-        below = round((SMALL + 5) * self._type_scale) if self._times_shown else 3
+        left = px(AXIS_WIDTH)
+        below = px(SMALL + 5) if self._times_shown else 3
         return QRectF(left, 2, max(self.width() - left - 4, 8), max(self.height() - below - 2, 8))
 
     def _reach(self) -> tuple[float, float]:
@@ -112,7 +111,7 @@ class LivePlot(PaintedWidget):
     def draw_ground(self) -> QPixmap:
         picture = blank(self, self.theme.surface)
         painter = QPainter(picture)
-        painter.setFont(font(SMALL, self._type_scale))
+        painter.setFont(font(SMALL))
         inside = self._inside()
         self._paint_values(painter, inside)
         self._paint_times(painter, inside)
@@ -158,15 +157,15 @@ class LivePlot(PaintedWidget):
 
     def _paint_names(self, painter: QPainter, inside: QRectF) -> None:
         """Name the plot; where it has several curves, with a piece of the line of each."""
-        metrics = QFontMetricsF(font(SMALL, self._type_scale, bold=True))
-        painter.setFont(font(SMALL, self._type_scale, bold=True))
+        metrics = QFontMetricsF(font(SMALL, bold=True))
+        painter.setFont(font(SMALL, bold=True))
         x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
         named = [curve for curve in self._curves if curve.named]
         several = len(named) > 1
         unit = self._name[max(self._name.find("["), 0) :] if several else self._name
         words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in named)
         room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
-        sample = max(min(SAMPLE * self._type_scale, room), 0.0)
+        sample = max(min(SAMPLE * type_scale(), room), 0.0)
         for curve in named if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
             if curve.dashed:
@@ -183,7 +182,7 @@ class LivePlot(PaintedWidget):
     def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
         """Mark what was found: a line for onset and lift, a shaded stretch for the steady window."""
         across = inside.width() / self._seconds
-        painter.setFont(font(SMALL, self._type_scale))
+        painter.setFont(font(SMALL))
         line = painter.fontMetrics().height()
         free = inside.left()  # from where on no words stand yet
         for mark in self._marks:

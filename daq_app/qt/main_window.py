@@ -18,12 +18,12 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import fill, hbox, scroll_area, stack_pages, vbox
-from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, millimetres, restore_place, save_place
+from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, millimetres, restore_place, save_place, type_scale
 from daq_app.qt.rooms import ROOMS, Menus, Rail, Room, Rooms
 from daq_app.qt.subject_picture import open_preview
 from daq_app.qt.subject_side import SubjectSide, TabletScreen
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import GRID
+from daq_app.qt.tokens import GRID, px
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline
 from daq_app.window.new_session import Bench, Refusal, SessionForm, bench_of, check_form, pilot_form
@@ -47,33 +47,32 @@ class MainWindow(QMainWindow):
 
     theme_chosen = Signal()
 
-    def __init__(self, bridge: Bridge, scale: float, tablet: TabletScreen | None = None) -> None:
+    def __init__(self, bridge: Bridge, tablet: TabletScreen | None = None) -> None:
         """Place the panels, and follow `bridge`; with a `tablet` the subject answers there."""
         super().__init__()
         self.setWindowTitle("daq-app")
         self.setAccessibleName(tr("experimenter's window"))
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.bridge = bridge
-        self._scale = scale
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
-        self.header = Header(scale)
-        self.notice = Notice(scale, bridge.send)
+        self.header = Header()
+        self.notice = Notice(bridge.send)
         self.to_do = ToDo(self._primary, lambda: self.act("go to review"))
-        self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
-        self.page = NewSessionPage(scale, bridge.send, self.act)
-        self.course = CoursePanel(scale, bridge.send)
-        self.middle = Middle(bridge, scale, self.act)
+        self.rail = Rail(lambda room: self.act(f"go to {room}"))
+        self.page = NewSessionPage(bridge.send, self.act)
+        self.course = CoursePanel(bridge.send)
+        self.middle = Middle(bridge, self.act)
         self.live = self.middle.live
-        self.bench = BenchPanel(scale, bridge.send, bridge.search)
-        self.strip = BenchStrip(scale, self._fold_bench)
-        self.subject = SubjectWindow(scale, bridge.session_now)
+        self.bench = BenchPanel(bridge.send, bridge.search)
+        self.strip = BenchStrip(self._fold_bench)
+        self.subject = SubjectWindow(bridge.session_now)
         self.tablet = tablet
         self.side = SubjectSide(self, bridge, self.subject, tablet, self.course, self.act)
         self.side.line_changed.connect(self._line_changed)
         self.subject.closed.connect(self._subject_closed)
         self.keyboard = self.side.keyboard
-        self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act))
-        self.keys = KeysPage(self, scale)
+        self.rooms = Rooms(bridge, self.rail, Menus(self, self.act))
+        self.keys = KeysPage(self)
         self._acts = self._table()
         self._left = stack_pages(self.page, self.course)
         self.setCentralWidget(self._lay_out())
@@ -223,7 +222,7 @@ class MainWindow(QMainWindow):
             self.notice.warn(tr("A protocol is piloted in Prepare, while no session is in hand."))
 
     def _preview(self) -> None:
-        if refused := open_preview(self.page.form(), self.subject.size(), self._scale, self):
+        if refused := open_preview(self.page.form(), self.subject.size(), self):
             self.notice.warn(refused)
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
@@ -296,16 +295,16 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def _fit(self) -> None:
-        width, height = self.width() / self._scale, self.height() / self._scale
+        width, height = self.width() / type_scale(), self.height() / type_scale()
         wide = width >= WIDE
         shown = wide if self._bench_shown is None else self._bench_shown
         self.bench.setVisible(shown)
         cards = self._left.currentIndex() == 0 and width >= WIDE
-        scale = self._scale if wide else min(self._scale, 1.4)
-        least = LEAST_CARDS * self._scale if self._left.currentIndex() == 0 and (wide or not shown) else 0.0
+        scale = type_scale() if wide else min(type_scale(), 1.4)
+        least = LEAST_CARDS * type_scale() if self._left.currentIndex() == 0 and (wide or not shown) else 0.0
         self._left.setMaximumWidth(round((CARDS if cards else max(PLAN, least / scale)) * scale))
         self._left.setMinimumWidth(round(max(PLAN * scale, least)))
-        self.bench.setFixedWidth(round(290 * scale))
+        self.bench.setFixedWidth(px(290))
         self.strip.setVisible(not shown and width >= 800)
         self.live.set_room(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
         self.to_do.show_small(height < TALL or width < ROOMY)

@@ -23,7 +23,7 @@ from daq_app.qt.parts import (
     stack_pages,
     vbox,
 )
-from daq_app.qt.tokens import GRID, SMALL, TARGET
+from daq_app.qt.tokens import GRID, SMALL, TARGET, px
 from daq_app.window.course_state import PICTURE, Mark
 from daq_app.window.live_trace import Columns
 from daq_app.window.view_course import KINDS, CourseView, Inspection, StrokeView, Tile, inspection
@@ -38,7 +38,7 @@ AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose str
 class TrialStrip(QScrollArea):
     """One row of tiles, which moves sideways where it is longer than its room; the trial in hand stays in sight."""
 
-    def __init__(self, scale: float, inspect: Callable[[int], None]) -> None:
+    def __init__(self, inspect: Callable[[int], None]) -> None:
         """Show no trials; `inspect` is called with the number of the trial whose tile is pressed."""
         super().__init__()
         self._inspect = inspect
@@ -50,7 +50,7 @@ class TrialStrip(QScrollArea):
         scroll_area(inside, self)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setAccessibleName(tr("trials of the session"))
-        self.setFixedHeight(max(round((2 * SMALL + 2 * GRID) * scale), TARGET) + 12 + GRID // 2)  # with the scroll bar
+        self.setFixedHeight(max(px(2 * SMALL + 2 * GRID), TARGET) + 12 + GRID // 2)  # with the scroll bar
 
     def show_tiles(self, tiles: tuple[Tile, ...]) -> None:
         if tiles == self._shown:
@@ -92,14 +92,14 @@ class TrialStrip(QScrollArea):
 class InspectedTrial(QWidget):
     """Takes the place of the signals while a trial is inspected; readings go on behind it."""
 
-    def __init__(self, scale: float, back: Callable[[], None]) -> None:
+    def __init__(self, back: Callable[[], None]) -> None:
         super().__init__()
         self._shown: Inspection | None = None
         self.heading = label("", "name", wrap=True)
         self.verdict = label("", "title", wrap=True)
         self.details = label("", "quiet", wrap=True)
         self.cells = {name: label("–", "value") for name in PICTURE}
-        self._plots = [LivePlot(*plot, scale, PICTURE) for plot in PLOTS]
+        self._plots = [LivePlot(*plot, PICTURE) for plot in PLOTS]
         for plot in self._plots:
             plot.show_axis(times=plot is self._plots[-1], end=tr("end"))
         head = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
@@ -141,14 +141,14 @@ class InspectedTrial(QWidget):
 class Middle(QWidget):
     """Shows the signals of this moment, until a trial is inspected; the next stroke brings the signals back."""
 
-    def __init__(self, bridge: Bridge, scale: float, act: Callable[[str], None]) -> None:
+    def __init__(self, bridge: Bridge, act: Callable[[str], None]) -> None:
         super().__init__()
         self._bridge = bridge
         self.inspected: int | None = None  # number of the trial that is; None where none is
         self._phase = ""  # of the session that was shown last
-        self.strip = TrialStrip(scale, self.inspect)
-        self.live = LivePanel(bridge.feed, bridge.model, scale)
-        self.trial = InspectedTrial(scale, self.leave)
+        self.strip = TrialStrip(self.inspect)
+        self.live = LivePanel(bridge.feed, bridge.model)
+        self.trial = InspectedTrial(self.leave)
         self.stroke = WrappedLabel("value")
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))

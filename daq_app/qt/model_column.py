@@ -50,7 +50,7 @@ class ModelColumn(QWidget):
     other_wanted = Signal()
     said = Signal(str)  # what came of a picture or film that was written
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, tokens: Tokens) -> None:
         super().__init__()
         self._state: AnalystState | None = None
         self._film: m.Filmed | None = None
@@ -58,8 +58,8 @@ class ModelColumn(QWidget):
         self._drawing = ("", -1)  # picture that was asked for, and version of the report
         self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
         self._at: int | None = None  # of the film; None: the settled state
-        self.finger = FingerCanvas(tokens, scale)
-        self.other = FingerCanvas(tokens, scale, self.finger.sight)  # of the session that is compared
+        self.finger = FingerCanvas(tokens)
+        self.other = FingerCanvas(tokens, self.finger.sight)  # of the session that is compared
         self.other.hide()
         self.fields, self.plot = FieldBar(), FieldPlot(tokens)
         self.probe, self.errors = WrappedLabel("quiet", keeps_room=True), WrappedLabel("quiet")

@@ -23,7 +23,7 @@ from daq_app.qt.parts import (
     vbox,
 )
 from daq_app.qt.preferences import Millimetres
-from daq_app.qt.tokens import GRID, TARGET
+from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.new_session import (
     AXES,
@@ -51,7 +51,7 @@ class NewSessionPage(Panel):
 
     changed = Signal()
 
-    def __init__(self, scale: float, send: Callable[[Message], None], act: Callable[[str], None]) -> None:
+    def __init__(self, send: Callable[[Message], None], act: Callable[[str], None]) -> None:
         super().__init__(tr("new session"))
         self._send = send
         self._cards: tuple[Card, ...] = ()
@@ -84,7 +84,7 @@ class NewSessionPage(Panel):
         self.people_score, self.simulated = self._either(tr("People"), tr("Rehearse, simulated"))
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
-        self.screen_fields = ScreenFields(scale, act)
+        self.screen_fields = ScreenFields(act)
         words = tr("pilot this protocol with simulated hand and answers")
         self._pilot = button(tr("Pilot  F5"), words, lambda: act("pilot"))
         self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
@@ -97,7 +97,7 @@ class NewSessionPage(Panel):
             "subject": self.subject, "study": self.study, "folder": self.folder, "seed": self.seed,
             "height": self.height_above, "area": self.area,
         }  # fmt: skip
-        self._build(scale)
+        self._build()
         self._follow()
         self._place_changed()
         self._show_study()
@@ -262,7 +262,7 @@ class NewSessionPage(Panel):
         self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
         self._proposal.setText(code)
 
-    def _build(self, scale: float) -> None:
+    def _build(self) -> None:
         height = field(tr("Height of the face above the transducer's origin [mm]"), self.height_above)
         vbox(height, field(tr("Axis along which pressing is positive"), self.normal), on=self._height)
         vbox(field(tr("Contact area, for tau_max [mm²]"), self.area), on=self._area)
@@ -301,8 +301,8 @@ class NewSessionPage(Panel):
         inside = QWidget()
         vbox(label(tr("New session"), "title"), self.cut_short, self._columns, 1, on=inside, margins=GRID, spacing=GRID)
         vbox(scroll_area(inside), on=self, margins=2)
-        self._two = round(TWO * scale)
-        self.setMinimumWidth(round(280 * min(scale, 1.25)))
+        self._two = px(TWO)
+        self.setMinimumWidth(px(280, most=1.25))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the cards in two columns where there is room."""

@@ -55,10 +55,9 @@ class ZoomedPlot(pg.PlotWidget):
 
     def __init__(self, tokens: Tokens) -> None:
         pg.PlotWidget.__init__(self, background=tokens.surface)
-        scale = type_scale()
         self._names: Any = None
         self._text = tokens.text
-        self.setMinimumSize(120, round(100 + 160 * (scale - 1)))  # the axes take what the type needs
+        self.setMinimumSize(120, round(100 + 160 * (type_scale() - 1)))  # the axes take what the type needs
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setToolTip(tr("Wheel: zoom. Drag: move. Home or double-click: show all."))
         item: Any = self.getPlotItem()
@@ -73,7 +72,7 @@ class ZoomedPlot(pg.PlotWidget):
         item.setMenuEnabled(False)
         item.hideButtons()
         for side in ("left", "bottom"):
-            style_axis(item.getAxis(side), tokens, font(SMALL, scale))
+            style_axis(item.getAxis(side), tokens, font(SMALL))
 
     def name_across(self, words: str) -> None:
         """Name the horizontal axis in one or two lines, under its numbers."""
@@ -93,7 +92,7 @@ class ZoomedPlot(pg.PlotWidget):
             self._names.scene().removeItem(self._names)
             self._names = None
         if curves:
-            size = f"{font(SMALL, type_scale()).pixelSize()}px"
+            size = f"{font(SMALL).pixelSize()}px"
             self._names = pg.LegendItem(offset=None, colCount=len(curves), labelTextSize=size, pen=None, brush=None)
             self._names.setParentItem(self.getPlotItem().getViewBox())
             self._names.anchor(corner, corner)

@@ -7,10 +7,9 @@ from functools import cache
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize, Qt
-from PySide6.QtGui import QScreen
+from PySide6.QtGui import QFontInfo, QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
-from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
 from daq_app.window.subject import LENGTH
 from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr, tr_noop
 from sessions.recording import Setting
@@ -25,6 +24,7 @@ THEME, SCALE, LANGUAGE = "window/theme", "window/type scale", "window/language"
 LEAST, MOST = 40.0, 250.0  # what 100 mm may measure on a screen before it is taken for a slip of the hand [mm]
 PLAUSIBLE = (40.0, 600.0)  # dots an inch; a screen that says otherwise does not know its size
 USUAL_DPI = 96.0
+USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scaling
 _GEOMETRY, _RECENT = "window/geometry", "window/recent sessions"
 
 
@@ -37,11 +37,6 @@ def theme() -> str:
     """Return the theme that was chosen, one of THEMES."""
     said = str(settings().value(THEME))
     return said if said in THEMES else "system"
-
-
-def chosen_tokens() -> Tokens:
-    """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
-    return {"light": LIGHT, "dark": DARK}.get(theme()) or current_tokens()
 
 
 @cache
@@ -57,6 +52,12 @@ def chosen_scale() -> float:
     except ValueError:
         return font_scale()
     return chosen if chosen in SCALES else font_scale()
+
+
+def font_scale() -> float:
+    """Return how much larger than usual the system wants its type [-], from 1 to 2."""
+    points = QFontInfo(QGuiApplication.font()).pointSizeF()
+    return min(max(points / USUAL_POINTS, 1.0), 2.0) if points > 0 else 1.0
 
 
 def language() -> str:

@@ -27,7 +27,7 @@ from daq_app.qt.bridge import Bridge
 from daq_app.qt.keys import KEYS
 from daq_app.qt.parts import Panel, button, hbox, label, vbox
 from daq_app.qt.preferences import name_of, recent_sessions, remember_session
-from daq_app.qt.tokens import GRID, theme_of
+from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.state import NewSession
 from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 
@@ -60,14 +60,14 @@ LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
 class Rail(Panel):
     """Three buttons, one for each room; that of the room that is shown stays pressed."""
 
-    def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
+    def __init__(self, go: Callable[[Room], None]) -> None:
         super().__init__(tr("rooms"), "strip")
         self.buttons: dict[Room, QPushButton] = {}
         for room in ROOMS:
             name = tr(ROOM_NAMES[room])
             self.buttons[room] = button(f"{name}\n{KEY[room]}", name, partial(go, room), "rail", checkable=True)
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
-        self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
+        self.setFixedWidth(px(WIDTH, most=1.4))
 
     def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:
         """Show which room is open, and which can be; a session may be `in_hand`, or `over`."""
@@ -185,7 +185,7 @@ def _version(name: str) -> str:
 class ReviewRoom(QWidget):
     """One session at a time; another takes its place."""
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.analyst: AnalystWindow | None = None
         self.recent = QListWidget()
@@ -194,7 +194,7 @@ class ReviewRoom(QWidget):
         self.recent.itemClicked.connect(self._go)
         self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
         side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
-        side.setFixedWidth(round(LIST_WIDTH * scale))
+        side.setFixedWidth(px(LIST_WIDTH))
         vbox(label(tr("Recent sessions"), "section"), (self.recent, 1), choose, on=side, margins=(0, GRID, 0, GRID))
         self._row = hbox(side, (self._none, 1), on=self, spacing=GRID)
 
@@ -249,12 +249,12 @@ class ReviewRoom(QWidget):
 class Rooms(QStackedWidget):
     """Shows one room; rail and menu say which, and which others can be entered."""
 
-    def __init__(self, bridge: Bridge, scale: float, rail: Rail, menus: Menus) -> None:
+    def __init__(self, bridge: Bridge, rail: Rail, menus: Menus) -> None:
         """Show nothing yet: the room of the session in hand is the first widget that is added."""
         super().__init__()
         self._bridge, self._rail, self._menus = bridge, rail, menus
         self._kept: str | None = None  # folder of the session that was put among the recent ones
-        self.review = ReviewRoom(scale)  # added when it is first entered
+        self.review = ReviewRoom()  # added when it is first entered
 
     @property
     def room(self) -> Room:

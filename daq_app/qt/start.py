@@ -57,12 +57,13 @@ def window(arguments: list[str]) -> int:
         return _fail(f"{folder} is no folder: give a session's folder")
 
     def analyst(application: "QApplication") -> "AnalystWindow":
-        from daq_app.qt import preferences
         from daq_app.qt.analyst_window import AnalystWindow
+        from daq_app.qt.preferences import remember_session
+        from daq_app.qt.tokens import chosen_tokens
 
-        tokens = preferences.chosen_tokens()
-        _dress(application, tokens, preferences.type_scale())
-        preferences.remember_session(folder)
+        tokens = chosen_tokens()
+        _dress(application, tokens)
+        remember_session(folder)
         return AnalystWindow(folder, tokens)
 
     return _show_window(analyst)
@@ -114,19 +115,18 @@ def open_window(
     # The recorder's process starts while the window is being built.
     recorder = (start or Recorder.start)()
     recorder.send(Connect(SIMULATED_BENCH))
-    from daq_app.qt import preferences
     from daq_app.qt.bridge import Bridge
     from daq_app.qt.main_window import MainWindow
+    from daq_app.qt.tokens import chosen_tokens
 
     application.setQuitOnLastWindowClosed(False)
-    scale, tokens = preferences.type_scale(), theme or preferences.chosen_tokens()
-    _dress(application, tokens, scale)
+    _dress(application, theme or chosen_tokens())
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
-    window = MainWindow(bridge, scale, tablet)
+    window = MainWindow(bridge, tablet)
 
     def follow_theme() -> None:
-        _dress(application, preferences.chosen_tokens(), scale)
+        _dress(application, chosen_tokens())
 
     window.theme_chosen.connect(follow_theme)
     if theme is None:
@@ -195,7 +195,7 @@ def _speak(application: "QApplication") -> None:
         application.installTranslator(own)
 
 
-def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
+def _dress(application: "QApplication", tokens: "Tokens") -> None:
     from PySide6.QtGui import QIcon
 
     from daq_app.qt.tokens import palette, style_sheet, tick_palette
@@ -208,7 +208,7 @@ def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     application.setPalette(palette(tokens))
     for kind in ("QCheckBox", "QRadioButton"):
         application.setPalette(tick_palette(tokens), kind)  # pyright: ignore[reportArgumentType]  its stub asks for bytes
-    application.setStyleSheet(style_sheet(tokens, scale))
+    application.setStyleSheet(style_sheet(tokens))
 
 
 def _fail(sentence: str) -> int:

@@ -12,10 +12,10 @@ from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.analyst.stroke import Edge, History
 from daq_app.qt.parts import WrappedLabel, button, hbox, label, scroll_area, vbox
 from daq_app.qt.pictures import SaveButtons
-from daq_app.qt.preferences import settings, type_scale
+from daq_app.qt.preferences import settings
 from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import ReadingsTable, TextTable
-from daq_app.qt.tokens import GRID, TEXT, Tokens, font
+from daq_app.qt.tokens import GRID, TEXT, Tokens, font, px
 from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
@@ -185,11 +185,11 @@ class DecisionsBar(QWidget):
         self.by = QLineEdit(str(settings().value(BY, "")))
         self.by.setPlaceholderText(NOBODY)
         self.by.setAccessibleName(tr("code of who decides; never a name"))
-        self.by.setMaximumWidth(round(110 * type_scale()))
+        self.by.setMaximumWidth(px(110))
         self.by.editingFinished.connect(lambda: settings().setValue(BY, self.by.text()))
         self.why = QLineEdit()
         self.why.setPlaceholderText(DRAGGED)
-        self.why.setMinimumWidth(QFontMetrics(font(TEXT, type_scale())).horizontalAdvance(DRAGGED) + 3 * GRID)
+        self.why.setMinimumWidth(QFontMetrics(font(TEXT)).horizontalAdvance(DRAGGED) + 3 * GRID)
         self.why.setAccessibleName(tr("why an edge is moved"))
         self.stack = DecisionStack(self)
         self.stack.wanted.connect(self._ask)

@@ -12,7 +12,6 @@ from daq_app.analyst.stroke import EDGES, LEAP, STEP, Edge, PlacedEdge, RawReadi
 from daq_app.qt.painting import sheer
 from daq_app.qt.parts import hbox, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
-from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
 from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
@@ -241,7 +240,7 @@ class StrokeView(QWidget):
             ground = self._tokens.surface if edge == "lift" else None  # hides the end of a window close before it
             look = {"color": self._tokens.act, "fill": ground}
             line.label = pg.InfLineLabel(line, tr(edge), position=place, anchors=anchors, **look)
-            line.label.setFont(font(SMALL, type_scale()))
+            line.label.setFont(font(SMALL))
         line.sigDragged.connect(lambda: self._try(edge, float(line.value()) + self._origin))
         line.sigPositionChangeFinished.connect(lambda: self.moved.emit(edge, float(line.value()) + self._origin))
         plot.addItem(line, ignoreBounds=True)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
 from daq_app.qt.parts import Openness, WrappedLabel, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import GRID, missing_glyphs
+from daq_app.qt.tokens import GRID, missing_glyphs, px
 from daq_app.window.new_session import Refusal, SessionForm
 from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, preview, translator
 from daq_app.wording import tr
@@ -27,10 +27,10 @@ class SubjectPicture(QWidget):
     The window that draws it is a second one that nobody sees, so that the subject's answer is never in the picture.
     """
 
-    def __init__(self, scale: float, size: QSize) -> None:
+    def __init__(self, size: QSize) -> None:
         """Show nothing yet; `size` is that of the subject's window."""
         super().__init__()
-        self.page = SubjectWindow(scale, lambda: 0.0)  # draws the picture
+        self.page = SubjectWindow(lambda: 0.0)  # draws the picture
         self.page.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
         self.page.resize(size)
         self._view: SubjectView | None = None
@@ -80,10 +80,10 @@ class SubjectPicture(QWidget):
 class Thumbnail(SubjectPicture):
     """Shows the first page with a question; nothing while the form's protocol or study is refused."""
 
-    def __init__(self, scale: float) -> None:
-        super().__init__(scale, QSize(1000, 640))
+    def __init__(self) -> None:
+        super().__init__(QSize(1000, 640))
         self._drawn: object = None  # what the picture was drawn from
-        self.setFixedHeight(round(THUMBNAIL_HEIGHT * min(scale, 1.4)))
+        self.setFixedHeight(px(THUMBNAIL_HEIGHT, most=1.4))
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_form(self, form: SessionForm, size: QSize) -> None:
@@ -101,9 +101,8 @@ class Thumbnail(SubjectPicture):
 class Mirror(QWidget):
     """Shows the subject's page without any answer on it, so that it serves under every blinding."""
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._scale = scale
         self._view: SubjectView | None = None
         self._size = QSize(1000, 640)
         self.open = Openness(MIRROR, self._place)
@@ -129,19 +128,19 @@ class Mirror(QWidget):
         if self._view is None or not self.open:
             return
         if self.picture is None:
-            self.picture = SubjectPicture(self._scale, self._size)
-            self.picture.setFixedHeight(round(MIRROR_HEIGHT * min(self._scale, 1.4)))
+            self.picture = SubjectPicture(self._size)
+            self.picture.setFixedHeight(px(MIRROR_HEIGHT, most=1.4))
             self.picture.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self.layout().addWidget(self.picture)  # pyright: ignore[reportOptionalMemberAccess]  it was set above
         self.picture.show_page(self._view, self._size)
 
 
-def open_preview(form: SessionForm, size: QSize, scale: float, parent: QWidget) -> str:
+def open_preview(form: SessionForm, size: QSize, parent: QWidget) -> str:
     """Show the pages of a form's protocol as they look in a window of a size; return why not, empty where they are."""
     pages = preview(form, translator(form.language or ENGLISH))
     if isinstance(pages, Refusal):
         return " ".join(pages.sentences.values())
-    shown = SubjectPreview(pages, size, scale, parent)
+    shown = SubjectPreview(pages, size, parent)
     shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     shown.show()
     return ""
@@ -150,17 +149,17 @@ def open_preview(form: SessionForm, size: QSize, scale: float, parent: QWidget) 
 class SubjectPreview(QDialog):
     """The pages as a list, and the picture of the one that is chosen."""
 
-    def __init__(self, pages: Sequence[PreviewPage], size: QSize, scale: float, parent: QWidget | None = None) -> None:
+    def __init__(self, pages: Sequence[PreviewPage], size: QSize, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("window")
         self.setWindowTitle(tr("daq-app · preview of the subject's pages"))
         self.setAccessibleName(tr("preview of the subject's pages"))
         self._pages, self._size = tuple(pages), size
-        self.picture = SubjectPicture(scale, size)
+        self.picture = SubjectPicture(size)
         self.list = _Pages()
         self.list.setAccessibleName(tr("pages that the subject will see"))
         self.list.addItems([page.name for page in self._pages])
-        self.list.setFixedWidth(round(LIST * min(scale, 1.5)))
+        self.list.setFixedWidth(px(LIST, most=1.5))
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.lost = WrappedLabel("value", "look")
@@ -170,7 +169,7 @@ class SubjectPreview(QDialog):
         close = button(tr("Close  Esc"), tr("close the preview"), self.close)
         page = vbox((self.picture, 1), self.lost, hbox(self.back, self.on, self._count, 1, close), spacing=GRID)
         hbox(self.list, (page, 1), on=self, margins=2 * GRID, spacing=2 * GRID)
-        self.resize(round(1000 * min(scale, 1.25)), round(560 * min(scale, 1.25)))
+        self.resize(px(1000, most=1.25), px(560, most=1.25))
         self.list.currentRowChanged.connect(self._show)
         self.list.setCurrentRow(0)
         self.list.setFocus()

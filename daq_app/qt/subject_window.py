@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QVBoxLayout, QWid
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
 from daq_app.qt.parts import button, fill, hbox, label, say, stack_pages, vbox
 from daq_app.qt.preferences import LEAST, MOST, direction, millimetres, store_ruler_length
-from daq_app.qt.tokens import GRID, font
+from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
 from daq_app.wording import tr
@@ -30,7 +30,7 @@ class SubjectWindow(QWidget):
     screen_changed = Signal()
     closed = Signal()  # by somebody, not by the program
 
-    def __init__(self, scale: float, now: Callable[[], float]) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
         super().__init__()
         self.setObjectName("window")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
@@ -41,26 +41,25 @@ class SubjectWindow(QWidget):
         self.given_with: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
         self._language = ENGLISH
-        self._type = scale  # of the letters, by their size at 100 %
         self._title, self._text = label(role="title", wrap=True), label(wrap=True)
-        self.press = PressBar(scale)
+        self.press = PressBar()
         self.press.hide()
         self._question, self._hint = label(role="title", wrap=True), label(wrap=True)
         self.line = ScoreLine(now)
         self._scale = _Scale(self.line)
-        self.number = NumberField(scale, now)
-        self.choice = ChoiceOfTwo(scale, now)
+        self.number = NumberField(now)
+        self.choice = ChoiceOfTwo(now)
         self._ways = stack_pages(self._scale, self.number, self.choice)
         self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
-        self.next.setMinimumSize(round(180 * scale), round(64 * scale))
-        self.ruler = RulerCheck(scale)
+        self.next.setMinimumSize(px(180), px(64))
+        self.ruler = RulerCheck()
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
         self.ruler.done.connect(self._ruler_done)
         self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
         for way in (self.line, self.number, self.choice):
             way.changed.connect(self._answer_changed)
-        self.setMinimumSize(round(560 * min(scale, 1.25)), 340)
+        self.setMinimumSize(px(560, most=1.25), 340)
         self.resize(1000, 640)
         self.fit_screen()
 
@@ -110,10 +109,10 @@ class SubjectWindow(QWidget):
         layout = self._answer_layout if self.scoring else self._message_layout
         for part in SHRINKING:
             for widget in (self._title, self._question):
-                _set_type(widget, LARGER * part, self._type, bold=True)
+                _set_type(widget, LARGER * part, bold=True)
             for widget in (self._text, self._hint):
-                _set_type(widget, LARGE * part, self._type)
-            self._scale.set_type(LARGE * part, self._type)
+                _set_type(widget, LARGE * part)
+            self._scale.set_type(LARGE * part)
             layout.invalidate()
             layout.activate()  # a page that is not shown has not yet heard of its new texts
             if layout.totalHeightForWidth(self.width()) <= self.height():
@@ -201,7 +200,7 @@ class SubjectWindow(QWidget):
         layout.setContentsMargins(6 * GRID, 6 * GRID, 6 * GRID, 6 * GRID)
         layout.addStretch(1)
         for shown in (self._title, self._text, self.press):
-            shown.setMaximumWidth(round(TEXT_WIDTH * self._type))
+            shown.setMaximumWidth(px(TEXT_WIDTH))
             layout.addLayout(hbox(1, (shown, 100), 1))
             layout.addSpacing(3 * GRID)
         layout.addStretch(2)
@@ -274,9 +273,9 @@ class _Scale(QWidget):
             say(shown, words)
         self.fit()
 
-    def set_type(self, size: float, scale: float) -> None:
+    def set_type(self, size: float) -> None:
         for end in self._ends:
-            _set_type(end, size, scale)
+            _set_type(end, size)
         self.fit()
 
     def fit(self) -> None:
@@ -302,7 +301,7 @@ class RulerCheck(QWidget):
 
     done = Signal()
 
-    def __init__(self, scale: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self._screen: QScreen | None = None
         self._line = ScoreLine(lambda: 0.0)  # the very line on which is answered
@@ -311,7 +310,7 @@ class RulerCheck(QWidget):
         sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
         self._measured = QLineEdit()
         self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
-        self._measured.setFixedWidth(round(100 * scale))
+        self._measured.setFixedWidth(px(100))
         self._measured.returnPressed.connect(self._keep)
         self._wrong = label("", "quiet", wrap=True)
         keep = button(tr("Keep"), tr("keep the measured length"), self._keep)
@@ -349,7 +348,7 @@ def _question_of(view: SubjectView) -> tuple[object, ...]:
     return view.kind, view.key, view.ends, view.ticks
 
 
-def _set_type(widget: QLabel, size: float, scale: float, *, bold: bool = False) -> None:
+def _set_type(widget: QLabel, size: float, *, bold: bool = False) -> None:
     """Set a label in large type: the style sheet's sizes are those of the experimenter's window."""
-    widget.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
-    widget.setFont(font(round(size), scale, bold=bold))
+    widget.setStyleSheet(f"font-size: {px(size)}px; font-weight: {600 if bold else 400};")
+    widget.setFont(font(round(size), bold=bold))

@@ -2,19 +2,21 @@
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from math import inf
 from pathlib import Path
 from string import Template
 from unicodedata import category, normalize
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetrics, QGuiApplication, QPalette
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QGuiApplication, QPalette
 from PySide6.QtWidgets import QWidget
+
+from daq_app.qt.preferences import theme, type_scale
 
 GRID = 8  # everything keeps to multiples of it [device-independent pixels]
 TARGET = 40  # least height of what is clicked or touched
-SMALL, TEXT, TITLE, HEADLINE = 13, 15, 20, 32  # type, before the system's font scale
+SMALL, TEXT, TITLE, HEADLINE = 13, 15, 20, 32  # type, before its scale
 STYLE = Path(__file__).with_name("style.qss")  # names of tokens and sizes stand after a $
-USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scaling
 
 # Okabe and Ito's palette, distinct with every common colour blindness.
 FX, FY, N, T, MU, MODEL = "#0072B2", "#E69F00", "#56B4E9", "#D55E00", "#CC79A7", "#009E73"
@@ -56,21 +58,25 @@ def current_tokens() -> Tokens:
     return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
 
 
+def chosen_tokens() -> Tokens:
+    """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
+    return {"light": LIGHT, "dark": DARK}.get(theme()) or current_tokens()
+
+
 def theme_of(widget: QWidget) -> Tokens:
     """Return the theme in which a widget is shown: light text stands on dark grounds."""
     return DARK if widget.palette().windowText().color().lightness() > 127 else LIGHT
 
 
-def font_scale() -> float:
-    """Return how much larger than usual the system wants its type [-], from 1 to 2."""
-    points = QFontInfo(QGuiApplication.font()).pointSizeF()
-    return min(max(points / USUAL_POINTS, 1.0), 2.0) if points > 0 else 1.0
+def px(length: float, most: float = inf) -> int:
+    """Return a length that grows with the type, but no more than `most` times [px]."""
+    return round(length * min(type_scale(), most))
 
 
-def font(size: int, scale: float, *, bold: bool = False) -> QFont:
+def font(size: float, *, bold: bool = False) -> QFont:
     """Return the window's type at a size, with figures that all have the same width."""
     typeface = QFont(QGuiApplication.font())
-    typeface.setPixelSize(round(size * scale))
+    typeface.setPixelSize(px(size))
     typeface.setFeature(QFont.Tag.fromString("tnum"), 1)
     if bold:
         typeface.setWeight(QFont.Weight.DemiBold)
@@ -105,12 +111,12 @@ def tick_palette(t: Tokens) -> QPalette:
     return colours
 
 
-def style_sheet(t: Tokens, scale: float) -> str:
+def style_sheet(t: Tokens) -> str:
     """Return the style sheet of every widget of the window; a button is at least as high as a line of its type."""
     sizes = {"small": SMALL, "text": TEXT, "title": TITLE, "headline": HEADLINE}
-    lengths = {f"px_{name}": round(size * scale) for name, size in sizes.items()}
+    lengths = {f"px_{name}": px(size) for name, size in sizes.items()}
     tall = (("button", TEXT, TARGET - 10), ("primary", TITLE, TARGET))
-    lengths |= {f"tall_{name}": max(least, QFontMetrics(font(size, scale)).height()) for name, size, least in tall}
+    lengths |= {f"tall_{name}": max(least, QFontMetrics(font(size)).height()) for name, size, least in tall}
     pixels = {name: f"{length}px" for name, length in (lengths | {"tall_field": TARGET - 12}).items()}
     return Template(STYLE.read_text(encoding="utf-8")).substitute(asdict(t) | pixels)
 

@@ -11,9 +11,10 @@ from examples import short_protocol
 from PySide6.QtCore import QEvent, QSettings
 from PySide6.QtWidgets import QApplication
 
-from daq_app.qt.preferences import settings
+from daq_app.qt.preferences import SCALE, choose, settings, type_scale
 from daq_app.qt.start import open_window
 from daq_app.qt.subject_window import SubjectWindow
+from daq_app.qt.tokens import style_sheet
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
@@ -65,14 +66,27 @@ def application(tmp_path_factory):
 
 
 @pytest.fixture
-def subject_page(application):
-    """Return a function that shows a view in a window for the subject, at a scale of the fonts."""
+def type_size():
+    """Return what chooses a size of type; the usual one comes back."""
+
+    def started_anew(scale):
+        choose(SCALE, scale)
+        type_scale.cache_clear()
+
+    yield started_anew
+    started_anew(None)
+
+
+@pytest.fixture
+def subject_page(application, type_size):
+    """Return a function that shows a view in a window for the subject, at a size of type."""
     windows = []
 
-    def shown(view, scale, size, direction=None, style="", hand=None):
-        window = SubjectWindow(scale, lambda: 0.0)
+    def shown(view, scale, size, direction=None, theme=None, hand=None):
+        type_size(scale)
+        window = SubjectWindow(lambda: 0.0)
         windows.append(window)
-        window.setStyleSheet(style)
+        window.setStyleSheet("" if theme is None else style_sheet(theme))
         if direction is not None:
             window.setLayoutDirection(direction)
         window.resize(*size)

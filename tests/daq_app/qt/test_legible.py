@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES
 from daq_app.analyst.state import selected_row
-from daq_app.qt import preferences, tokens
+from daq_app.qt import tokens
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.live_panel import PLOTS
@@ -82,7 +82,7 @@ def themed(application, request):
     def shown(widget, palette=tokens.palette):
         widget.setStyle(fusion)
         widget.setPalette(palette(request.param))
-        widget.setStyleSheet(tokens.style_sheet(request.param, 1.0))
+        widget.setStyleSheet(tokens.style_sheet(request.param))
         widget.show()
         application.processEvents()
 
@@ -201,14 +201,15 @@ def test_a_row_an_example_a_tab_a_head_and_a_cell_are_noticed_where_they_are_cut
 
 
 @pytest.fixture
-def windows(driver):
+def windows(driver, type_size):
     """Return a function that makes the experimenter's window in a theme and at a size of type."""
     made, bridge = [], driver.window.bridge
 
     def make(size, scale, theme):
-        window = MainWindow(bridge, scale)
+        type_size(scale)
+        window = MainWindow(bridge)
         made.append(window)
-        window.setStyleSheet(tokens.style_sheet(theme, scale))
+        window.setStyleSheet(tokens.style_sheet(theme))
         window.resize(*size)
         window.show()
         settle(driver.application)
@@ -275,18 +276,6 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
             assert (window.width(), window.height()) == size
 
 
-@pytest.fixture
-def type_size():
-    """Return what chooses a size of type; the usual one comes back."""
-
-    def started_anew(scale):
-        preferences.choose(preferences.SCALE, scale)
-        preferences.type_scale.cache_clear()
-
-    yield started_anew
-    started_anew(None)
-
-
 @pytest.mark.parametrize(
     ("size", "scale"),
     [
@@ -298,7 +287,7 @@ def type_size():
 def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, scale):
     type_size(scale)
     window = AnalystWindow(SESSION, tokens.LIGHT, Nobody())
-    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
     window.resize(*size)
     window.show()
     window.take(m.ReportReady("predicted", example()))
@@ -359,9 +348,10 @@ def cut_axes(window):
         for scale in SCALES
     ],
 )
-def test_no_text_that_the_subject_sees_is_cut_off(application, size, scale, language):
-    window = SubjectWindow(scale, lambda: 0.0)
-    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+def test_no_text_that_the_subject_sees_is_cut_off(application, type_size, size, scale, language):
+    type_size(scale)
+    window = SubjectWindow(lambda: 0.0)
+    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
     window.resize(*size)
     window.show()
     for name in protocol_names():
@@ -377,7 +367,7 @@ def test_no_text_that_the_subject_sees_is_cut_off(application, size, scale, lang
 
 @pytest.mark.usefixtures("application")
 def test_the_words_of_a_lift_and_of_the_next_onset_never_lie_on_each_other():
-    plot = LivePlot(*PLOTS[0], 1.0)
+    plot = LivePlot(*PLOTS[0])
     plot.resize(220, 160)
     time = np.linspace(0.0, 10.0, 50)
     for gap in np.linspace(0.1, 4.0, 40):

@@ -116,7 +116,7 @@ def test_sessions_that_were_cut_short_are_looked_for_in_the_folder_that_is_chose
 
 @pytest.mark.usefixtures("application")
 def test_a_number_is_typed_of_digits_alone():
-    field = NumberField(1.0, lambda: 0.0)
+    field = NumberField(lambda: 0.0)
     QTest.keyClicks(field.field, "stop")
     assert field.field.text() == ""
     QTest.keyClicks(field.field, "-1x2,5")
@@ -125,7 +125,7 @@ def test_a_number_is_typed_of_digits_alone():
 
 
 def test_a_choice_by_touch_is_kept_as_one_by_touch(application):
-    choice, finger = ChoiceOfTwo(1.0, lambda: 0.0), QTest.createTouchDevice()
+    choice, finger = ChoiceOfTwo(lambda: 0.0), QTest.createTouchDevice()
     choice.show()
     application.processEvents()
     place = choice.second.rect().center()

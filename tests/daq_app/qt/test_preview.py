@@ -21,7 +21,7 @@ def opened(application):
     made = []
 
     def show(pages):
-        made.append(SubjectPreview(pages, QSize(1366, 768), 1.0))
+        made.append(SubjectPreview(pages, QSize(1366, 768)))
         made[-1].show()
         application.processEvents()
         return made[-1]

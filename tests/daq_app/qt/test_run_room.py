@@ -79,7 +79,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         assert not live.map.isVisible()
         assert live.tab.accessibleName().startswith("open the drawer")
         assert preferences.settings().value(DRAWER) == "no"
-        again = LivePanel(window.bridge.feed, window.bridge.model, 1.0)
+        again = LivePanel(window.bridge.feed, window.bridge.model)
         assert not again.drawer.open
         click(live.tab)
         assert live.map.isVisible()
@@ -90,7 +90,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         QTest.mouseMove(handle, middle - QPoint(60, 0))
         QTest.mouseRelease(handle, LEFT, pos=middle - QPoint(60, 0))
         assert live.drawer.sizes()[1] == pytest.approx(before[1] + 60, abs=3)
-        again = LivePanel(window.bridge.feed, window.bridge.model, 1.0)
+        again = LivePanel(window.bridge.feed, window.bridge.model)
         again.resize(live.size())
         again.show()
         driver.application.processEvents()
@@ -118,9 +118,10 @@ def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_strok
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
-def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application, scale):
-    shown = InspectedTrial(scale, lambda: None)
-    shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application, type_size, scale):
+    type_size(scale)
+    shown = InspectedTrial(lambda: None)
+    shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
     picture = StrokePicture(np.linspace(0.0, 3.0, 50), np.ones((4, 50)), 0.5, 2.5, (1.2, 0.5, 0.41, 20.6))
     cells = (("N", "12.34 N"), ("T", "12.34 N"), ("mu", "0.41"), ("speed", "120 mm/s"))
     words = "Redo: the finger was not lifted between strokes. Lift the finger between strokes."
@@ -138,9 +139,10 @@ def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application,
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
-def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(application, scale):
-    strip = TrialStrip(scale, lambda _: None)
-    strip.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(application, type_size, scale):
+    type_size(scale)
+    strip = TrialStrip(lambda _: None)
+    strip.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
     strip.resize(600, strip.height())
     strip.show()
     kinds = ["done"] * 40 + ["current"] + ["coming"] * 19
@@ -157,7 +159,7 @@ def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(
 
 @pytest.mark.usefixtures("application")
 def test_a_tile_of_a_session_that_is_over_cannot_be_pressed():
-    strip = TrialStrip(1.0, lambda _: None)
+    strip = TrialStrip(lambda _: None)
     strip.show_tiles(tuple(Tile(number, "K50", "coming") for number in range(1, 4)))
     strip.show()
     gone = strip.tiles[2]
@@ -170,7 +172,7 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
     class Feed:
         trace = LiveTrace(100.0)
 
-    panel = LivePanel(Feed, driver.window.bridge.model, 1.0)
+    panel = LivePanel(Feed, driver.window.bridge.model)
     panel.resize(800, 600)
     panel.show()
     driver.application.processEvents()
@@ -195,7 +197,7 @@ def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transdu
     class Feed:
         trace = LiveTrace(100.0)
 
-    panel = LivePanel(Feed, driver.window.bridge.model, 1.0)
+    panel = LivePanel(Feed, driver.window.bridge.model)
     panel.resize(1200, 800)
     panel.show()
     driver.application.processEvents()

@@ -28,7 +28,7 @@ def page(subject_page):
     """Return a function that shows a view in a window for the subject, in the program's own style."""
 
     def shown(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
-        return subject_page(view, scale, size, direction, tokens.style_sheet(tokens.LIGHT, scale), "right")
+        return subject_page(view, scale, size, direction, tokens.LIGHT, "right")
 
     return shown
 
@@ -84,7 +84,7 @@ def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_who
 @pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])
 @pytest.mark.usefixtures("application")
 def test_the_bar_of_the_force_fills_from_where_reading_begins(direction):
-    bar = PressBar(1.0)
+    bar = PressBar()
     bar.setLayoutDirection(direction)
     bar.resize(400, 40)
     bar._force = 0.25 * FULL

@@ -27,7 +27,7 @@ from daq_app.qt.subject_window import SubjectWindow
 desk, tablet = application.screens()
 preferences.store_ruler_length(desk, 80.0)     # a line meant to be 100 mm long measured 80 there
 preferences.store_ruler_length(tablet, 125.0)  # and 125 here
-subject = SubjectWindow(1.0, lambda: 0.0)
+subject = SubjectWindow(lambda: 0.0)
 subject.show()
 told = []
 for screen in (desk, tablet, desk):

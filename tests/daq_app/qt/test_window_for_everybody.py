@@ -186,7 +186,7 @@ def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_rememb
         QTest.keyClick(window, Qt.Key.Key_M)
         assert model.kinematics == kinematics
         assert remembered().value(FINITE) == kept
-        again = LivePanel(window.bridge.feed, model, 1.0)
+        again = LivePanel(window.bridge.feed, model)
         assert again.bar.finite.isChecked() == (kinematics == "finite")
 
 
@@ -319,7 +319,7 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
 
 @pytest.mark.usefixtures("application")
 def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_moment():
-    bar, trace = PressBar(1.0), LiveTrace(100.0)
+    bar, trace = PressBar(), LiveTrace(100.0)
     values = np.full((len(CHANNELS), 200), np.nan)
     values[CHANNELS.index("N"), :180], values[CHANNELS.index("N"), 180:] = 4.0, 2.5
     bar.resize(400, 40)
