@@ -23,9 +23,11 @@ TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
 PART = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
-MAGMA = ("#fcfdbf", "#fecf92", "#fe9f6d", "#f7705c", "#de4968", "#b5367a", "#8c2981", "#641a80", "#3b0f70")
+MAGMA = (
+    "#fcfdbf", "#fde9aa", "#fed698", "#fec186", "#feae77", "#fd9a6a", "#fb8660", "#f7715c", "#f05f5d", "#e44f64",
+    "#d5446c", "#c43c74", "#b3367a", "#a1307e", "#902a81", "#7f2482", "#6e1e81", "#5d177f", "#4d117a", "#3b0f70",
+)  # fmt: skip
 ROW_LINES = 4.0  # of text, below which height the row is left out and the finger has all the room
-SHADES = 20
 TOP_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
 EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
@@ -202,11 +204,11 @@ class FingerView(QWidget):
 
     def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
         part = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
-        shade = (part * (SHADES - 1)).astype(np.int64)
+        shade = (part * (len(MAGMA) - 1)).astype(np.int64)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.setPen(Qt.PenStyle.NoPen)
         for number, path in faces(places[picture.faces], shade):
-            painter.setBrush(_COLOURS[number])
+            painter.setBrush(QColor(MAGMA[number]))
             painter.drawPath(path)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
@@ -241,15 +243,3 @@ def _alike(one: Picture | None, other: Picture | None) -> bool:
     if one is None or other is None:
         return one is other
     return one is other or np.array_equal(one.outline, other.outline)
-
-
-def _shades() -> list[QColor]:
-    """Return the colours from none of the SED to all of the scale."""
-    known = np.array([[int(name[i : i + 2], 16) for i in (1, 3, 5)] for name in MAGMA], float)
-    at = np.linspace(0.0, len(MAGMA) - 1.0, SHADES)
-    table = np.column_stack([np.interp(at, np.arange(len(MAGMA)), known[:, i]) for i in range(3)])
-    rows: list[list[int]] = table.round().astype(int).tolist()
-    return [QColor(*row) for row in rows]
-
-
-_COLOURS = _shades()
