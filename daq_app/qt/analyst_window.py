@@ -4,7 +4,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -26,7 +26,7 @@ from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
 from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, scroll_area, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
-from daq_app.qt.tokens import GRID, MODEL, Tokens, px
+from daq_app.qt.tokens import GRID, MODEL, Tokens, px, theme_of
 from daq_app.wording import tr
 from sessions.exchange import FORMATS
 from sessions.prediction import QUANTITIES
@@ -41,9 +41,8 @@ class LineageLabel(QLabel):
 
     followed = Signal(str)  # the place that a link leads to
 
-    def __init__(self, tokens: Tokens) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._tokens = tokens
         self._links: tuple[Link, ...] = ()
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setWordWrap(True)
@@ -59,11 +58,20 @@ class LineageLabel(QLabel):
         if links == self._links:
             return
         self._links = links
-        style = f"color: {self._tokens.act}"
-        elements = (f'<a href="{link.place}" style="{style}">{escape(link.words)}</a>' for link in links)
-        self.setText(" &nbsp;→&nbsp; ".join(elements))
+        self._show()
         whole = " → ".join(link.words for link in links)
         self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=whole))
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Write the links in the colour of another theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.StyleChange:
+            self._show()
+
+    def _show(self) -> None:
+        style = f"color: {theme_of(self).act}"
+        elements = (f'<a href="{link.place}" style="{style}">{escape(link.words)}</a>' for link in self._links)
+        self.setText(" &nbsp;→&nbsp; ".join(elements))
 
     def _tell(self, place: str) -> None:
         self.setToolTip(next((link.more for link in self._links if link.place == place), ""))
@@ -81,7 +89,7 @@ class AnalystWindow(QMainWindow):
         self._work = work or Analyst(folder)
         self.keys = KeysPage(self, ANALYST_KEYS)
         self._head = label("", "simulated")
-        self.way = LineageLabel(tokens)
+        self.way = LineageLabel()
         self.way.followed.connect(self._follow)
         self.trials = TrialsColumn(tokens)
         self.stroke = StrokeColumn(tokens)
@@ -134,10 +142,10 @@ class AnalystWindow(QMainWindow):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Undo):
-            self.stroke.decisions.stack.undo()
+            self.stroke.decisions.undo.click()
             return
         if event.matches(QKeySequence.StandardKey.Redo):
-            self.stroke.decisions.stack.redo()
+            self.stroke.decisions.redo.click()
             return
         control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         match event.key():

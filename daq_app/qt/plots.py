@@ -67,7 +67,7 @@ class ZoomedPlot(pg.PlotWidget):
         self.words = label("", "tight")
         self.words.setParent(self)
         self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.words.setStyleSheet(f"background: {tokens.surface}; padding: 0 {GRID // 2}px;")
+        self.words.setStyleSheet(f"background: {tokens.surface}; color: {tokens.text}; padding: 0 {GRID // 2}px;")
         self._hide_words()
         item.setMenuEnabled(False)
         item.hideButtons()

@@ -1,9 +1,7 @@
 """The chosen stroke: its curves and edges, its replay, what was decided about it, its numbers and its readings."""
 
-from collections.abc import Callable
-
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QFontMetrics, QUndoCommand, QUndoStack
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
 from daq_app.analyst import state as m
@@ -17,7 +15,7 @@ from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import ReadingsTable, TextTable
 from daq_app.qt.tokens import GRID, TEXT, Tokens, font, px
 from daq_app.qt.transport_bar import TransportBar
-from daq_app.wording import tr
+from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 NUMBERS, READINGS = range(2)  # tabs
@@ -82,7 +80,7 @@ class StrokeColumn(QWidget):
         self._moving = self._moving and state.step is not None
         decided = () if stroke is None else stroke.decided.values()
         self.decisions.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in decided))
-        self.decisions.stack.show_history(state.history)
+        self.decisions.show_history(state.history)
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
         if (lines := numbers(state)) != self._lines:
@@ -145,36 +143,6 @@ class StrokeColumn(QWidget):
             self.readings.go_to(at)
 
 
-class DecisionStack(QUndoStack):
-    """The session's file holds the decisions, and whatever it says is shown; `wanted` asks for the next line of it."""
-
-    wanted = Signal(bool)  # True: redo; False: undo
-
-    def show_history(self, history: History) -> None:
-        """Show what can be undone and redone; nothing is asked for by it."""
-        decisions = [*history.done, *history.undone]
-        if decisions == [self.text(at) for at in range(self.count())] and len(history.done) == self.index():
-            return
-        with QSignalBlocker(self):  # each command that is pushed is done, and one that is left is undone
-            self.clear()
-            for words in decisions:
-                self.push(_Decision(words, self.wanted.emit))
-            self.setIndex(len(history.done))
-        self.indexChanged.emit(self.index())
-
-
-class _Decision(QUndoCommand):
-    def __init__(self, words: str, ask: Callable[[bool], object]) -> None:
-        super().__init__(words)
-        self._ask = ask
-
-    def undo(self) -> None:
-        self._ask(False)
-
-    def redo(self) -> None:
-        self._ask(True)
-
-
 class DecisionsBar(QWidget):
     """A code, a reason, undo and redo; under them what was decided about the chosen stroke."""
 
@@ -191,12 +159,9 @@ class DecisionsBar(QWidget):
         self.why.setPlaceholderText(DRAGGED)
         self.why.setMinimumWidth(QFontMetrics(font(TEXT)).horizontalAdvance(DRAGGED) + 3 * GRID)
         self.why.setAccessibleName(tr("why an edge is moved"))
-        self.stack = DecisionStack(self)
-        self.stack.wanted.connect(self._ask)
-        self.stack.indexChanged.connect(self._show_next)
-        self.undo = button(tr("Undo"), "", self.stack.undo, "small")
-        self.redo = button(tr("Redo"), "", self.stack.redo, "small")
-        self._show_next()
+        self.undo = button(tr("Undo"), "", lambda: self.requested.emit(m.Undo(self.who())), "small")
+        self.redo = button(tr("Redo"), "", lambda: self.requested.emit(m.Undo(self.who(), again=True)), "small")
+        self.show_history(History())
         self.sentences_label = WrappedLabel("value", "look")
         by, why = label(tr("by"), "quiet"), label(tr("why"), "quiet")
         row = hbox(by, self.by, why, (self.why, 1), self.undo, self.redo, spacing=GRID // 2)
@@ -208,16 +173,13 @@ class DecisionsBar(QWidget):
     def reason(self) -> str:
         return self.why.text().strip() or DRAGGED
 
-    def _ask(self, again: bool) -> None:
-        self.requested.emit(m.Undo(self.who(), again))
-
-    def _show_next(self) -> None:
+    def show_history(self, history: History) -> None:
         """Say on each button what it would do next."""
-        stack = self.stack
-        for widget, can, words in (
-            (self.undo, stack.canUndo(), tr("undo {decision}, Ctrl+Z", decision=stack.undoText())),
-            (self.redo, stack.canRedo(), tr("redo {decision}, Ctrl+Shift+Z", decision=stack.redoText())),
+        for widget, decisions, words in (
+            (self.undo, history.done[-1:], tr_noop("undo {decision}, Ctrl+Z")),
+            (self.redo, history.undone[:1], tr_noop("redo {decision}, Ctrl+Shift+Z")),
         ):
-            widget.setEnabled(can)
-            widget.setAccessibleName(words if can else tr("{button}: no decision", button=widget.text()))
+            widget.setEnabled(bool(decisions))
+            none = tr("{button}: no decision", button=widget.text())
+            widget.setAccessibleName(tr(words, decision=decisions[0]) if decisions else none)
             widget.setToolTip(widget.accessibleName())

@@ -1,5 +1,7 @@
 """The windows can be read: contrast as it is painted, and no text cut off at any size of type."""
 
+import re
+
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
@@ -131,6 +133,21 @@ def test_the_outline_of_what_can_be_ticked_stands_out_in_both_themes(themed, kin
     widget.resize(60, 30)
     themed(widget, tokens.tick_palette)
     assert painted_contrast(widget, widget.rect()) >= 3.0  # WCAG 2.1, 1.4.11
+
+
+@pytest.mark.usefixtures("application")
+def test_review_can_be_read_after_the_theme_was_changed_while_a_session_is_open(themed):
+    window = AnalystWindow(SESSION, tokens.LIGHT, Nobody())
+    window.take(m.ReportReady("predicted", example()))
+    words = window.stroke.stroke._plots[0].words
+    words.setText("HHHH 12")
+    words.adjustSize()
+    themed(window)
+    words.show()
+    assert painted_contrast(words, words.rect()) >= 4.5
+    ground = window.grab().toImage().pixelColor(2, 2).name()
+    assert {contrast(colour, ground) >= 4.5 for colour in re.findall("#[0-9a-f]{6}", window.way.text())} == {True}
+    window.close()
 
 
 @pytest.mark.parametrize("part", [0, 100])

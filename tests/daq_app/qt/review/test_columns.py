@@ -290,7 +290,7 @@ def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
 
 
 def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
-    way = LineageLabel(LIGHT)
+    way = LineageLabel()
     way.show_links(lineage(window.state))
     way.show()
     way.activateWindow()
