@@ -7,21 +7,19 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
+from daq_app.qt.keys import KEYS
 from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, say, stack_pages, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.state import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import tr
 from sessions.run import steps
 
 MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # that take a text
-ACTS = {
-    "skip": tr_noop("skip the trial, with a reason"), "redo": tr_noop("redo the trial, with a reason"),
-    "pause": tr_noop("pause"), "note": tr_noop("write a note"), "no answer": tr_noop("the subject gives no answer"),
-    "end": tr_noop("end the session, with a reason"),
-}  # fmt: skip
+ACTS = ("skip", "redo", "pause", "note", "no answer", "end")  # that have a button
+WORDS = {name: key.words for key in KEYS for name in (key.key, key.act)}
 ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
 
 
@@ -37,7 +35,7 @@ class CoursePanel(Panel):
         self.plan = QListWidget()
         self.plan.setAccessibleName(tr("plan: trials done, in hand and coming"))
         self.plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.buttons = {act: button("", tr(name), partial(self.ask, act), "small") for act, name in ACTS.items()}
+        self.buttons = {act: button("", tr(WORDS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
@@ -70,6 +68,7 @@ class CoursePanel(Panel):
             shown = _button_of(view, name)
             if before is None or shown != _button_of(before, name):
                 widget.setText(f"{shown.label} {tr(shown.key)}".strip())
+                widget.setAccessibleName(f"{shown.label}: {tr(WORDS.get(shown.key, WORDS['no answer']))}")
                 widget.setEnabled(shown.enabled)
 
     def ask(self, what: str) -> None:

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QMainWindow, QWidget
 
 from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
-from daq_app.qt.course_panel import CoursePanel
+from daq_app.qt.course_panel import ACTS, CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
@@ -32,7 +32,7 @@ from daq_app.window.view_course import Button
 from daq_app.wording import tr
 from sessions.run import steps
 
-COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "end"})  # of the session in hand
+COURSE = frozenset({"primary", *ACTS})  # of the session in hand
 # Before the scale of the fonts [px]:
 WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away

@@ -40,8 +40,8 @@ WHY_NOT = {
     "prepare": tr_noop("A session is being recorded: end it before the next is prepared."),
     "run": tr_noop("No session is in hand: start one in Prepare."),
 }
+KEY_OF = {key.act: key.key for key in KEYS}
 ROOM_NAMES: Mapping[Room, str] = {"prepare": tr_noop("Prepare"), "run": tr_noop("Run"), "review": tr_noop("Review")}
-KEY = {"prepare": "F2", "run": "F3", "review": "F4"}
 WIDTH = 84  # before the font's scale [px]
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
 SESSION = (
@@ -65,7 +65,9 @@ class Rail(Panel):
         self.buttons: dict[Room, QPushButton] = {}
         for room in ROOMS:
             name = tr(ROOM_NAMES[room])
-            self.buttons[room] = button(f"{name}\n{KEY[room]}", name, partial(go, room), "rail", checkable=True)
+            self.buttons[room] = button(
+                f"{name}\n{KEY_OF[f'go to {room}']}", name, partial(go, room), "rail", checkable=True
+            )
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
         self.setFixedWidth(px(WIDTH, most=1.4))
 
@@ -134,8 +136,7 @@ class Menus:
 
     def _add(self, menu: QMenu, name: str, words: str) -> QAction:
         """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
-        key = next((known.key for known in KEYS if known.act == name), "")
-        return menu.addAction(f"{words}\t{key}" if key else words, lambda: self._act(name))
+        return menu.addAction(f"{words}\t{KEY_OF.get(name, '')}".rstrip(), lambda: self._act(name))
 
     def _choices(self, menu: QMenu, what: str, values: Mapping[str, object], now: object) -> QActionGroup:
         """Return an entry for each value of a preference, by its name, that remembers it and does what follows."""

@@ -77,6 +77,7 @@ def test_a_session_that_has_ended_is_opened_with_the_mouse_and_a_key_leads_back(
     folder = Path(driver.session.folder)
     driver.application.processEvents()
     assert window.to_do.second.isVisible()
+    assert window.course.buttons["end"].accessibleName() == "New: new session, after one has ended"
     QTest.mouseClick(window.to_do.second, Qt.MouseButton.LeftButton)
     assert rooms.room == "review"
     assert rooms.analyst.state.folder == folder
