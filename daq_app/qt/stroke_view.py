@@ -17,7 +17,7 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
-WORDS: dict[Edge, float] = {"onset": 0.92, "steady begin": 0.8, "steady end": 0.68, "lift": 0.92}  # share of the height
+WORDS: dict[Edge, float] = {"onset": 0.92, "steady begin": 0.8, "steady end": 0.6, "lift": 0.92}  # share of the height
 
 
 class EdgeHandle(QPushButton):
