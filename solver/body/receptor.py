@@ -30,21 +30,19 @@ def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) 
     patch, piece = np.nonzero((start < stop) & reaches[:, None])
     arc, arc_weight = _gauss(start[patch, piece], stop[patch, piece])
     depth, depth_weight = _gauss(depth_lines[:-1], depth_lines[1:])
-    area = (arc_weight[:, None] * depth_weight).ravel()
+    curved = (arc > outline.palmar) & (arc < outline.dorsal)  # under the tip's arc lengths shrink with depth
+    shrinkage = np.where(curved[:, None], 1.0 - depth / outline.finger.tip_radius, 1.0)
+    area = (arc_weight[:, None] * depth_weight * shrinkage).ravel()
     patch = np.repeat(patch, len(_POINTS) * len(depth))
-    arc, depth = np.repeat(arc, len(depth)), np.tile(depth, len(arc))
-    # lengths shrink with depth under the tip's arc
-    curved = (arc > outline.palmar) & (arc < outline.dorsal)
-    area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
-    return Endings(_probes(finger, centre, arc, depth), area, patch, len(arcs), outline.tangent(arc))
+    tangent = np.repeat(outline.tangent(arc), len(depth), axis=0)
+    return Endings(_probes(finger, centre, arc, depth), area, patch, len(arcs), tangent)
 
 
 def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
     """Return the midpoint of the reference ending, as the mean of the limits from the elements around it."""
-    arc = _ASIDE * np.array([-1.0, 1.0, -1.0, 1.0])
-    depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
-    probes, tangent = _probes(finger, centre, arc, depth), finger.outline.tangent(arc)
-    return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, tangent)
+    aside = np.array([-_ASIDE, _ASIDE])
+    probes, tangent = _probes(finger, centre, aside, receptor.depth + aside), finger.outline.tangent(aside)
+    return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, np.repeat(tangent, 2, axis=0))
 
 
 def join(one: Endings, other: Endings) -> Endings:
@@ -62,21 +60,24 @@ def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
 
 
 def _probes(finger: FingerMesh, centre: Array, arc: Array, depth: Array) -> Probes:
-    """Return probes at `arc` and `depth` (p,): their elements and local coordinates."""
+    """Return probes (n m,) at each of the `arc` positions (n,) in turn at every `depth` (m,) [mm]."""
     station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
     layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
-    element = station * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
-    side, depth = _along_side(finger, arc, depth, station)
-    out = (finger.depths[layer] - depth) / (finger.depths[layer] - finger.depths[layer + 1]) * 2.0 - 1.0
-    return Probes.at(finger.mesh, centre, element, np.stack([out, side], axis=1))
+    element = station[:, None] * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
+    side, reach = _along_side(finger, arc, station)
+    radius = finger.outline.finger.tip_radius
+    deep = np.where(reach[:, None] == 1.0, depth, radius - (radius - depth) / reach[:, None])
+    out = (finger.depths[layer] - deep) / (finger.depths[layer] - finger.depths[layer + 1]) * 2.0 - 1.0
+    local = np.stack([out.ravel(), np.repeat(side, len(depth))], axis=1)
+    return Probes.at(finger.mesh, centre, element.ravel(), local)
 
 
-def _along_side(finger: FingerMesh, arc: Array, depth: Array, station: Indices) -> tuple[Array, Array]:
-    """Return the local coordinates (p,) of places along the skin, and their depths (p,) in the isoparametric map.
+def _along_side(finger: FingerMesh, arc: Array, station: Indices) -> tuple[Array, Array]:
+    """Return the local coordinates (n,) of `arc` positions, and the distance of the isoparametric arc by the radius.
 
     The sides of an element lie along normals of the skin. Between them the isoparametric map replaces the skin's arc by
     a parabola a little deeper than the arc: E(s) = (1 - s^2 (1 - cos a)) e_m + s sin a e_t at unit radius, with half
-    its angle a, and e_m, e_t radial and tangential in its middle.
+    its angle a, and e_m, e_t radial and tangential in its middle. The distance is 1 where the skin is straight.
     """
     start, stop = finger.arcs[station], finger.arcs[station + 1]
     here, first, last = (finger.outline.angle(place) for place in (arc, start, stop))
@@ -88,6 +89,4 @@ def _along_side(finger: FingerMesh, arc: Array, depth: Array, station: Indices) 
     side = np.where(
         straight, along, 2.0 * slope / np.where(straight, 1.0, sine + np.sqrt(sine**2 + 4.0 * slope**2 * rise))
     )
-    radius = finger.outline.finger.tip_radius
-    reach = np.cos(angle) * (1.0 - side**2 * rise) + np.sin(angle) * side * sine
-    return side, np.where(straight, depth, radius - (radius - depth) / reach)
+    return side, np.where(straight, 1.0, np.cos(angle) * (1.0 - side**2 * rise) + np.sin(angle) * side * sine)
