@@ -54,10 +54,6 @@ class Index:
         """Say whether these cannot be shares of a variance, so that they are noise of too few samples."""
         return self.first < 0.0 or self.total > 1.0 or self.first > self.total
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
-
 
 class TooFewAnswers(Exception):
     """Some scenes of the design have no answer: how many, and what to do."""

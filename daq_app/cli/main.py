@@ -168,6 +168,9 @@ def _failure(error: Exception) -> tuple[str, int]:
         if error.filename is None or error.strerror is None:
             return sentence, FAILED
         return f"{error.filename}: {error.strerror.lower()}; {remedy(error, new=True)}", FAILED
+    if isinstance(error, UnicodeEncodeError):  # Python has bytes of a name that are no UTF-8 as lone surrogates
+        around = error.object[max(error.start - 40, 0) : error.end + 20]
+        return f"a name is not UTF-8 ({around!r}): rename the file or folder and run this again", FAILED
     if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in _OUR_OWN:
         package = error.name.partition(".")[0]
         return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED

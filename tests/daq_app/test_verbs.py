@@ -239,6 +239,17 @@ def test_a_live_file_that_is_gone_or_torn_is_made_again_of_the_sealed_copy_as_th
         np.testing.assert_array_equal(getattr(again, name), getattr(readings, name))
 
 
+@pytest.mark.skipif(os.name != "posix", reason="names are text there")
+def test_a_file_whose_name_is_no_utf8_is_one_sentence_and_leaves_no_folder(tmp_path, capsys):
+    csv = tmp_path / os.fsdecode(b"m\xfcde.csv")
+    csv.write_text("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,3,4,5,6\n")
+    assert run(["import", str(csv), "--out", str(tmp_path / "a")]) == 1
+    said = capsys.readouterr().err
+    assert "a name is not UTF-8" in said
+    assert "rename the file or folder" in said
+    assert not (tmp_path / "a").exists()
+
+
 def test_an_import_that_cannot_be_sealed_leaves_no_folder(session, tmp_path, capsys, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")

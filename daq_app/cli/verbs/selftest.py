@@ -10,7 +10,6 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
@@ -78,25 +77,6 @@ class SelfTestFailed(Exception):
     """Something that is promised did not hold; the message says what."""
 
 
-@dataclass(frozen=True, slots=True)
-class Kills:
-    """What came of killing the recorder while a session ran, and going on with it."""
-
-    number: int
-    readings: int  # acknowledged, and there afterwards
-    events: int
-    most_lost: float  # of what was shown and not yet acknowledged [s, session clock]
-
-
-@dataclass(frozen=True, slots=True)
-class Quota:
-    """What came of filling all the room a session was given."""
-
-    bytes: int
-    readings: int  # acknowledged, and there afterwards
-    commit_ms: float  # median time in which a second of readings at 7000 Hz was made safe
-
-
 def selftest(room: Path, progress: Progress, seed: int | None = None) -> dict[str, Any]:
     """Try everything in the folder `room`, which is empty, and return the certificate.
 
@@ -115,14 +95,15 @@ def selftest(room: Path, progress: Progress, seed: int | None = None) -> dict[st
         "format": FORMAT,
         "utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "sentence": (
-            f"On this computer and disk the recorder was killed {kills.number} times, the end of its log was cut off "
+            f"On this computer and disk the recorder was killed {KILLS} times, the end of its log was cut off "
             f"{cuts} times and its room was filled up: all it had acknowledged was there afterwards "
-            f"({kills.readings + quota.readings} readings, {kills.events} events), at most {kills.most_lost:.2f} s of "
-            f"what it had not was lost, and each session went on at the same trial. A stop took {stop_ms:.0f} ms."
+            f"({kills['readings'] + quota['readings']} readings, {kills['events']} events), at most "
+            f"{kills['most_lost']:.2f} s of what it had not was lost, and each session went on at the same trial. "
+            f"A stop took {stop_ms:.0f} ms."
         ),
-        "kills": asdict(kills),
+        "kills": kills,
         "cuts": cuts,
-        "quota": asdict(quota),
+        "quota": quota,
         "stop_ms": stop_ms,
         "disk": {"file_system": file_system(room)},
         "machine": machine(),
@@ -186,8 +167,12 @@ class _WatchedRecorder:
                 pass
 
 
-def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[Kills, list[Path]]:
-    """Kill the recorder again and again; also return copies of the folder as the kills left it."""
+def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[dict[str, Any], list[Path]]:
+    """Kill the recorder while a session runs, and go on with it, again and again.
+
+    Return how many readings and events were acknowledged and there afterwards, and how much of what was shown and not
+    yet acknowledged was lost at most [s, session clock]; and copies of the folder as the kills left it.
+    """
     readings = events = 0
     most_lost = 0.0
     copies: list[Path] = []
@@ -208,7 +193,8 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[K
         shutil.copytree(folder, copies[-1])
         if recording.end is not None:
             folder = room / f"killed-{number + 1}"  # this session had come to its end before it was killed
-    return Kills(KILLS, readings, events, max(most_lost, 0.0)), copies
+    kills = {"number": KILLS, "readings": readings, "events": events, "most_lost": max(most_lost, 0.0)}
+    return kills, copies
 
 
 def _begin_or_resume(watched: _WatchedRecorder, folder: Path) -> int | None:
@@ -286,8 +272,12 @@ class _QuotaWriter(SessionWriter):
         self.limit(QUOTA + RESERVE)
 
 
-def _try_quota(folder: Path) -> Quota:
-    """Record until there is no more room; all must be there, and the end written. Raises SelfTestFailed."""
+def _try_quota(folder: Path) -> dict[str, Any]:
+    """Record until there is no more room; all must be there, and the end written. Raises SelfTestFailed.
+
+    Return the room [bytes], the readings that were acknowledged, and the median time in which a second of them was made
+    safe [ms].
+    """
     clock = RealClock()
     calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
     info = TransducerInfo("selftest:", "selftest", "SIMULATED", "SELFTEST", True, float(RATE), float(RATE), calibration)
@@ -314,7 +304,7 @@ def _try_quota(folder: Path) -> Quota:
         )
     if not np.array_equal(block.raw, _numbered_readings(0, 0, position).raw):
         raise SelfTestFailed("readings came back otherwise than they were written when the room was full")
-    return Quota(QUOTA, safe, round(float(np.median(took)) * 1e3, 2))
+    return {"bytes": QUOTA, "readings": safe, "commit_ms": round(float(np.median(took)) * 1e3, 2)}
 
 
 def _numbered_readings(first: int, received_ns: int, count: int = RATE) -> ReadingBlock:

@@ -11,6 +11,7 @@ keeps that sign: single changes, a map over the receptor's place and the tip rad
 import argparse
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +94,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             "seed": options.seed,
             "design_origin": origin,
             "sed_range": [low, high],
-            "indices": [one.to_dict() for one in indices],
+            "indices": [asdict(one) for one in indices],
             "doubts": doubtful,
             "not_varied": constant,
         }
@@ -152,7 +153,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             "fingers": len(random),
             "without_answer": without_answer,
             "shares": shares,
-            "indices": {name: [one.to_dict() for one in computed] for name, (computed, _) in indices.items()},
+            "indices": {name: [asdict(one) for one in computed] for name, (computed, _) in indices.items()},
         }
     )
     _print_changes(single, at, console)
