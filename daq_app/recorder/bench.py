@@ -103,6 +103,7 @@ class Bench:
         """Close the transducer."""
         was = self.uri
         self._close()
+        self._display.forget()
         self.uri = self._before = None
         if was is not None:
             self._send(NoDevice())
@@ -208,6 +209,7 @@ class Bench:
             same = True
         except RecordingError:
             same = False
+            self._display.forget()
         self._send(LinkBack(info, same))
         self.stream()
 

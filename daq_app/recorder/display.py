@@ -40,13 +40,16 @@ class Display:
         self._live_due = self._health_due = 0.0
 
     def device(self, info: TransducerInfo | None) -> None:
-        """Show this transducer from now on, or none."""
+        """Show this transducer from now on, or none. Zero and peaks stay: it may be the one of before."""
         self._flush()
         self._info = info
-        self._zero = UNLOADED
-        self.acknowledge()
         self._load = np.zeros(7)
         self._health_due = 0.0
+
+    def forget(self) -> None:
+        """Forget the zero and the greatest loads: another transducer will be shown."""
+        self.set_zero(UNLOADED)
+        self.acknowledge()
 
     def stream_began(self) -> None:
         """Take what comes next as a new stream, whose time and numbers begin anew."""

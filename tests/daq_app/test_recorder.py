@@ -288,39 +288,63 @@ def test_a_stop_with_nothing_in_hand_changes_nothing_and_during_a_tare_ends_that
         desk.until(Live)
 
 
-@pytest.fixture
-def bench():
+class Seat:
     """A bench in this process on the simulated transducer, and what it reports."""
-    reports = []
-    made = Bench(RealClock(), Display(reports.append, 1.0), reports.append)
-    made.connect("sim:?seed=7")
-    yield made, reports
-    made.disconnect()
+
+    def __init__(self):
+        self.reports = []
+        self.display = Display(self.reports.append, 1.0)
+        self.bench = Bench(RealClock(), self.display, self.reports.append)
+        self.bench.connect("sim:?seed=7")
+
+    def until(self, wanted):
+        """Go on until a report of this kind comes, and return it; those before are forgotten."""
+        self.reports.clear()
+        while not (found := [report for report in self.reports if isinstance(report, wanted)]):
+            self.bench.look()
+            self.display.look(self.bench.health)
+        return found[0]
 
 
-def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(bench):
-    made, reports = bench
-    made.begin_tare(60.0)
-    made.lent(0)
-    made.stream()
-    made.begin_tare(60.0)
-    made.lose("the cable is out")
-    words = [report.sentence.partition(": ")[2] for report in reports if isinstance(report, Failed)]
+@pytest.fixture
+def seat():
+    made = Seat()
+    yield made
+    made.bench.disconnect()
+
+
+def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(seat):
+    seat.bench.begin_tare(60.0)
+    seat.bench.lent(0)
+    seat.bench.stream()
+    seat.bench.begin_tare(60.0)
+    seat.bench.lose("the cable is out")
+    words = [report.sentence.partition(": ")[2] for report in seat.reports if isinstance(report, Failed)]
     assert words == ["a session began; zero again after it", "the transducer is no longer connected"]
 
 
-def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_again(bench, monkeypatch):
-    made, reports = bench
-
+def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_again(seat, monkeypatch):
     def refuse():
         raise SetupError("another program has it")
 
-    made.lent(0)
-    monkeypatch.setattr(made.connected.transducer, "start", refuse)
-    made.stream()
-    assert LinkDown("another program has it") in reports
-    while not any(isinstance(report, LinkBack) for report in reports):
-        made.look()
+    seat.bench.lent(0)
+    monkeypatch.setattr(seat.bench.connected.transducer, "start", refuse)
+    seat.bench.stream()
+    assert LinkDown("another program has it") in seat.reports
+    assert seat.until(LinkBack).same
+
+
+def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and_go_with_another(seat):
+    seat.bench.begin_tare(0.5)
+    tared, peak = seat.until(Tared), seat.until(HealthReport).peak
+    seat.bench.lose("the cable is out")
+    assert seat.until(LinkBack).same
+    assert seat.until(Live).zero == tared.mean
+    assert np.all(np.array(seat.until(HealthReport).peak) >= peak)
+    seat.bench.lose("the cable is out")
+    seat.bench.uri = "sim:?seed=8"
+    assert not seat.until(LinkBack).same
+    assert seat.until(Live).zero == (0.0,) * 6
 
 
 def test_a_stop_breaks_off_a_connection_that_does_not_come_about():
