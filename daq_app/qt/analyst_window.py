@@ -281,7 +281,6 @@ class TrialsColumn(QWidget):
     def __init__(self, tokens: Tokens) -> None:
         super().__init__()
         self._tokens = tokens
-        self._listed: tuple[str, ...] = ()
         self.list = QListWidget()
         self.list.setAccessibleName(tr("trials"))
         self.list.currentRowChanged.connect(self._choose)
@@ -308,13 +307,9 @@ class TrialsColumn(QWidget):
         if len(listed) != self.list.count():
             self.list.clear()
             self.list.addItems(listed)
-        elif listed != self._listed:
-            for at, words in enumerate(listed):
-                self.list.item(at).setText(words)
-        self._listed = listed
         for at, row in enumerate(rows(state)):
-            item = self.list.item(at)
-            marks = marks_of(row)
+            item, marks = self.list.item(at), marks_of(row)
+            item.setText(listed[at])
             item.setToolTip(marks)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {marks}".rstrip())
         self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)

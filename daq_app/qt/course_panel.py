@@ -121,8 +121,7 @@ class CoursePanel(Panel):
                 item = QListWidgetItem()
                 self.plan.addItem(item)
             text = f"{row.name}   {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"
-            if item.text() != text:
-                item.setText(text)
+            item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.outcome}")
             typeface = self.plan.font()
             typeface.setBold(row.kind in ("block", "current"))

@@ -139,9 +139,7 @@ class ToDo(Panel):
         self._arrow.show_direction(direction)
         self._arrow.setVisible(direction != 0 or not self._small)
         if primary is not None:
-            text = f"{primary.label}   {tr(primary.key)}"
-            if self.primary.text() != text:
-                self.primary.setText(text)
+            self.primary.setText(f"{primary.label}   {tr(primary.key)}")
             self.primary.setAccessibleName(f"{primary.label}: {sentence}")
             self.primary.setEnabled(primary.enabled)
         self.primary.setVisible(primary is not None)

@@ -62,9 +62,7 @@ class TrialStrip(QScrollArea):
         while len(self.tiles) < len(tiles):
             self._add()
         for tile_button, tile in zip(self.tiles, tiles, strict=True):
-            text = f"{KINDS[tile.kind][0]} {tile.number}\n{tile.code}"
-            if tile_button.text() != text:
-                tile_button.setText(text)
+            tile_button.setText(f"{KINDS[tile.kind][0]} {tile.number}\n{tile.code}")
             tile_button.setAccessibleName(tile.words)
             tile_button.setToolTip(tile.words)
             regrade(tile_button, TILE_GRADES.get(tile.kind, ""))

@@ -255,7 +255,7 @@ class ModelColumn(QWidget):
         """Begin to write the history that is shown as a film; `said` tells what came of it."""
         assert self._film is not None
         before, self._filming = self._at, True
-        writer = FilmWriter(self.finger, self._head(), self._show_step, len(self._film.film.frames))
+        writer = FilmWriter(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
 
         def end(sentence: str) -> None:
             self._filming, self._at = False, before
@@ -263,7 +263,6 @@ class ModelColumn(QWidget):
             self.said.emit(sentence)
 
         writer.ended.connect(end)
-        writer.write(path)
         return writer
 
     def _finger_page(self) -> QWidget:

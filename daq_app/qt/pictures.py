@@ -172,11 +172,13 @@ class FilmWriter(QObject):
 
     ended = Signal(str)  # with a sentence: where it is, or why there is none
 
-    def __init__(self, canvas: FingerCanvas, head: str, show: Callable[[int], None], count: int) -> None:
-        """Take `count` states that `show` puts on `canvas`, with a `head` over them."""
+    def __init__(self, canvas: FingerCanvas, head: str, show: Callable[[int], None], count: int, path: Path) -> None:
+        """Begin to write `count` states that `show` puts on `canvas`, with a `head` over them, to `path`.
+
+        It is an MP4 where its suffix says so; `ended` follows.
+        """
         super().__init__(canvas)
-        self._canvas, self._head, self._show, self._count = canvas, head, show, count
-        self._path = Path()
+        self._canvas, self._head, self._show, self._count, self._path = canvas, head, show, count, path
         self._frames: list[Image.Image] = []
         self._pool = ThreadPoolExecutor(1)
         self._writing: Future[None] | None = None
@@ -188,10 +190,6 @@ class FilmWriter(QObject):
         self._dialog.setMinimumDuration(0)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._step)
-
-    def write(self, path: Path) -> None:
-        """Begin to write to `path`, an MP4 where its suffix says so; `ended` follows."""
-        self._path = path
         self._timer.start(0)
 
     def _step(self) -> None:

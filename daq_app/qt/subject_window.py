@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEvent
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
-from daq_app.qt.parts import button, fill, hbox, label, say, stack_pages, vbox
+from daq_app.qt.parts import button, hbox, label, say, stack_pages, vbox
 from daq_app.qt.preferences import LEAST, MOST, direction, millimetres, store_ruler_length
 from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator
@@ -211,23 +211,18 @@ class SubjectWindow(QWidget):
         for words in (self._question, self._hint):
             words.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         place = QWidget()  # keeps the button's place while there is none
-        self._next_row = hbox(on=place, margins=(4 * GRID, 0, 4 * GRID, 0))
+        self._next_row = hbox(1, self.next, on=place, margins=(4 * GRID, 0, 4 * GRID, 0))
         place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
         place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
         place.setMaximumWidth(WIDEST)
         row, margins = hbox(1, (place, 1000), 1), (2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
         self._answer_layout = vbox(self._question, 2, self._hint, self._ways, 2, row, on=page, margins=margins)
-        self._place_next("right")
         return page
 
     def _place_next(self, hand: Hand) -> None:
         """Put Next where the answering hand is."""
-        while self._next_row.count():
-            self._next_row.takeAt(0)
-        if hand == "right":
-            fill(self._next_row, 1, self.next)
-        else:
-            fill(self._next_row, self.next, 1)
+        ways = QBoxLayout.Direction
+        self._next_row.setDirection(ways.LeftToRight if hand == "right" else ways.RightToLeft)
 
     def _turn(self) -> None:
         self._pages.setCurrentIndex(1 if self.scoring else 0)
