@@ -44,6 +44,7 @@ class Display:
         self._flush()
         self._info = info
         self._load = np.zeros(7)
+        self._count_anew()
         self._health_due = 0.0
 
     def forget(self) -> None:
@@ -56,7 +57,12 @@ class Display:
         self._flush()
         self._stream += 1
         self._arrived.clear()
-        self._saturated_before = self._saturated_now = 0
+        self._count_anew()
+
+    def _count_anew(self) -> None:
+        """Go on from what was counted so far: health begins at 0 again."""
+        self._saturated_before -= self._saturated_now
+        self._saturated_now = 0
 
     def set_zero(self, mean: Six) -> None:
         """Subtract this zero from now on [raw units]."""

@@ -41,7 +41,7 @@ from daq_app.recorder.messages import (
     Tared,
 )
 from drivers.clock import RealClock
-from drivers.transducer import SetupError
+from drivers.transducer import Health, SetupError
 from sessions.recording import LoggedEvent, Recording
 from sessions.run.runner import Status
 from sessions.run.steps import (
@@ -332,6 +332,20 @@ def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_a
     seat.bench.stream()
     assert LinkDown("another program has it") in seat.reports
     assert seat.until(LinkBack).same
+
+
+def test_readings_called_invalid_are_counted_until_somebody_acknowledges_also_across_streams():
+    reports = []
+    display = Display(reports.append, 1.0)
+    display.look(Health(saturated=3))
+    display.stream_began()
+    display.device(None)  # which has health reported at once
+    display.look(Health(saturated=2))
+    display.device(None)
+    display.look(Health())
+    display.acknowledge()
+    display.look(Health())
+    assert [report.saturated for report in reports] == [3, 5, 5, 0]
 
 
 def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and_go_with_another(seat):
