@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, cast
 
+from sessions.file_access import as_type
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import UNBLINDING, load_derived, store_derived
 
@@ -60,14 +61,11 @@ def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]
     """
     try:
         seal = load_derived(recording.folder, SEAL)
-    except RecordingError:
+        numbers = [] if seal is None else as_type(seal.get("numbers"), list[dict[str, Any]])
+    except (RecordingError, ValueError):
         return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
     if seal is None:
         return "The predictions were made after the scores had been given, and had not been sealed before."
-    rows: Any = seal.get("numbers")
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in cast("list[object]", rows)):
-        return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
-    numbers = cast("list[dict[str, Any]]", rows)
     sha256 = str(seal.get("sha256"))
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."

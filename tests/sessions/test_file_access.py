@@ -1,6 +1,7 @@
 """Files of any size and kind: read within bounds, written over no link, and a failure names what mends it."""
 
 import errno
+import os
 import sqlite3
 from pathlib import Path
 
@@ -54,7 +55,8 @@ def test_a_link_at_the_place_of_the_unfinished_file_is_not_followed(tmp_path):
     folder = ended(tmp_path / "s")
     mine = tmp_path / "thesis.tex"
     mine.write_text("years of work")
-    for name in (".analysis.json.part", ".session.h5.part", ".MANIFEST.json.part", "session.reserve"):
+    own = os.getpid()
+    for name in (f".analysis.json.{own}.part", ".session.h5.part", f".MANIFEST.json.{own}.part", "session.reserve"):
         (folder / name).symlink_to(mine)
     store_derived(folder, "analysis.json", {"a": 1})
     take_reserve(folder, 4096)
