@@ -8,6 +8,7 @@ import logging
 import multiprocessing
 import os
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
@@ -211,7 +212,7 @@ def _by_client(
             client.cancel([future for _, future in under_way.values()])
 
 
-KILLED = 0.1  # that a killed process may take to end [s]
+KILLED = 0.1  # that killed processes and their pool may take to end [s]
 
 
 class Shelf:
@@ -352,10 +353,9 @@ def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generat
                 yield waiting.pop(future), future.result()
         pool.shutdown()
     except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        children = multiprocessing.active_children()
-        for process in children:
+        for process in multiprocessing.active_children():
             process.kill()  # they hold nothing that is not computed again
-        for process in children:
-            process.join(KILLED)
+        ending = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+        ending.start()
+        ending.join(KILLED)
         raise
