@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sessions.prediction.surface_series import AREA, StudyDesign, planted_strokes
-from sessions.statistics.power import Judgement, preferred_rivals, study_weights, twins
+from sessions.statistics.power import PlantedEffects, preferred_rivals, study_weights, twins
 from solver.quantities import NAMES
 from solver.scene.published import STICKINESS
 
 PLANTED = ("mu", "tau_max", "sed", "shear_along_skin", "stretch_along_skin", "pressure")
 DECIDED = 0.95  # Akaike weight, as a posterior probability under equal priors
-JUDGEMENT = Judgement(rise=25.0, noise=4.0, level_sd=3.0)
+EFFECTS = PlantedEffects(25.0 * 12.0**0.5, noise=4.0, level_sd=3.0, slope_sd=0.0)  # 25 points a standard deviation
 POOL = 60  # simulated people whose strokes are predicted once; each study draws from them
 SPEEDS = (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5)  # [mm/s]
 WIDE_FORCES = (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2)  # in no order of friction [N]
@@ -81,7 +81,7 @@ def main() -> None:
         surfaces = len(study.design.mu)
         for planted in PLANTED:
             draw = np.random.default_rng([seed, number, PLANTED.index(planted)])
-            weights = [study_weights(pool, study.people, surfaces, planted, JUDGEMENT, draw) for _ in range(count)]
+            weights = [study_weights(pool, study.people, surfaces, planted, EFFECTS, draw) for _ in range(count)]
             print(row(study, planted, twins(pool, planted), weights), flush=True)
 
 

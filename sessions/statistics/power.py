@@ -19,6 +19,7 @@ from sessions.statistics.within_subjects import repeated_correlation
 
 Array = NDArray[np.float64]
 ALPHA = 0.05  # of the study's confirmatory test, two-sided
+_MIDDLE = sum(SCALE) / 2.0
 FRICTION = (0.24, 0.67)  # least and greatest µ of the published surfaces
 
 
@@ -26,11 +27,16 @@ FRICTION = (0.24, 0.67)  # least and greatest µ of the published surfaces
 class PlantedEffects:
     """Effect and spreads of simulated scores. The default values are not measured: a pilot's mixed model gives them."""
 
-    effect: float = 20.0  # of the mean score, from the least to the greatest µ [0–100]
+    effect: float = 20.0  # of the mean score, from the least to the greatest µ or planted quantity [0–100]
     noise: float = 12.0  # standard deviation of a score about its subject's line [0–100]
     level_sd: float = 12.0  # between subjects, of the level [0–100]
     slope_sd: float = 0.5  # between subjects, of the effect, by the mean effect [-]
     friction_sd: float = 0.1  # of the µ of one stroke about the surface's, by it [-]
+
+    @property
+    def rise(self) -> float:
+        """The effect of one standard deviation of what is planted, spread evenly over its range [0–100]."""
+        return self.effect / math.sqrt(12.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +92,7 @@ def _study(
     mu = np.linspace(*FRICTION, count)
     own = mu * np.exp(rng.normal(0.0, planted.friction_sd, (people, count)))
     slope = planted.effect * (1.0 + planted.slope_sd * rng.standard_normal((people, 1))) / (FRICTION[1] - FRICTION[0])
-    level = sum(SCALE) / 2.0 + planted.level_sd * rng.standard_normal((people, 1))
+    level = _MIDDLE + planted.level_sd * rng.standard_normal((people, 1))
     scores = level + slope * (own - np.mean(FRICTION)) + planted.noise * rng.standard_normal((people, count))
     names = [f"P{number}" for number in range(people) for _ in range(count)]
     return names, own.ravel(), np.clip(scores, *SCALE).ravel()
@@ -101,17 +107,6 @@ def _verdict(subjects: Sequence[str], mu: Array, scores: Array) -> float:
 
 
 TWIN = 0.99  # correlation over all strokes
-_MIDDLE = 50.0  # of the scale of scores [points]
-
-
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """How scores follow the planted quantity."""
-
-    rise: float  # for each standard deviation of the planted quantity [points]
-    noise: float  # standard deviation of one score [points]
-    level_sd: float  # between people [points]
-    slope_sd: float = 0.0  # between people, by the rise [-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,13 +128,13 @@ def recovery(
     people: int,
     depths: tuple[float, ...],
     planted: str,
-    judgement: Judgement,
+    effects: PlantedEffects,
     studies: int,
     draw: np.random.Generator,
 ) -> Recovery:
     """Return how often studies of so many of the people in `strokes` prefer the planted quantity."""
     surfaces = strokes[planted].shape[1] // len(depths)
-    weights = [study_weights(strokes, people, surfaces, planted, judgement, draw) for _ in range(studies)]
+    weights = [study_weights(strokes, people, surfaces, planted, effects, draw) for _ in range(studies)]
     alike, first = twins(strokes, planted), preferred_rivals(weights)
     shares = first.count(planted) / studies, sum(name in alike for name in first) / studies
     return Recovery(people, surfaces, depths, planted, tuple(sorted(alike - {planted})), *shares, studies)
@@ -150,7 +145,7 @@ def study_weights(
     people: int,
     surfaces: int,
     planted: str,
-    judgement: Judgement,
+    effects: PlantedEffects,
     draw: np.random.Generator,
 ) -> dict[str, float]:
     """Return the Akaike weight of each rival in one synthetic study of `people` drawn from `strokes` (people, trials).
@@ -162,11 +157,11 @@ def study_weights(
     usable = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     known: Array = strokes[planted][np.isfinite(strokes[planted])]
     level, noise = draw.standard_normal((people, 1)), draw.standard_normal(usable.shape)
-    slope = judgement.rise * np.ones((people, 1))
-    if judgement.slope_sd:
-        slope *= 1.0 + judgement.slope_sd * draw.standard_normal((people, 1))
+    slope = effects.rise * np.ones((people, 1))
+    if effects.slope_sd:
+        slope *= 1.0 + effects.slope_sd * draw.standard_normal((people, 1))
     scores: Array = slope * (values[planted] - known.mean()) / known.std()
-    scores += _MIDDLE + judgement.level_sd * level + judgement.noise * noise
+    scores += _MIDDLE + effects.level_sd * level + effects.noise * noise
     subjects, trials = np.nonzero(usable)
     at = (trials % surfaces).tolist()
     deviances = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.cli.main import run
-from sessions.statistics.power import Judgement, recovery, twins
+from sessions.statistics.power import PlantedEffects, recovery, twins
 
 DEPTHS = (1.0, 2.0)
 
@@ -19,13 +19,13 @@ def strokes(seed, likeness):
 
 @pytest.mark.parametrize("planted", ["sed", "shear", "mu"])
 def test_a_planted_quantity_that_scores_follow_closely_is_preferred_in_every_study(planted):
-    close = Judgement(rise=20.0, noise=4.0, level_sd=10.0)
+    close = PlantedEffects(70.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
     found = recovery(strokes(1, 0.5), 10, DEPTHS, planted, close, 8, np.random.default_rng(2))
     assert (found.preferred, found.family, found.twins, found.surfaces) == (1.0, 1.0, (), 4)
 
 
 def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often():
-    nothing = Judgement(rise=0.0, noise=4.0, level_sd=10.0)
+    nothing = PlantedEffects(0.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
     found = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, 45, np.random.default_rng(2))
     assert found.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # 45 studies: three standard errors
 

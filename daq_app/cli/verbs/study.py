@@ -8,7 +8,6 @@ With --synthetic a study of ten simulated subjects is made first, and what was p
 """
 
 import argparse
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from datetime import datetime
@@ -42,7 +41,7 @@ from sessions.recording import RecordingError
 from sessions.recording.derived import session_folders
 from sessions.statistics.findings import UNITS, StudyFindings, check_ground_truth
 from sessions.statistics.pooled import pool_visits
-from sessions.statistics.power import TWIN, Judgement, PlantedEffects, Recovery, power, recovery
+from sessions.statistics.power import TWIN, PlantedEffects, Recovery, power, recovery
 from sessions.statistics.visit import VisitOptions, exclusions_in
 from sessions.strokes.stroke import FIXED
 
@@ -111,8 +110,6 @@ def _recovery(options: argparse.Namespace, planted: PlantedEffects, console: Con
     if not options.depths:
         return []
     depths = tuple(options.depths)
-    # Values spread evenly over a range have a standard deviation of the range by the root of 12.
-    judgement = Judgement(planted.effect / math.sqrt(12.0), planted.noise, planted.level_sd, planted.slope_sd)
     recoveries: list[Recovery] = []
     count = len(RIVAL_SURFACES) * len(RIVAL_SUBJECTS)
     for surfaces in RIVAL_SURFACES:
@@ -120,7 +117,7 @@ def _recovery(options: argparse.Namespace, planted: PlantedEffects, console: Con
         draw = np.random.default_rng([options.seed, surfaces])
         strokes = planted_strokes(StudyDesign.even(surfaces, depths), max(RIVAL_SUBJECTS), draw)
         for people in RIVAL_SUBJECTS:
-            recoveries.append(recovery(strokes, people, depths, options.quantity, judgement, RIVAL_STUDIES, draw))
+            recoveries.append(recovery(strokes, people, depths, options.quantity, planted, RIVAL_STUDIES, draw))
             console.progress(len(recoveries) / count, f"{people} subjects, {surfaces} surfaces")
     return recoveries
 
