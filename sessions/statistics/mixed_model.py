@@ -337,12 +337,10 @@ def spreads(
     dof = len(values) - design.shape[1]
     if dof < 1 or np.linalg.matrix_rank(design) < design.shape[1]:
         return None
-    orthogonal, triangular = np.linalg.qr(design)
-    inverse = np.linalg.inv(triangular)
-    fitted = inverse @ (orthogonal.T @ values)
-    left = values - design @ fitted
+    inverse = np.asarray(np.linalg.pinv(design), np.float64)
+    left = values - design @ inverse @ values
     square = float(left @ left) / dof
-    coefficients, errors = fitted / scale, (inverse @ inverse.T) / np.outer(scale, scale)
+    coefficients, errors = inverse @ values / scale, inverse @ inverse.T / np.outer(scale, scale)
 
     def between(first: int) -> Spread:
         part = slice(first, first + k)

@@ -185,17 +185,16 @@ def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, 
 
 def average(values: Sequence[float]) -> Average | None:
     """Return the mean of subjects' values with its 95 % t interval; None of none."""
-    return Average(len(values), float(np.mean(values)), *_interval(values)) if values else None
+    return _average(values) if values else None
 
 
-def _interval(values: Sequence[float]) -> tuple[float, float, float] | tuple[None, None, None]:
-    """Return the standard deviation of values, and the ends of the 95 % t interval of their mean."""
+def _average(values: Sequence[float]) -> Average:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
-        return None, None, None
+        return Average(n, mean, None, None, None)
     sd = float(np.std(values, ddof=1))
     half = t_quantile(n - 1) * sd / math.sqrt(n)
-    return sd, mean - half, mean + half
+    return Average(n, mean, sd, mean - half, mean + half)
 
 
 def sd_interval(sd: float, n: int) -> tuple[float, float]:
@@ -209,11 +208,11 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
 
 
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
-    n, mean, (sd, low, high) = len(values), float(np.mean(values)), _interval(values)
-    if sd is None or low is None or high is None:
-        return MeanScore(descriptor, index, n, mean, None, None, None, None, "one subject alone has no interval")
-    bootstrap = _bootstrap(values) if low < SCALE[0] or high > SCALE[1] else None
-    return MeanScore(descriptor, index, n, mean, sd, low, high, bootstrap, None)
+    of = _average(values)
+    ends = bounds(of.low, of.high)
+    alone = "one subject alone has no interval" if ends is None else None
+    bootstrap = None if ends is None or SCALE[0] <= ends[0] <= ends[1] <= SCALE[1] else _bootstrap(values)
+    return MeanScore(descriptor, index, of.n, of.mean, of.sd, of.low, of.high, bootstrap, alone)
 
 
 def _bootstrap(values: Sequence[float]) -> tuple[float, float]:

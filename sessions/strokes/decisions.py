@@ -5,7 +5,6 @@ it, when and why, and what stood there before; undoing it is a line of its own. 
 """
 
 import os
-import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -18,7 +17,7 @@ from msgspec import Meta
 from sessions.file_access import as_type, json_object, remedy
 from sessions.recording.derived import bytes_of
 from sessions.recording.head import json_text
-from sessions.recording.schema import RecordingError
+from sessions.recording.schema import RecordingError, text_crc
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
@@ -273,7 +272,7 @@ def _line(decision: Decision, simulated: str | None) -> bytes:
     """Return a line: compact JSON whose last name, crc32, is that of the JSON text without it."""
     head: dict[str, Any] = {"SIMULATED": simulated} if simulated else {}
     text = json_text({**head, **decision.to_dict()})
-    return f'{text[:-1]},"crc32":{zlib.crc32(text.encode())}}}\n'.encode()
+    return f'{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode()
 
 
 def _decision(line: bytes) -> Decision | str | None:
@@ -283,7 +282,7 @@ def _decision(line: bytes) -> Decision | str | None:
     try:
         document = json_object(line)
         crc = document.pop("crc32")
-        if zlib.crc32(json_text(document).encode()) != crc:
+        if text_crc(json_text(document)) != crc:
             return "its CRC-32 is not that of its text, which was changed or damaged"
         document.pop("SIMULATED", None)
         decision = as_type(document, Decision)

@@ -12,7 +12,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
 from sessions.strokes import invalid_readings as invalid
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.stroke import FlawName, Grade
+from sessions.strokes.stroke import Flaw, FlawName
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
@@ -43,7 +43,7 @@ class SignalQuality:
     gaps: tuple[Gap, ...]
     segments: tuple[slice, ...]  # stretches of good readings without a gap
     dead: tuple[str, ...]  # axes that never moved
-    flaws: tuple[tuple[FlawName, str, Grade], ...]
+    flaws: tuple[Flaw, ...]
 
 
 def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> SignalQuality:
@@ -114,19 +114,16 @@ def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask
     return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
 
 
-_FlawParts = Iterator[tuple[FlawName, str, Grade]]
-
-
 def _flaws_of_readings(
     block: ReadingBlock, lost: int, repeated: Mask, frozen: Mask, saturated: Mask, table: StatusTable, refusal: float
-) -> _FlawParts:
+) -> Iterator[Flaw]:
     """Yield what is wrong with readings (n,) as a whole; from a share of frozen ones on all are refused."""
     if lost:
         share = 100 * lost / (lost + len(block))
         sentence = (
             f"{lost} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
         )
-        yield FlawName.LOST_READINGS, sentence, "note"
+        yield Flaw(FlawName.LOST_READINGS, sentence, "note")
     refused = float(frozen.mean()) >= refusal
     if repeated.any():
         sentence = (
@@ -134,11 +131,11 @@ def _flaws_of_readings(
             f"{block.time[repeated][0]:.2f} s: the sensor was frozen"
         )
         rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
-        yield FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"
+        yield Flaw(FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful")
     elif refused:
         share = 100 * float(frozen.mean())
         sentence = f"One axis or another was frozen in {share:.0f} % of the readings: nothing is analysed."
-        yield FlawName.FROZEN, sentence, "refused"
+        yield Flaw(FlawName.FROZEN, sentence, "refused")
     faulty = table.faulty(block.status)
     if faulty.any():
         count = StatusCount(table)
@@ -147,19 +144,19 @@ def _flaws_of_readings(
             f"{int(faulty.sum())} readings came while the device reported a fault, first at "
             f"{block.time[faulty][0]:.2f} s: {flagged_words(count.flagged)}; they are doubtful and left out."
         )
-        yield FlawName.DEVICE_FAULT, sentence, "doubtful"
+        yield Flaw(FlawName.DEVICE_FAULT, sentence, "doubtful")
     saturated = saturated & ~faulty
     if saturated.any():
         sentence = (
             f"{int(saturated.sum())} readings are saturated or marked invalid by the device, first at "
             f"{block.time[saturated][0]:.2f} s; they are left out, and a peak that they may hide is not given."
         )
-        yield FlawName.SATURATED, sentence, "doubtful"
+        yield Flaw(FlawName.SATURATED, sentence, "doubtful")
 
 
 def _flaws_of_axes(
     stuck: tuple[invalid.ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array
-) -> _FlawParts:
+) -> Iterator[Flaw]:
     """Yield which axes stuck, by the first run that shows it, had wild readings (n, 6), or never moved."""
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
         runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
@@ -173,7 +170,7 @@ def _flaws_of_axes(
             f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {lasting:.2g} s in all, first "
             f"at {time[runs[0].first]:.2f} s, and {what}"
         )
-        yield FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful"
+        yield Flaw(FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful")
     if wild.any():
         at = wild.any(axis=1)
         axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.T, strict=True) if marked.any())
@@ -182,23 +179,23 @@ def _flaws_of_axes(
             f"{at.sum()} {stand} far beyond everything around on {axes}, first at {time[at][0]:.3f} s: spikes, which "
             "are left out before filtering."
         )
-        yield FlawName.WILD, sentence, "doubtful"
+        yield Flaw(FlawName.WILD, sentence, "doubtful")
     if dead:
         force = any(name.startswith("F") for name in dead)
         cost = "a dead sensor, and nothing is analysed" if force else "no centre of pressure, hence no speed"
-        yield FlawName.DEAD, f"{', '.join(dead)} never changed: {cost}.", "refused" if force else "doubtful"
+        yield Flaw(FlawName.DEAD, f"{', '.join(dead)} never changed: {cost}.", "refused" if force else "doubtful")
 
 
-def _flaws_of_time(step: float, even: bool, stalled: int) -> _FlawParts:
+def _flaws_of_time(step: float, even: bool, stalled: int) -> Iterator[Flaw]:
     if not step > 0.0:
-        yield FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused"
+        yield Flaw(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")
         return
     if stalled:
         sentence = f"At {stalled} readings the device's time did not advance; they are left out."
-        yield FlawName.IRREGULAR_TIME, sentence, "doubtful"
+        yield Flaw(FlawName.IRREGULAR_TIME, sentence, "doubtful")
     if not even:
         sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."
-        yield FlawName.IRREGULAR_TIME, sentence, "doubtful"
+        yield Flaw(FlawName.IRREGULAR_TIME, sentence, "doubtful")
 
 
 def doubtful_readings(recording: "Recording") -> Iterator[str]:

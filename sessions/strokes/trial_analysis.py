@@ -97,7 +97,7 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
         sentence = f"Only {len(block)} readings: too few for a stroke."
         return TrialAnalysis(flaws=(Flaw(FlawName.NO_STROKE, sentence, "refused"),))
     quality = signal_quality(block, context.info, settings)
-    flaws = [Flaw(name, sentence, grade) for name, sentence, grade in quality.flaws]
+    flaws = list(quality.flaws)
     usable, refused = int(quality.good.sum()), any(flaw.grade == "refused" for flaw in flaws)
     if usable < fewest and not refused:
         sentence = f"Only {usable} of {len(block)} readings can be used: too few for a stroke."
