@@ -212,7 +212,7 @@ def preview(recording: "Recording", decision: Decision, before: Decisions, now: 
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    settings = AnalysisSettings(area=now.settings.area, gain_error=now.settings.gain_error)
+    settings = replace(now.settings, tilt=(0.0, 0.0))  # the decisions tell it
     after = analyse(recording, settings, before.with_line(decision))
     known = {flaw.sentence for flaw in now.flaws}
     for flaw in after.flaws:

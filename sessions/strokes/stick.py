@@ -122,9 +122,13 @@ class ClimbReadings:
         return climb
 
     def free_numbers(self, climb: Climb, *, bends: bool) -> list[int]:
-        """Return the positions of the numbers of a climb that the readings can move."""
+        """Return the positions of the numbers of a climb that the readings can move.
+
+        A climb that begins with the first reading can only begin later.
+        """
+        later = float(climb.slopes(self.time)[:, 0] @ (self.ratio - climb.at(self.time))) > 0.0
         free = [1, 4, 5]
-        free += [0] if climb.begins > self.time[0] else []
+        free += [0] if climb.begins > self.time[0] or later else []
         free += [2] if bends else []
         return sorted(free + ([3, 6] if climb.fall > 0.0 else []))
 

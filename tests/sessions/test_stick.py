@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from made_strokes import N, T, analysed, block, felt, stroke, trapezium, wrench
 
-from sessions.strokes.stick import Climb
+from sessions.strokes.settings import ClimbSettings
+from sessions.strokes.stick import Climb, ClimbReadings
 
 
 def climbing(ratio, slip):
@@ -23,6 +24,13 @@ def test_a_finger_that_rests_before_it_is_moved_breaks_away_no_earlier(rest):
     slip = 1.1 + rest + 0.25
     found = climbing(0.5 * np.clip((T - slip) / 0.25 + 1.0, 0.0, 1.0), slip)
     assert found.break_away == pytest.approx(slip, abs=0.005)
+
+
+def test_a_rest_of_three_readings_is_told_from_the_climb():
+    time = np.arange(300) / 200.0
+    readings = ClimbReadings(time, 0.05 + 0.5 * np.clip((time - 0.012) / 0.5, 0.0, 1.0), ClimbSettings())
+    climb = readings.fit(0.1, peaked=False)
+    assert (climb.begins, climb.meets, climb.rest) == pytest.approx((0.012, 0.512, 0.05), abs=1e-4)
 
 
 @pytest.mark.parametrize("bend", [1.5, 2.0, 3.0])
