@@ -178,3 +178,8 @@ class Report:
     scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are shown
     afferent_quantity: str = "sed"  # what it answers to, one of `solver.quantities`
+
+    @property
+    def scored(self) -> bool:
+        """Whether somebody gave a score between 0 and 100."""
+        return any(experiment.scores for experiment in self.experiments)

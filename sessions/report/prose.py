@@ -34,7 +34,7 @@ def doubts(report: Report) -> tuple[str, ...]:
 
     That is the other strain, the ending's place, a given force, and another finger.
     """
-    if all(p.sed is None for p in report.predictions) or not any(e.scores for e in report.experiments):
+    if all(p.sed is None for p in report.predictions) or not report.scored:
         return ()
     kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
     other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
@@ -137,7 +137,9 @@ def question(report: Report) -> str:
         what = shown_response(report.response).in_full if report.predictions else ""
         return f"People judge the {judged} of surfaces they stroke. {friction_question(what)}"
     if not report.predictions:
-        return f"How do people scale {judged}, and with what friction do fingers stroke the same surfaces?"
+        stroked = report.course is not None or report.strokes
+        friction = ", and with what friction do fingers stroke the same surfaces" if stroked else ""
+        return f"How do people scale {judged}{friction}?"
     return (
         f"People scale the {judged} of surfaces they stroke. Does the {shown_response(report.response).in_full} that a "
         "finger model predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow "
@@ -181,7 +183,8 @@ def summary(report: Report) -> tuple[str, ...]:
         are = "is" if doubted == 1 else "are"
         sentences.append(f"{plural(doubted, noun)} {are} in a state that no finger can be in; the tables mark each.")
     excluded, flaws = len(report.excluded) or "nothing", len(report.flaws) or "none"
-    sentences.append(f"Excluded: {excluded}; flaws found: {flaws}; the appendix names each.")
+    names = "; the appendix names each" if report.excluded or report.flaws else ""
+    sentences.append(f"Excluded: {excluded}; flaws found: {flaws}{names}.")
     return tuple(sentences)
 
 

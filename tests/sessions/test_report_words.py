@@ -11,6 +11,7 @@ from study_example import study
 from sessions.prediction.stored import Variant
 from sessions.report import study_prose
 from sessions.report.figures.relation import paths_panel, relation_panel
+from sessions.report.pages import page
 from sessions.report.prose import doubts, question, summary
 from sessions.report.tables import predictions as of_predictions
 from sessions.report.tables.session import planted_table, relation_table
@@ -93,9 +94,19 @@ def test_where_nobody_gave_a_score_no_word_is_of_scores_or_of_r(report):
         f"{words}, and what strain-energy density (SED) does a finger model predict at a receptor?"
     )
     assert question(replace(compared, predictions=())) == f"{words}?"
+    text = page(compared, ())
+    assert ">Prediction against index<" in text
+    assert "to scores" not in text
     made = study()
     unscored = replace(made, descriptors=tuple(replace(one, scores=()) for one in made.descriptors))
     assert "score" not in study_prose.question(unscored)
+
+
+def test_a_visit_for_scores_alone_asks_about_no_friction_and_has_no_forces(report):
+    alone = replace(report, course=None, strokes=(), predictions=(), excluded=(), flaws=())
+    assert question(alone) == "How do people scale stickiness and slipperiness?"
+    assert summary(alone)[-1] == "Excluded: nothing; flaws found: none."
+    assert ">Further tables<" in page(alone, ())
 
 
 def test_the_axis_of_many_paths_names_the_quantity_that_they_are_of(report):

@@ -230,7 +230,8 @@ def relation_table(report: Report) -> Table | None:
     any_own = any(e.own_relation is not None for e in report.experiments)
     own = "The forces are those of one subject, whose scores are the own ones. " if any_own else ""
     caption = (
-        f"Relation of the predicted {shown.label} ({report.model}) to scores and to the stimuli's indices. "
+        f"Relation of the predicted {shown.label} ({report.model}) to {'scores and to ' if report.scored else ''}the "
+        "stimuli's indices. "
         f"{own}Intervals: Fisher's z, for rho as by "
         "Bonett and Wright (2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its "
         "t interval. Last column: r when the stimulus of that index is left out."
