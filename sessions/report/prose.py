@@ -38,21 +38,17 @@ def doubts(report: Report) -> tuple[str, ...]:
         return ()
     kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
     other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
-    strain, force = f"At {other} strain", "Under the measured normal force"
-    untried = "which was not tried here, the sign of r may differ."
-    opening = f"{strain}, r of the SED with the mean scores"
+    by_force = Variant(kind, "computed", "force")
     return (
-        _in_variant(report, Variant(other, "computed", "depth"), opening, f"{strain}, {untried}"),
+        _in_variant(report, Variant(other, "computed", "depth"), f"At {other} strain"),
         _by_place(report),
-        _in_variant(
-            report, Variant(kind, "computed", "force"), f"{force}, in place of a given depth", f"{force}, {untried}"
-        ),
+        _in_variant(report, by_force, "Under the measured normal force in place of a given depth"),
         OTHER_FINGERS,
         *report.other_signs,
     )
 
 
-def _in_variant(report: Report, variant: Variant, opening: str, untried: str) -> str:
+def _in_variant(report: Report, variant: Variant, where: str) -> str:
     """Return r of the scores with the SED in a variant, for each experiment."""
 
     def sed(one: PredictionFinding) -> float | None:
@@ -70,7 +66,9 @@ def _in_variant(report: Report, variant: Variant, opening: str, untried: str) ->
         for r in [related.pearson]
         for words in [related.reason if r is None else f"r = {correlation(r)}{ends_of(related)}"]
     ]
-    return f"{opening}: {'; '.join(parts)}." if parts else untried
+    if not parts:
+        return f"{where}, which was not tried here, the sign of r may differ."
+    return f"{where}, r of the SED with the mean scores: {'; '.join(parts)}."
 
 
 def _doubt(doubted: Sequence[bool]) -> str:

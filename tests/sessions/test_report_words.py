@@ -14,7 +14,7 @@ from sessions.report.figures.relation import paths_panel, relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import doubts, question, summary
 from sessions.report.tables import predictions as of_predictions
-from sessions.report.tables.session import planted_table, relation_table
+from sessions.report.tables.session import paths_sentence, planted_table, relation_table
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.wording import correlation
@@ -44,6 +44,11 @@ def test_a_stimulus_stroked_twice_is_one_point_of_a_correlation_and_not_two(repo
     twice = replace(report, predictions=(*report.predictions, *report.predictions))
     assert under_force(twice) == under_force(report)
     assert "n = 5 stimuli" in under_force(report)
+
+
+def test_paths_that_all_agree_are_not_said_to_differ(report):
+    alike = [replace(one, r=0.9) for one in report.experiments[0].paths]
+    assert paths_sentence("stickiness", alike).endswith("all agree within 0.005.")
 
 
 def test_a_correlation_over_states_that_no_finger_can_be_in_says_how_many_there_are(report):

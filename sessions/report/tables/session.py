@@ -296,10 +296,10 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     start = f"{capital(name)}: of {len(findings)} paths of the analysis"
     if whole is None:
         return f"{start} none gives a correlation."
+    differ = "all agree within" if whole.distinct == 1 else f"{whole.distinct} of these differ by more than"
     return (
         f"{start} {whole.correlated} give a correlation, from {correlation(whole.least)} to "
-        f"{correlation(whole.greatest)}, median {correlation(whole.median)}; "
-        f"{whole.distinct} of these differ by more than {SAME:g}."
+        f"{correlation(whole.greatest)}, median {correlation(whole.median)}; {differ} {SAME:g}."
     )
 
 
