@@ -49,8 +49,7 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
 
 def greatest(six: tuple[float, ...]) -> str:
     """Return the greatest force and the greatest torque of six."""
-    force, torque = max(map(abs, six[:3])), max(map(abs, six[3:]))
-    return f"{number(1000 * force, 2)} mN, {number(torque, 2)} N mm"
+    return f"{_noise(max(map(abs, six[:3])), 'N')}, {_noise(max(map(abs, six[3:])), 'N mm')}"
 
 
 @dataclass(frozen=True, slots=True)
