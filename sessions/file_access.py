@@ -98,6 +98,17 @@ def remedy(error: Exception, *, new: bool = False) -> str:
     return (_BY_ERRNO | _OF_NEW if new else _BY_ERRNO).get(number or 0, _OTHER)
 
 
+def failure_sentence(error: OSError) -> str:
+    """Return which file that somebody named could not be read or written, why, and what mends it.
+
+    >>> failure_sentence(FileNotFoundError(errno.ENOENT, "No such file or directory", "a/b.png"))
+    'a/b.png: no such file or directory; check its name'
+    """
+    if error.filename is None or error.strerror is None:
+        return str(error)
+    return f"{error.filename}: {error.strerror.lower()}; {remedy(error, new=True)}"
+
+
 @contextmanager
 def name_failure(
     kind: type[Exception], what: str, more: str = "", failures: tuple[type[Exception], ...] = (OSError,)

@@ -14,6 +14,7 @@ from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportSource, export
+from sessions.file_access import failure_sentence, write_whole
 from sessions.plan.plan import Blinded
 from sessions.prediction import PredictionOptions, TrialPrediction, predict
 from sessions.prediction.scenes import Way
@@ -292,7 +293,6 @@ class Work:
         return str(export(source, request.what, path, report_part))
 
     def _write_picture(self, name: str, path: Path) -> str:
-        from sessions.file_access import write_whole
         from sessions.report.pages import panel_csv, swap_in
 
         self._say(m.Step(0.0, tr("writing {name}", name=path.name)))
@@ -327,6 +327,8 @@ def _options(recording: Recording) -> PredictionOptions:
 
 def sentence_of(error: Exception) -> str:
     """Return a failure in a sentence."""
+    if isinstance(error, OSError):
+        return failure_sentence(error)
     own = type(error).__module__.partition(".")[0] in OWN
     return str(error) if own else f"{type(error).__name__}: {error}"
 

@@ -163,11 +163,9 @@ def _failure(error: Exception) -> tuple[str, int]:
     if isinstance(error, _exceptions(_FAILED)):
         return sentence, FAILED
     if isinstance(error, OSError):
-        from sessions.file_access import remedy  # here: a verb that is well needs none
+        from sessions.file_access import failure_sentence  # here: a verb that is well needs none
 
-        if error.filename is None or error.strerror is None:
-            return sentence, FAILED
-        return f"{error.filename}: {error.strerror.lower()}; {remedy(error, new=True)}", FAILED
+        return sentence if error.filename is None else failure_sentence(error), FAILED
     if isinstance(error, UnicodeEncodeError):  # Python has bytes of a name that are no UTF-8 as lone surrogates
         around = error.object[max(error.start - 40, 0) : error.end + 20]
         return f"a name is not UTF-8 ({around!r}): rename the file or folder and run this again", FAILED

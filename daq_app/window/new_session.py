@@ -11,6 +11,7 @@ from pathlib import Path
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.state import BenchState
 from daq_app.wording import sentence, tr
+from sessions.file_access import failure_sentence
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, is_code, plan, protocol
 from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, phases_before
@@ -335,7 +336,4 @@ def _number(text: str) -> float | None:
 
 
 def _sentence(error: Exception) -> str:
-    text = str(error)
-    if isinstance(error, OSError) and error.strerror:
-        text = f"{error.filename}: {error.strerror.lower()}"
-    return sentence(text)
+    return sentence(failure_sentence(error) if isinstance(error, OSError) else str(error))

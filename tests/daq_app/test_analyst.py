@@ -21,7 +21,7 @@ from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_words, session_pictures, words_of
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.analyst.stroke import APART, EDGES, RawFile, decision_of, edges_of, history, reversal, within
-from daq_app.analyst.work import Work
+from daq_app.analyst.work import Work, sentence_of
 from sessions.recording import Recording
 from sessions.recording.derived import set_gain_error
 from sessions.report import findings
@@ -283,6 +283,13 @@ def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
     assert set(other.fingers) == set(answered) != set()
     for key, finger in other.fingers.items():
         np.testing.assert_allclose(finger.frame.row, list(answered[key].row.values()))
+
+
+def test_a_file_that_cannot_be_written_is_told_with_its_name_and_what_to_do(at_work, tmp_path):
+    work, _ = at_work
+    with pytest.raises(FileNotFoundError) as refused:
+        work.do(m.Write("picture course", str(tmp_path / "nowhere" / "course.png")))
+    assert sentence_of(refused.value) == f"{tmp_path}/nowhere/course.png: no such file or directory; check its name"
 
 
 def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):
