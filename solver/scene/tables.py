@@ -5,8 +5,9 @@ points distally along the finger axis, -Y is palmar, and the origin is the centr
 """
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+import sys
+from dataclasses import dataclass, fields
+from typing import Any, Literal, cast
 
 Slide = Literal["+x", "-x", "none"]
 Law = Literal["hooke", "neo-hookean", "ogden"]
@@ -22,21 +23,58 @@ class SceneError(ValueError):
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
         """Name the dotted `key`, its `value`, and what is `allowed`."""
-        super().__init__(f"{key} = {value!r} is not allowed: {allowed}.")
+        super().__init__(key, value, allowed)  # all three, so that the error can be sent between processes
         self.key = key
         self.value = value
         self.allowed = allowed
 
+    def __str__(self) -> str:
+        """Return the sentence."""
+        return f"{self.key} = {self.value!r} is not allowed: {self.allowed}."
 
-def _within(key: str, value: float, low: float, high: float, unit: str = "", *, zero: bool = False) -> None:
-    """Raise SceneError unless low <= value <= high, which is false for nan; with `zero`, the message allows 0 too."""
-    if not low <= value <= high:
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of a scene. NumPy's numbers become Python's, of full width; lists and arrays become tuples."""
+
+    def __post_init__(self) -> None:
+        """Convert the values."""
+        for f in fields(self):
+            object.__setattr__(self, f.name, _plain(getattr(self, f.name)))
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - of any type
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(map(_plain, cast("list[Any]", value))) if isinstance(value, list | tuple) else value
+
+
+def _row(value: object) -> tuple[object, ...]:
+    """Return a `value` that is a tuple, and nothing of another."""
+    return cast("tuple[object, ...]", value) if isinstance(value, tuple) else ()
+
+
+LARGEST = sys.float_info.max
+
+
+def _lies_within(value: object, low: float, high: float) -> bool:
+    """Return whether `value` is a number in this range; nan and strings are not."""
+    return isinstance(value, int | float) and low <= value <= high
+
+
+def _are_two_within(values: object, low: float, high: float) -> bool:
+    row = _row(values)
+    return len(row) == 2 and all(_lies_within(value, low, high) for value in row)
+
+
+def _within(key: str, value: object, low: float, high: float, unit: str = "", *, zero: bool = False) -> None:
+    """Raise SceneError unless `value` is a number from `low` to `high`; with `zero`, the message allows 0 too."""
+    if not _lies_within(value, low, high):
         allowed = f"it must {'be 0 or ' if zero else ''}lie between {low:g} and {high:g}{unit and ' ' + unit}"
         raise SceneError(key, value, allowed)
 
 
 @dataclass(frozen=True, slots=True)
-class Finger:
+class Finger(Table):
     """Outline of the finger: a half-disc tip, straight edges back to the cut, two layers of skin, a bone."""
 
     tip_radius: float = 5.0  # of the skin's outline [mm]
@@ -53,12 +91,13 @@ class Finger:
 
     def __post_init__(self) -> None:
         """Check ranges, and that some fat lies between dermis and bone everywhere. Raises SceneError."""
+        Table.__post_init__(self)
         _within("finger.tip_radius", self.tip_radius, 0.5, 50.0, "mm")
         for name in ("epidermis", "dermis"):
             _within(f"finger.{name}", getattr(self, name), 0.01 * self.tip_radius, 0.8 * self.tip_radius, "mm")
         _within("finger.shaft_length", self.shaft_length, self.tip_radius, 20.0 * self.tip_radius, "mm")
         _within("finger.bone_radius", self.bone_radius, 0.05 * self.tip_radius, 0.9 * self.tip_radius, "mm")
-        if len(self.bone_centre) != 2 or not all(math.isfinite(c) for c in self.bone_centre):
+        if not _are_two_within(self.bone_centre, -LARGEST, LARGEST):
             raise SceneError("finger.bone_centre", self.bone_centre, "it must be two finite lengths in mm")
         _within("finger.bone_centre[0]", self.bone_centre[0], -0.8 * self.shaft_length, self.tip_radius, "mm")
         _within("finger.contact_angle", self.contact_angle, 10.0, 90.0, "degrees")
@@ -92,13 +131,7 @@ class Finger:
         0.75
         """
         x, y = self.bone_centre
-        dorsal = self.core_radius - abs(y) - self.bone_radius
-        if x <= 0.0:  # the end of the bone may still reach past the centre of the tip
-            angles = [math.radians(a) for a in range(-90, 91, 2)]
-            ahead = [(x + self.bone_radius * math.cos(a), y + self.bone_radius * math.sin(a)) for a in angles]
-            reach = max((math.hypot(*p) for p in ahead if p[0] > 0.0), default=0.0)
-            return min(dorsal, self.core_radius - reach)
-        return min(dorsal, self.core_radius - math.hypot(x, y) - self.bone_radius)
+        return self.core_radius - math.hypot(max(x, 0.0), y) - self.bone_radius
 
     def pulp_thickness(self) -> float:
         """Return the distance from the point of first touch to the end of the bone [mm].
@@ -112,7 +145,7 @@ class Finger:
 
 
 @dataclass(frozen=True, slots=True)
-class Relaxation:
+class Relaxation(Table):
     """One term of a Prony series: a part of the shear modulus that relaxes with one time constant."""
 
     g: float  # part of the instantaneous modulus [-]
@@ -120,7 +153,7 @@ class Relaxation:
 
 
 @dataclass(frozen=True, slots=True)
-class Material:
+class Material(Table):
     """An isotropic tissue."""
 
     E: float  # instantaneous Young's modulus of the undeformed tissue [MPa]
@@ -132,8 +165,9 @@ class Material:
     def check(self, key: str) -> None:
         """Raise SceneError where a value is not allowed; `key` is the tissue's key in the scene."""
         _within(f"{key}.E", self.E, 1e-6, 1e12, "MPa")
-        if not 0.0 <= self.nu <= 0.4999999:
-            why = ", since at 0.5 a material has no strain energy of volume change to compute" if self.nu > 0.0 else ""
+        if not _lies_within(self.nu, 0.0, 0.4999999):
+            high = _lies_within(self.nu, 0.0, math.inf)
+            why = ", since at 0.5 a material has no strain energy of volume change to compute" if high else ""
             raise SceneError(f"{key}.nu", self.nu, f"it must lie between 0 and 0.4999999{why}")
         if self.law not in (None, "hooke", "neo-hookean", "ogden"):
             raise SceneError(f"{key}.law", self.law, 'it must be "hooke", "neo-hookean" or "ogden"')
@@ -141,11 +175,14 @@ class Material:
             raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "ogden"')
         if self.stiffening is not None:
             _within(f"{key}.stiffening", self.stiffening, *STIFFENING)
+        terms = _row(self.prony)
+        if terms is not self.prony or not all(isinstance(term, Relaxation) for term in terms):
+            raise SceneError(f"{key}.prony", self.prony, "give each term of the series as a Relaxation(g, tau)")
         for number, term in enumerate(self.prony):
             _within(f"{key}.prony[{number}].g", term.g, 0.0, 0.99)
             _within(f"{key}.prony[{number}].tau", term.tau, 1e-6, 1e6, "s")
         if not sum(term.g for term in self.prony) <= 0.99:
-            raise SceneError(f"{key}.prony", [term.g for term in self.prony], "all g together must stay below 0.99")
+            raise SceneError(f"{key}.prony", [term.g for term in self.prony], "all g together must be at most 0.99")
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +230,7 @@ class Materials:
 
 
 @dataclass(frozen=True, slots=True)
-class Friction:
+class Friction(Table):
     """Coulomb friction with a traction bound: the traction is at most min(mu p, tau_max)."""
 
     mu: float  # coefficient of friction [-]
@@ -201,6 +238,7 @@ class Friction:
 
     def __post_init__(self) -> None:
         """Check ranges."""
+        Table.__post_init__(self)
         if self.mu != 0.0:
             _within("friction.mu", self.mu, FEEBLE, 1000.0, zero=True)
         if self.tau_max is not None and self.tau_max != 0.0:
@@ -218,7 +256,7 @@ class Friction:
 
 
 @dataclass(frozen=True, slots=True)
-class Loading:
+class Loading(Table):
     """How the bone is driven: down within 1 s, by an indentation or a force, then along the surface.
 
     A drag can be given in place of a slide to the settled state. It grows within 1 s after the press, and the shift of
@@ -234,6 +272,7 @@ class Loading:
 
     def __post_init__(self) -> None:
         """Check ranges, and that exactly one of depth and force is prescribed. Raises SceneError."""
+        Table.__post_init__(self)
         if (self.indentation is None) == (self.normal_force is None):
             allowed = "give either an indentation or a normal force"
             raise SceneError("loading.indentation", self.indentation, allowed)
@@ -282,7 +321,7 @@ class Loading:
 
 
 @dataclass(frozen=True, slots=True)
-class Receptor:
+class Receptor(Table):
     """The nerve ending: a patch of tissue on the inward normal through the point of first touch."""
 
     depth: float = 1.9  # depth of its middle below the skin [mm]
@@ -290,13 +329,14 @@ class Receptor:
 
     def __post_init__(self) -> None:
         """Check ranges."""
+        Table.__post_init__(self)
         _within("receptor.depth", self.depth, 1e-3, 50.0, "mm")
-        if len(self.ending) != 2 or not all(1e-3 <= size <= 20.0 for size in self.ending):
+        if not _are_two_within(self.ending, 1e-3, 20.0):
             raise SceneError("receptor.ending", self.ending, "it must be two lengths between 0.001 and 20 mm")
 
 
 @dataclass(frozen=True, slots=True)
-class Solve:
+class Solve(Table):
     """How to solve the scene.
 
     Evidence: "quick" comes with the solution, "estimated" also marches the overstress that tissues would still hold,
@@ -311,6 +351,7 @@ class Solve:
 
     def __post_init__(self) -> None:
         """Check the options. Raises SceneError."""
+        Table.__post_init__(self)
         if self.kinematics not in ("small", "finite"):
             raise SceneError("solve.kinematics", self.kinematics, 'it must be "small" or "finite"')
         if self.course not in ("steady", "history"):

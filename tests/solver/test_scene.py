@@ -1,6 +1,8 @@
 import math
+import pickle
 from dataclasses import fields, replace
 
+import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, SceneError, Solve
@@ -56,6 +58,12 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
         (lambda: Scene(friction=Friction(0.3), loading=Loading(4.8)), "loading.indentation"),
         (lambda: Scene(friction=Friction(0.3), loading=Loading(2.0), receptor=Receptor(depth=2.5)), "receptor.depth"),
         (lambda: Finger(width=0.0), "finger.width"),
+        (lambda: Finger(bone_centre=(-1.0, math.inf)), "finger.bone_centre"),
+        (lambda: Receptor(ending=0.2), "receptor.ending"),
+        (lambda: Friction("0.4"), "friction.mu"),
+        (lambda: Materials(fat=Material(None, 0.48)), "materials.fat.E"),
+        (lambda: Materials(fat=Material(0.034, "0.48")), "materials.fat.nu"),
+        (lambda: Materials(fat=Material(0.034, 0.48, prony=((0.2, 1.0),))), "materials.fat.prony"),
     ],
 )
 def test_what_cannot_be_run_is_refused_in_one_sentence_that_names_key_value_and_what_is_allowed(make, key):
@@ -66,6 +74,30 @@ def test_what_cannot_be_run_is_refused_in_one_sentence_that_names_key_value_and_
     assert message.startswith(f"{key} = ")
     assert message.endswith(".")
     assert "\n" not in message
+
+
+def test_lists_and_numbers_of_numpy_make_the_scene_of_tuples_and_plain_numbers():
+    made = Scene(
+        finger=Finger(np.float32(5.0), bone_centre=[-1.0, np.float64(0.75)], contact_angle=np.int8(45)),
+        materials=Materials(fat=Material(np.array(0.034), 0.48, prony=[Relaxation(np.float16(0.5), 1.0)])),
+        friction=Friction(np.array(0.44)),
+        loading=Loading(np.uint8(1), ["+x", "-x"]),
+        receptor=Receptor(ending=np.array([0.2, 1.0])),
+    )
+    plain = Scene(
+        materials=Materials(fat=Material(0.034, 0.48, prony=(Relaxation(0.5, 1.0),))),
+        friction=Friction(0.44),
+        loading=Loading(1, ("+x", "-x")),
+    )
+    assert repr(made) == repr(replace(plain, finger=Finger(contact_angle=45)))
+    assert hash(made) == hash(plain)
+
+
+def test_the_error_of_a_scene_says_the_same_when_it_comes_from_another_process():
+    with pytest.raises(SceneError) as refused:
+        Friction(-0.1)
+    sent = pickle.loads(pickle.dumps(refused.value))
+    assert (str(sent), sent.key, sent.value) == (str(refused.value), "friction.mu", -0.1)
 
 
 def test_the_defaults_are_the_published_finger():
