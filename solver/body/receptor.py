@@ -21,9 +21,8 @@ def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) 
     """
     across, along = receptor.ending
     outline = finger.outline
-    depth_lines = distinct(np.concatenate([finger.depths, [receptor.depth - across / 2, receptor.depth + across / 2]]))
-    inside = np.abs(depth_lines - receptor.depth) <= across / 2 * (1 + 1e-12)
-    depth_lines = depth_lines[inside]
+    near, far = receptor.depth - across / 2, receptor.depth + across / 2
+    depth_lines = distinct(np.concatenate([[near, far], np.clip(finger.depths, near, far)]))
     low, high = (outline.along(arcs, receptor.depth, side * along / 2) for side in (-1.0, 1.0))
     reaches = (outline.palmar_cut + 1e-9 < low) & (high < outline.dorsal_cut - 1e-9)
     start, stop = np.maximum(low[:, None], finger.arcs[:-1]), np.minimum(high[:, None], finger.arcs[1:])

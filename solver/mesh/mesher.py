@@ -320,10 +320,10 @@ class _Row:
         if receptor.ending[1] < SIZES.point_along * outline.finger.tip_radius:
             near, far, largest = _around_point(arc, near, far, SIZES.at_point * outline.finger.tip_radius * scale)
             sizes = np.minimum(sizes, largest)
-        ends = [outline.palmar_cut, outline.palmar, near, far, outline.dorsal, outline.dorsal_cut]
+        ends = [outline.palmar_cut, outline.palmar, outline.dorsal, outline.dorsal_cut]
         if outline.finger.nail_length > 0.0:
             ends.append(outline.nail_end)
-        ends = _distinct(*ends)
+        ends = _framed(ends, near, far)
         least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
         return _Row(arc, _cumulative_count(arc, sizes), ends, least, 0.2)
 
@@ -370,7 +370,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
         above, below, largest = _around_point(depth, near, far, SIZES.at_point * size)
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
         sizes = np.minimum(sizes, largest)
-    ends = _distinct(0.0, finger.epidermis, skin, skin + thick, near, far)
+    ends = _framed([0.0, finger.epidermis, skin, skin + thick], near, far)
     # a single element between epidermis and ending is too stiff in shear, whatever its size
     least = [2 if end < near <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
     row = _Row(depth, _cumulative_count(depth, sizes), ends, (*least, 2), 0.1)
@@ -391,7 +391,10 @@ def _around_point(place: Array, near: float, far: float, size: float) -> tuple[f
     return middle - size / 2.0, middle + size / 2.0, largest
 
 
-def _distinct(*ends: float) -> tuple[float, ...]:
-    """Return the ends in order, without those that repeat another to a thousandth of a millimetre."""
-    ordered = sorted(ends)
-    return (ordered[0], *(b for a, b in pairwise(ordered) if b - a > 1e-3))
+def _framed(ends: Sequence[float], *frame: float) -> tuple[float, ...]:
+    """Return the `ends` in order, and among them those of the `frame` that no other lies within a micrometre of."""
+    out = list(ends)
+    for place in frame:
+        if min(abs(place - end) for end in out) > 1e-3:
+            out.append(place)
+    return tuple(sorted(out))

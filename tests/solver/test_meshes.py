@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver import Finger, Receptor
+from solver.body.receptor import endings
 from solver.mesh import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1, MeshError, grid_mesh, quality
 from solver.mesh.mesher import DERMIS, EPIDERMIS, FAT, Outline, Sizing, finger_mesh
 
@@ -104,6 +105,21 @@ def test_lines_between_elements_frame_the_ending_and_lie_on_the_layers():
         assert np.abs(made.depths - depth).min() < 1e-12
     for arc in (-0.5 / 3.1 * 5, 0.5 / 3.1 * 5, -np.pi / 4 * 5):
         assert np.abs(made.arcs - arc).min() < 1e-9
+
+
+@pytest.mark.parametrize("depth", [0.8505, 0.6495, 1.8991, 1.8999])
+def test_the_layers_keep_their_thickness_where_an_ending_ends_next_to_them(depth):
+    made = finger_mesh(Finger(), Receptor(depth, (0.2, 1.0)), Sizing(8.0, 1.0))
+    assert {0.0, 0.75, 2.0} <= set(made.depths.tolist())
+
+
+def test_a_thin_ending_deep_in_a_thick_finger_is_whole():
+    finger = Finger(20.0, 7.0, 5.0, 40.0, 2.0, (-4.0, 3.0))
+    for depth in (8.17, 8.196, 10.828, 10.975):
+        receptor = Receptor(depth, (0.001, 4.0))
+        made = finger_mesh(finger, receptor, Sizing(6.0, 2.0))
+        (area,) = endings(made, np.zeros((len(made.mesh.elements), 2)), receptor, np.zeros(1)).areas
+        assert area == pytest.approx(0.004, rel=1e-9)
 
 
 @pytest.mark.parametrize("depth", [1.3, 0.003, 0.752])  # at the surface, and beside a line between layers
