@@ -84,11 +84,6 @@ class Body(Protocol):
         ...
 
     @property
-    def dofs(self) -> int:
-        """Number of unknown displacements."""
-        ...
-
-    @property
     def centre(self) -> Array:
         """Origins (e, 2) of the elements' pressure modes [mm]."""
         ...

@@ -60,11 +60,6 @@ class FiniteBody(MeshElements):
         """Number of unknowns after the centres are eliminated."""
         return self.plan.size
 
-    @property
-    def dofs(self) -> int:
-        """Number of unknown displacements, centres included."""
-        return self.plan.size + 2 * len(self.elements.nodes)
-
     def displacement(self, u: Array, only: Indices | None = None) -> Array:  # noqa: ARG002 - all nodes are there anyway
         """Do as `Body` says."""
         return u

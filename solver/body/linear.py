@@ -189,11 +189,6 @@ class LinearBody:
             _ = condensed.compliance  # raises where the body can move
         return LinearBody(mesh, whole.elastic, whole, carried, condensed, moved)
 
-    @property
-    def dofs(self) -> int:
-        """Return the number of unknown displacements."""
-        return 2 * len(self.mesh.nodes) - len(self.mesh.fixed)
-
     def displacement(self, u: Array, only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, ...) of all nodes for those of the skin `u` (k, 2, ...).
 
@@ -239,7 +234,7 @@ class LinearBody:
 
     def following(self, skin: Array) -> Array:
         """Do as `Body` says."""
-        return self.displacement(skin.reshape(len(skin) // 2, 2, -1))
+        return self.displacement(skin.reshape(-1, 2, skin.shape[1]))
 
     def forces(self, displacement: Array) -> Array:
         """Do as `Body` says."""

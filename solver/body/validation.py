@@ -5,9 +5,9 @@ from math import isfinite
 
 import numpy as np
 
-from solver.arrays import Array
+from solver.arrays import Array, Flags
 from solver.constitutive import Elasticity, Prony
-from solver.mesh import Q2P1, Mesh, jacobians
+from solver.mesh import Q2P1, Mesh, distinct, jacobians
 from solver.scene.tables import STIFFENING
 
 MOTIONS = ("x", "y", "turn")  # rigid motions
@@ -24,6 +24,7 @@ def check_body(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
     Raises MeshError where an element is folded at a quadrature point.
     """
     _check_arrays(mesh)
+    _check_driven_nodes(mesh)
     check_moduli(mesh, materials)
     jacobians(mesh, Q2P1.points)
     _check_skin(mesh)
@@ -55,6 +56,28 @@ def _check_arrays(mesh: Mesh) -> None:
         raise BodyError(f"mesh.region has {len(mesh.region)} entries for {len(mesh.elements)} elements; give one each")
 
 
+def _stray(mesh: Mesh) -> Flags:
+    """Return which nodes (n,) belong to no element."""
+    out = np.ones(len(mesh.nodes), bool)
+    out[mesh.elements] = False
+    return out
+
+
+def _check_driven_nodes(mesh: Mesh) -> None:
+    """Raise BodyError where a driven node belongs to no element, or is the centre of one that is not driven whole."""
+    stray = np.flatnonzero(_stray(mesh) & mesh.driven.any(axis=1))
+    if len(stray):
+        raise BodyError(f"node {stray[0]} is held and belongs to no element of the mesh; leave it out")
+    outer, centre = mesh.driven[mesh.elements[:, :8]].all(axis=1), mesh.driven[mesh.elements[:, 8]]
+    wrong = (centre & ~outer).any(axis=1)
+    if wrong.any():
+        element = int(np.argmax(wrong))
+        raise BodyError(
+            f"node {mesh.elements[element, 8]} is held and is the centre of element {element}, whose other nodes are "
+            "not all held so; hold them too, or leave the centre out"
+        )
+
+
 def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
     """Raise BodyError where a region of `mesh` has no material, or moduli are not allowed."""
     if not (mesh.region.min() >= 0 and mesh.region.max() < len(materials)):
@@ -65,12 +88,12 @@ def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
     for number, material in enumerate(materials):
         try:
             shear, lame = material.shear, material.lame
-        except ZeroDivisionError:
+        except (AttributeError, ZeroDivisionError):
             shear, lame = np.nan, np.nan
         if not (0.0 < shear < np.inf and np.isfinite(lame) and lame > -2.0 / 3.0 * shear):
             raise BodyError(
-                f"material {number}, {material}, is none that can be computed; E must be above 0 and nu from 0 to "
-                "0.4999999, since nu = 0.5 leaves no energy of volume change"
+                f"material {number}, {material}, is none that can be computed; give one of solver.constitutive, whose "
+                "E must be above 0 and nu from 0 to 0.4999999, since nu = 0.5 leaves no energy of volume change"
             )
 
 
@@ -135,6 +158,9 @@ def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> No
         if not np.isfinite(array).all():
             row = int(np.argmin(np.isfinite(array).all(axis=1)))
             raise BodyError(f"row {row} of {name} is not finite; give 0 where there is none")
+    pulled = _stray(mesh) & np.asarray(0.0 if loads is None else loads).any(axis=-1)
+    if pulled.any():
+        raise BodyError(f"loads pull at node {np.argmax(pulled)}, which belongs to no element; give 0 there")
     if prescribed is not None and np.asarray(prescribed)[~mesh.driven].any():
         row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))
         raise BodyError(
@@ -152,7 +178,7 @@ def finite(name: str, value: float) -> float:
 
 def loose(mesh: Mesh) -> Array:
     """Return a basis (3, r) of the rigid motions that no held node prevents, as combinations of MOTIONS."""
-    if len(mesh.held) > 1:
+    if len(distinct(mesh.held)) > 1:
         return np.zeros((3, 0))
     x, y = (mesh.nodes / np.ptp(mesh.nodes)).T
     one, zero = np.ones_like(x), np.zeros_like(x)
@@ -176,6 +202,9 @@ def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
 
     Or where skin that may touch is held along y, and so cannot give way to the surface.
     """
+    unknown = [name for name in free if name not in MOTIONS]
+    if unknown:
+        raise BodyError(f"free names the motion {unknown[0]!r}; name some of {', '.join(map(repr, MOTIONS))}")
     if not free and not mesh.driven.any():
         raise BodyError(
             "nothing holds the body; name the nodes that are driven in mesh.held, or the motions along which the "

@@ -97,24 +97,28 @@ class Mesh:
     held_y: Indices = field(default_factory=lambda: _NONE)  # likewise along y: rollers, and planes of symmetry
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only, and convert lengths and whole numbers to the types of the loops.
+        """Copy the arrays, so that nobody can change them, with lengths and whole numbers in the types of the loops.
 
         Other types are left alone; `solver.body.validation` refuses them where a body is made.
         """
         for f in fields(self):
-            array = np.asarray(getattr(self, f.name))
+            array = np.array(getattr(self, f.name))
             kinds, taken = ("fiu", np.float64) if f.name == "nodes" else ("iu", np.int64)
             if array.dtype.kind in kinds or not array.size:
                 array = np.ascontiguousarray(array, taken)
-            view = array.view()
-            view.flags.writeable = False
-            object.__setattr__(self, f.name, view)
+            array.flags.writeable = False
+            object.__setattr__(self, f.name, array)
 
     @cached_property
     def fixed(self) -> Indices:
         """Numbers of the driven unknowns in ascending order: x of node n is 2 n, y is 2 n + 1."""
         along = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
         return distinct(np.concatenate([2 * along[0], 2 * along[1] + 1]))
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknown displacements."""
+        return 2 * len(distinct(self.elements)) - len(self.fixed)
 
     @cached_property
     def driven(self) -> Flags:

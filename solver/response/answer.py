@@ -76,7 +76,7 @@ def prediction(
         contact_width_error=off.width,
         nested=nested,
         sed_point_error=off.point,
-        dofs=finger.body.dofs,
+        dofs=finger.body.mesh.dofs,
         newton_iterations=state.iterations,
         wall_s=solved.wall_s,
         setup_s=solved.setup_s,

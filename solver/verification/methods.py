@@ -36,7 +36,7 @@ class MeshMethod(ABC, Generic[AnyFinger]):
     @property
     def dofs(self) -> int:
         """Number of unknown displacements."""
-        return self.finger.body.dofs
+        return self.finger.body.mesh.dofs
 
     @abstractmethod
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:

@@ -93,7 +93,7 @@ def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
         assert set(mesh.lines.arcs) < set(lines.arcs)
         assert np.all(np.diff(lines.arcs) > 0.0)
         assert np.all(np.diff(lines.skin) < 0.0)
-        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.dofs <= MOST_UNKNOWNS
+        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.mesh.dofs <= MOST_UNKNOWNS
     assert len(few.arcs) < len(many.arcs)
     assert len(halves.arcs) == 2 * len(mesh.lines.arcs) - 1
 

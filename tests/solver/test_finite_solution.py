@@ -164,7 +164,7 @@ def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said
     nested = finite_answers.solve_nested
 
     def lost(scene, top, *more):
-        return (None, None) if top.finger.body.dofs < lost_below else nested(scene, top, *more)
+        return (None, None) if top.finger.body.mesh.dofs < lost_below else nested(scene, top, *more)
 
     monkeypatch.setattr(finite_answers, "solve_nested", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))

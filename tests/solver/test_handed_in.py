@@ -3,6 +3,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from solver import Material
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
@@ -18,6 +19,8 @@ MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
 ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))
 NOT_HELD = replace(MESH, held=np.empty(0, np.int64))
 NAN = np.full(MESH.nodes.shape, np.nan)
+STRAY = replace(MESH, nodes=np.append(MESH.nodes, [[9.0, 9.0]], axis=0))
+NONE = np.empty(0, np.int64)
 TISSUE, SKIN = [Hooke(0.08, 0.48)], [NeoHooke(0.08, 0.48)]
 
 
@@ -44,6 +47,14 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: linear(MESH, TISSUE, None, np.zeros((1, 2))), "prescribed has the shape"),
         (lambda: linear(MESH, [Hooke(0.08, 0.5)]), "nu = 0.5"),
         (lambda: FiniteBody.of(MESH, [NeoHooke(0.08, 0.5)]), "nu = 0.5"),
+        (lambda: linear(MESH, [Material(0.08, 0.48)]), "give one of solver.constitutive"),
+        (lambda: linear(NOT_HELD, TISSUE, free=("Y",)), "free names the motion 'Y'"),
+        (lambda: linear(replace(MESH, held=np.full(2, MESH.held[0])), TISSUE), "leaves the body a motion"),
+        (lambda: linear(replace(MESH, skin=NONE, held=np.full(2, MESH.held[0])), TISSUE), "leaves the body a motion"),
+        (lambda: linear(replace(MESH, held_y=MESH.elements[0, 8:]), TISSUE), "is the centre of element 0"),
+        (lambda: FiniteBody.of(replace(MESH, held=MESH.elements[1, 8:]), SKIN), "is the centre of element 1"),
+        (lambda: linear(replace(STRAY, held=np.array([*MESH.held, 25])), TISSUE), "node 25 is held and belongs to no"),
+        (lambda: linear(STRAY, TISSUE, np.ones((26, 2))), "loads pull at node 25, which belongs to no element"),
         (lambda: linear(MESH, [Hooke(-0.08, 0.3)]), "E must be above 0"),
         (lambda: linear(replace(MESH, region=MESH.region + 1), TISSUE), "region 1 of the mesh has no material"),
         (lambda: linear(replace(MESH, nodes=NAN), TISSUE), "node 0 of the mesh has no finite position"),
@@ -129,6 +140,21 @@ def as_handed_in(mesh, whole, lengths):
 def test_a_body_that_cannot_be_solved_is_refused_at_the_door_in_one_sentence(make, told):
     with pytest.raises((BodyError, ValueError), match=told):
         make()
+
+
+def test_a_mesh_keeps_its_places_when_the_array_they_came_from_changes():
+    nodes = MESH.nodes.copy()
+    mesh = replace(MESH, nodes=nodes)
+    nodes *= 2.0
+    np.testing.assert_array_equal(mesh.nodes, MESH.nodes)
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.nodes[0] = 0.0
+
+
+def test_held_unknowns_and_nodes_of_no_element_are_no_unknowns():
+    assert MESH.dofs == 2 * (25 - 5)
+    assert STRAY.dofs == MESH.dofs
+    assert replace(MESH, held_x=MESH.skin[:1]).dofs == MESH.dofs - 1
 
 
 def test_an_element_turned_inside_out_is_refused_at_the_door():
