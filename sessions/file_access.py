@@ -195,6 +195,23 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
+@contextmanager
+def one_at_a_time(folder: Path) -> Generator[None]:
+    """Let programs that change files of one folder in only one after the other, where the system locks folders."""
+    if os.name != "posix":
+        yield
+        return
+    import fcntl
+
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # as on a disk of another computer
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
 T = TypeVar("T")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from drivers.readings import ReadingBlock
-from sessions.file_access import as_type, json_object, name_failure, read_within_limit, write_whole
+from sessions.file_access import as_type, json_object, name_failure, one_at_a_time, read_within_limit, write_whole
 from sessions.recording.head import json_text
 from sessions.recording.log import LoggedEvent, TrialRecord
 from sessions.recording.reader import Recording
@@ -112,13 +112,14 @@ def list_in_manifest(folder: Path, names: Iterable[str], head: dict[str, Any] | 
 
     With a `head` the manifest begins anew. Raises RecordingError for a damaged one, OSError.
     """
-    document = _manifest(folder) if head is None else head
-    files: dict[str, Any] = document.get("files", {})
-    for name in names:
-        path = folder / name
-        files[name] = {"sha256": file_sha256(path), "bytes": path.stat().st_size}
-    document = {**document, "files": dict(sorted(files.items()))}
-    write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
+    with one_at_a_time(folder):
+        document = _manifest(folder) if head is None else head
+        files: dict[str, Any] = document.get("files", {})
+        for name in names:
+            path = folder / name
+            files[name] = {"sha256": file_sha256(path), "bytes": path.stat().st_size}
+        document = {**document, "files": dict(sorted(files.items()))}
+        write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
 
 def changed_files(recording: Recording) -> tuple[str, ...]:

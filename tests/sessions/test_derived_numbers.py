@@ -2,7 +2,9 @@
 
 import json
 import math
+import os
 import sqlite3
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 from recordings import ended
 from stand_ins import INFO
 
-from sessions.recording import Recording, RecordingError
+from sessions.recording import Recording, RecordingError, manifest
 from sessions.recording.archive import problems, seal
 from sessions.recording.derived import load_derived, store_derived, store_page
 
@@ -38,6 +40,24 @@ def test_derived_numbers_are_listed_so_that_a_change_is_named(sealed):
     path = store_derived(sealed, "analysis.json", {"mu": 0.5})
     path.write_text(path.read_text().replace("0.5", "0.6"))
     assert problems(sealed)[0].startswith("analysis.json is not what it was")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders are locked on POSIX alone")
+def test_numbers_that_two_programs_store_at_once_are_both_listed(sealed, monkeypatch):
+    (sealed / "prediction.json").write_text("{}")
+    another = threading.Thread(target=manifest.list_in_manifest, args=(sealed, ("prediction.json",)))
+
+    def interrupted(path):
+        monkeypatch.undo()
+        another.start()
+        another.join(1.0)  # by then it would be done, and its line be written over
+        return manifest.file_sha256(path)
+
+    monkeypatch.setattr(manifest, "file_sha256", interrupted)
+    store_derived(sealed, "analysis.json", {"a": 1})
+    another.join()
+    assert {"analysis.json", "prediction.json"} <= set(json.loads((sealed / "MANIFEST.json").read_bytes())["files"])
+    assert problems(sealed) == ()
 
 
 def test_derived_numbers_made_anew_replace_the_old_ones_as_a_whole(sealed, monkeypatch):
