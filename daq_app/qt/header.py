@@ -53,6 +53,8 @@ class Header(QWidget):
         self._simulated.setAccessibleName(view.simulated or tr("nothing is simulated"))
         self._lamp.show_grade(view.lamp.grade, view.lamp.words)
         say(self._words, view.lamp.words)
+        # All figures are as wide, but some lean beyond their place, which a label allows for.
+        self._words.setMinimumWidth(self._words.fontMetrics().horizontalAdvance(view.lamp.words) + 2)
         regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
         say(self._saved, view.lamp.saved)
 

@@ -1,5 +1,6 @@
 """Preparing a session in the real window: cards, the bench, a session that was cut short, and a rehearsal."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField
 from daq_app.recorder.messages import Connect, Disconnect
 from daq_app.window.new_session import UnfinishedSession
 from daq_app.window.state import DevicesFound, Searching
+from daq_app.window.view import Lamp
 
 pytestmark = pytest.mark.qt
 
@@ -68,6 +70,20 @@ def test_the_strip_at_the_top_says_lamp_subject_device_and_language_and_has_no_b
     assert {"new session", "not recording", "language that the subject reads English (en)"} <= names
     assert any(name.startswith("SIMULATED Net F/T") for name in names)
     assert header.findChildren(QAbstractButton) == []
+
+
+def test_nothing_at_the_top_moves_while_the_clock_counts(driver):
+    header, places = driver.window.header, set()
+    driver.window.bridge.blockSignals(True)
+    try:
+        for second in range(10):
+            header.show_view(replace(driver.view, lamp=Lamp("on", f"recording 00:00:0{second}", "")))
+            driver.application.processEvents()
+            places.add(header._lamp.x())
+    finally:
+        driver.window.bridge.blockSignals(False)
+    header.show_view(driver.view)
+    assert len(places) == 1
 
 
 def test_start_lights_when_every_card_is_ready_and_a_card_that_is_mended_says_so_at_once(driver):
