@@ -11,6 +11,7 @@ from sessions.report.contents import Experiment, PredictionFinding, Report
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, session_functions
 from sessions.report.tables.session import paths_sentence
+from sessions.report.trials import NO_ESTIMATE
 from sessions.report.wording import (
     ShownResponse,
     capital,
@@ -67,7 +68,9 @@ def _in_variant(report: Report, variant: Variant, where: str) -> str:
         for words in [related.reason if r is None else f"r = {correlation(r)}{ends_of(related)}"]
     ]
     if not parts:
-        return f"{where}, which was not tried here, the sign of r may differ."
+        sizes = [fact.value for fact in report.left_out if where.endswith(fact.name) and fact.value != NO_ESTIMATE]
+        change = f": the change is estimated at {sizes[0]}" if sizes else ""
+        return f"{where}, which was not tried here, the sign of r may differ{change}."
     return f"{where}, r of the SED with the mean scores: {'; '.join(parts)}."
 
 

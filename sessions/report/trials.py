@@ -240,11 +240,14 @@ def field_of(experiment: str, row: TrialPrediction) -> Field | None:
     return Field(experiment, row.stimulus.known_index, *picture)
 
 
+NO_ESTIMATE = "no estimate"  # of what leaving an effect out changes
+
+
 def _share(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return the estimated change of the SED, over all trials."""
     known = [100 * entry["estimate"] for entry in entries if entry["estimate"] is not None]
     if not known:
-        return "no estimate"
+        return NO_ESTIMATE
     ends = dict.fromkeys((_plain(min(known)), _plain(max(known))))
     return f"{' to '.join(ends)} % of the SED"
 

@@ -10,6 +10,7 @@ from study_example import study
 
 from sessions.prediction.stored import Variant
 from sessions.report import study_prose
+from sessions.report.contents import Fact
 from sessions.report.figures.relation import paths_panel, relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import doubts, question, summary
@@ -38,6 +39,17 @@ def with_doubt(one, variant):
     return replace(
         one, alternatives=tuple(replace(a, doubt=DOUBT if a.variant == variant else a.doubt) for a in one.alternatives)
     )
+
+
+@pytest.mark.parametrize(
+    ("size", "end"),
+    [("31 to 120 % of the SED", "may differ: the change is estimated at 31 to 120 % of the SED."),
+     ("no estimate", "may differ.")],
+)  # fmt: skip
+def test_a_strain_that_was_not_tried_is_said_with_the_size_of_what_it_would_change(report, size, end):
+    untried = tuple(replace(one, alternatives=()) for one in report.predictions)
+    first, *_ = doubts(replace(report, predictions=untried, left_out=(Fact("finite strain", size, ""),)))
+    assert first == f"At finite strain, which was not tried here, the sign of r {end}"
 
 
 def test_a_stimulus_stroked_twice_is_one_point_of_a_correlation_and_not_two(report):
