@@ -1,7 +1,8 @@
 """Solve scenes to a prediction with an error estimate each, refining the mesh until tolerances are met."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -36,6 +37,7 @@ FIRST_FINENESS = 4.0  # with a tolerance: from 3 and from 5 ten surfaces take as
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
 ASSUMED_ERROR = 4.0  # by the tolerance, where nothing is known of the error
 MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
+Key = TypeVar("Key", bound=Hashable)
 Rough = Callable[[Prediction], None]  # called with each answer that is to be refined, to be kept if work stops
 
 
@@ -122,10 +124,16 @@ def _with_earlier_slides(prediction: Prediction, solve: Answers) -> Prediction:
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
-    groups: dict[object, list[int]] = {}
-    for number, scene in enumerate(scenes):
-        groups.setdefault((scene.solve.kinematics, scene.finger, scene.materials, scene.receptor), []).append(number)
-    return list(groups.values())
+    alike = [(scene.solve.kinematics, scene.finger, scene.materials, scene.receptor) for scene in scenes]
+    return list(_positions(alike).values())
+
+
+def _positions(keys: Sequence[Key]) -> dict[Key, list[int]]:
+    """Return the positions of each key, in the order of their first ones."""
+    out: dict[Key, list[int]] = {}
+    for position, key in enumerate(keys):
+        out.setdefault(key, []).append(position)
+    return out
 
 
 def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
@@ -140,47 +148,61 @@ def _solve_group(
 ) -> list[Answer]:
     """Return the answers of scenes that share meshes."""
     kind = scenes[0].solve.kinematics
-    depth = max(expected_depth(scene) for scene in scenes)
-    has_tolerance = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
-    fineness = FIRST_FINENESS if has_tolerance else DEFAULT_FINENESS[kind]
-    meshing = MESHINGS[kind](depth, progress)
+    meshing = MESHINGS[kind](max(expected_depth(scene) for scene in scenes), progress)
     has_course = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
-    if has_course and (has_tolerance or compared_sets(scenes)):
-        return _march(scenes, fineness, meshing, watch)
-    refinement = _refine(scenes, fineness, meshing, watch, rough)
+    if has_course and (any(map(_has_tolerance, scenes)) or compared_sets(scenes)):
+        return _march(scenes, meshing, watch)
+    refinement = _refine(scenes, meshing, watch, rough)
     return [_add_warnings(answer, more) for answer, more in zip(refinement.answers, refinement.warnings, strict=True)]
 
 
-def _march(scenes: list[Scene], fineness: float, meshing: Meshing, watch: Watch | None) -> list[Answer]:
-    """Return the answers of load paths, each marched once, on the mesh that the settled states need.
+def _has_tolerance(scene: Scene) -> bool:
+    return scene.solve.tolerance is not None or scene.solve.contrast_tolerance is not None
+
+
+def _first_finenesses(scenes: Sequence[Scene], contrast_sets: Sequence[Sequence[int]]) -> list[float]:
+    """Return the fineness of the mesh on which each scene is solved first; scenes that are compared share it."""
+    default = DEFAULT_FINENESS[scenes[0].solve.kinematics]
+    out = [FIRST_FINENESS if _has_tolerance(scene) else default for scene in scenes]
+    for together in contrast_sets:
+        finest = max(out[i] for i in together)
+        for i in together:
+            out[i] = finest
+    return out
+
+
+def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
+    """Return the answers of load paths, each marched once, on the mesh that its settled state needs.
 
     Warnings of a settled state hold for its load path too.
     """
     ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
-    refinement = _refine(ends, fineness, meshing, None, None)
-    answers_of_courses: dict[int, Answer] = {}
+    refinement = _refine(ends, meshing, None, None)
+    meshes = [
+        settled.geometry.sizing.fineness if isinstance(settled, Prediction) else DEFAULT_FINENESS["small"]
+        for settled in refinement.answers
+    ]
+    out: dict[int, Answer] = {}
 
-    def record(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
-        answers_of_courses[number] = _add_warnings(answer, refinement.warnings[number])
+    def record(i: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
+        out[i] = _add_warnings(answer, refinement.warnings[i])
         if watch is not None:
-            watch(number, answers_of_courses[number], finger, way)
+            watch(i, out[i], finger, way)
 
-    answers = meshing.answers(scenes, refinement.fineness, record)
-    return [answers_of_courses.get(number, answer) for number, answer in enumerate(answers)]
+    for mesh, todo in _positions(meshes).items():
+        marched = meshing.answers([scenes[i] for i in todo], mesh, _within(record, todo))
+        out = dict(zip(todo, marched, strict=True)) | out
+    return [out[i] for i in range(len(scenes))]
 
 
-@dataclass(frozen=True, slots=True)
-class _Refinement:
+class _Refinement(NamedTuple):
     """The answers of scenes that share meshes, after the last refinement."""
 
     answers: list[Answer]
     warnings: list[tuple[str, ...]]  # of each answer, about what the finest mesh leaves open
-    fineness: float | Lines  # of the last mesh
 
 
-def _refine(
-    scenes: list[Scene], fineness: float, meshing: Meshing, watch: Watch | None, rough: Rough | None
-) -> _Refinement:
+def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: Rough | None) -> _Refinement:
     """Refine until every error estimate meets its tolerance, those of contrasts too, or no mesh may be finer.
 
     Scenes that share a mesh share the finer one. Where that has no state, `_coarser_counts` decides which answer stays.
@@ -189,11 +211,13 @@ def _refine(
     answers: dict[int, Answer] = {}
     best: dict[int, Answer] = {}  # of each scene the answer with the smallest estimate
     failures: dict[int, SolveFailure] = {}  # on finer meshes, of scenes whose coarser answers count
-    work: dict[float | Lines, list[int]] = {fineness: list(range(len(scenes)))}
-    mesh: float | Lines = fineness
+    first = _first_finenesses(scenes, contrast_sets)
+    work: dict[float | Lines, list[int]] = {**_positions(first)}
+    meshes: dict[int, float | Lines] = {}  # the last of each scene
     while True:
         for mesh, todo in work.items():
-            solved = meshing.answers([scenes[i] for i in todo], mesh, watch)
+            solved = meshing.answers([scenes[i] for i in todo], mesh, _within(watch, todo))
+            meshes |= dict.fromkeys(todo, mesh)
             for i, answer in zip(todo, solved, strict=True):
                 failure = _loss(answer, answers.get(i))
                 if failure is not None:
@@ -201,11 +225,7 @@ def _refine(
                     continue
                 answers[i] = answer
                 best[i] = min(answer, best.get(i, answer), key=_estimate)
-        limits_known = mesh != FIRST_FINENESS
-        errors = [
-            0.0 if i in failures else _error_by_tolerance(answers[i], limits_known=limits_known)
-            for i in range(len(scenes))
-        ]
+        errors = _errors(answers, failures, meshes)
         contrasts = [
             contrast_error([p for i in together if isinstance(p := answers[i], Prediction)])
             for together in contrast_sets
@@ -224,10 +244,11 @@ def _refine(
                 rough(answer)
     answers |= {i: best[i] for i, miss in enumerate(errors) if miss > 1.0}
     if kind == "finite":  # where a fine mesh may lose its way
-        failures |= _fall_back(scenes, answers, fineness, meshing)
+        failures |= _fall_back(scenes, answers, first, meshing)
     contrast_of = {i: off for together, off in zip(contrast_sets, contrasts, strict=True) for i in together}
+    errors = _errors(answers, failures, meshes)
     warnings = [_sentences(contrast_of.get(i), errors[i], answers[i], failures.get(i)) for i in range(len(scenes))]
-    return _Refinement([answers[i] for i in range(len(scenes))], warnings, mesh)
+    return _Refinement([answers[i] for i in range(len(scenes))], warnings)
 
 
 def _error_reductions(
@@ -274,20 +295,20 @@ def _finer(
 
 
 def _fall_back(
-    scenes: list[Scene], answers: dict[int, Answer], first_fineness: float, meshing: Meshing
+    scenes: list[Scene], answers: dict[int, Answer], first: Sequence[float], meshing: Meshing
 ) -> dict[int, SolveFailure]:
-    """Solve scenes without a state at `first_fineness` on a coarser mesh; return the failures that this replaces.
+    """Solve scenes without a state at their `first` fineness on a coarser mesh; return the failures that this replaces.
 
     Under steep friction a single mesh may have no state by chance, and a slightly finer one is tried at last.
     """
     replaced: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         if isinstance(failure := answers[i], SolveFailure) and _is_doubtful(scene, failure):
-            answer = meshing.answers([scene], first_fineness / FINENESS_RATIO)[0]
+            answer = meshing.answers([scene], first[i] / FINENESS_RATIO)[0]
             if _coarser_counts(answer, failure):
                 answers[i], replaced[i] = answer, failure
         if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
-            answers[i] = meshing.answers([scene], first_fineness * FINENESS_RATIO)[0]
+            answers[i] = meshing.answers([scene], first[i] * FINENESS_RATIO)[0]
     return replaced
 
 
@@ -350,6 +371,16 @@ def _add_warnings(answer: Answer, sentences: tuple[str, ...]) -> Answer:
         if sentences and isinstance(answer, Prediction)
         else answer
     )
+
+
+def _errors(
+    answers: Mapping[int, Answer], failures: Mapping[int, SolveFailure], meshes: Mapping[int, float | Lines]
+) -> list[float]:
+    """Return the errors of all answers by their tolerances, 0 for coarser answers in place of `failures`."""
+    return [
+        0.0 if i in failures else _error_by_tolerance(answers[i], limits_known=meshes[i] != FIRST_FINENESS)
+        for i in sorted(answers)
+    ]
 
 
 def _error_by_tolerance(answer: Answer, *, limits_known: bool) -> float:
