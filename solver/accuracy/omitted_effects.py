@@ -20,7 +20,7 @@ from solver.equilibrium.finger import Finger, LinearFinger
 from solver.failures import NoSteadyState, SolveFailure
 from solver.prediction import Prediction, percent
 from solver.scene import Scene
-from solver.scene.tables import Material, Materials, Solve
+from solver.scene.tables import Material, Materials, SceneError, Solve
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178). Their weights are
@@ -275,8 +275,7 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
     """Return the entries that were measured, with new `estimate`, `from` and `how`."""
     out: dict[str, dict[str, Any]] = {}
     if scene.finger.bone == "rigid":
-        yielding = replace(scene, finger=replace(scene.finger, bone="meshed"))
-        out["bone compliance"] = _difference(base, answers((yielding,))[0], "with the bone meshed")
+        out["bone compliance"] = _difference(base, _with_meshed_bone(scene, answers), "with the bone meshed")
     if scene.solve.kinematics == "small" and not scene.materials.relax:
         out["finite strain"] = _beyond_errors(base, answers((_at_finite_strain(scene),))[0], "at finite strain")
     if scene.loading.directions and not scene.loading.dragged and not scene.materials.relax:
@@ -285,14 +284,22 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
     return out
 
 
-def _difference(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
+def _with_meshed_bone(scene: Scene, answers: Answers) -> Answer | SceneError:
+    """Return the answer of a scene with its bone meshed, whose stiffness may be out of proportion to the tissues'."""
+    try:
+        return answers((replace(scene, finger=replace(scene.finger, bone="meshed")),))[0]
+    except SceneError as refused:
+        return refused
+
+
+def _difference(base: Prediction, other: Answer | SceneError, how: str) -> dict[str, Any]:
     if isinstance(other, NoSteadyState):
         return {
             "estimate": None,
             "from": {"limit_mu": other.limit_mu},
             "how": f"{MEASURED}{how}: no settled state is there",
         }
-    if isinstance(other, SolveFailure):
+    if not isinstance(other, Prediction):
         return {"how": f"{MEASURED}{how} was to be measured, but: {other}"}
     change = abs(other.sed_ending / base.sed_ending - 1.0) if base.sed_ending else None
     numbers = {"without_MPa": base.sed_ending, "with_MPa": other.sed_ending}

@@ -7,6 +7,7 @@ grows linearly.
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from threading import get_ident
 from time import perf_counter
 from typing import Any
 
@@ -21,7 +22,7 @@ from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.scene import Scene
-from solver.scene.tables import Relaxation
+from solver.scene.tables import Relaxation, SceneError
 
 MARGIN = 4.0  # by the indentation: height of the undeformed skin up to which contact is considered
 # Elements to a tip radius, and load steps of the press and of the slide. Against 16 or 24 of each at a fineness of 5,
@@ -41,7 +42,7 @@ class ResidualOverstress:
 def relaxing_scene(scene: Scene) -> Scene | None:
     """Return the scene with relaxing tissues: its own Prony series, or literature's with its moduli as long-term ones.
 
-    Bulk moduli do not relax. None for tissue too compressible for that.
+    Bulk moduli do not relax. None for tissue too compressible for that, or too stiff for a scene.
     """
     if scene.materials.relax:
         return scene
@@ -55,7 +56,10 @@ def relaxing_scene(scene: Scene) -> Scene | None:
         if nu < 0.0:
             return None
         soft[name] = replace(tissue, E=2.0 * shear * (1.0 + nu), nu=nu, prony=terms)
-    return replace(scene, materials=replace(scene.materials, **soft))
+    try:
+        return replace(scene, materials=replace(scene.materials, **soft))
+    except SceneError:
+        return None
 
 
 def with_viscosity(prediction: Prediction) -> Prediction:
@@ -99,7 +103,7 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     if slide > 0.0:
         aims += [Aim(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in along.tolist()]
     try:
-        finger = _coarse_finger(scene.frictionless_press(depth))
+        finger = _coarse_finger(scene.frictionless_press(depth), get_ident())
         state = roughly(finger, scene) if isinstance(finger, FiniteFinger) else settled_state(scene, finger)
         at_last = finger.sed_ending(finger.displacement(state))
         way = way_of(scene, finger, relaxing=True)
@@ -111,8 +115,8 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
 
 
 @lru_cache(maxsize=1)
-def _coarse_finger(scene: Scene) -> LinearFinger | FiniteFinger:
-    """Return a finger on a coarse mesh, cached for consecutive surfaces of one finger."""
+def _coarse_finger(scene: Scene, _thread: int) -> LinearFinger | FiniteFinger:
+    """Return a finger on a coarse mesh, cached for consecutive surfaces of one finger in one thread."""
     kind = scene.solve.kinematics
     sizing = Sizing(FINENESS[kind], scene.loading.depth, margin=MARGIN)
     return FiniteFinger.of(scene, sizing) if kind == "finite" else LinearFinger.of(scene, sizing)

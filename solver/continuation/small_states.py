@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log2, sqrt
+from threading import get_ident
 
 import numpy as np
 
@@ -328,7 +329,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     if not scenes:
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
-    finger = _finger(scenes[0].frictionless_press(deepest))
+    finger = _finger(scenes[0].frictionless_press(deepest), get_ident())
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if state is None else state.load.depth for state in pressed)
 
@@ -340,7 +341,7 @@ def expected_depth(scene: Scene) -> float:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        finger = _finger(scene.frictionless_press(deepest))
+        finger = _finger(scene.frictionless_press(deepest), get_ident())
     except (SceneError, NotConverged):  # the solve itself will report it
         return deepest
     state = _pressed(finger, scene, force, deepest)
@@ -383,8 +384,8 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
 
 
 @lru_cache(maxsize=1)
-def _finger(bare: Scene) -> LinearFinger:
-    """Return the finger on a coarse mesh, cached for consecutive surfaces of one finger."""
+def _finger(bare: Scene, _thread: int) -> LinearFinger:
+    """Return the finger on a coarse mesh, cached for consecutive surfaces of one finger in one thread."""
     return LinearFinger.of(bare, Sizing(ROUGH, bare.loading.depth))
 
 

@@ -15,7 +15,7 @@ from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
 from solver.equilibrium import EquilibriumState, ForceLoad
 from solver.equilibrium.finger import KINDS, Finger
-from solver.equilibrium.load_path import Way, march
+from solver.equilibrium.load_path import PRESSING_TIME, Way, march
 from solver.failures import SolveFailure
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
@@ -28,7 +28,7 @@ ALL = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
 class Rates(NamedTuple):
     """Mean rates of one quantity, in its unit per second; nan for a part that a load path does not have."""
 
-    press: float  # from first touch until the bone moves along the surface
+    press: float  # from first touch until the bone is slid or dragged along the surface
     break_away: float  # from then until all of the contact slips
     slide: float  # from then to the end: 0 once nothing changes any more
 
@@ -48,7 +48,8 @@ def instants(history: History) -> tuple[int, int, int]:
     A part that is not reached ends with the one before it.
     """
     count = len(history.time)
-    moved = np.flatnonzero(np.abs(history.bone_x) > 0.0)
+    # A press without drag, before it is dragged, lets the bone move along the surface too.
+    moved = np.flatnonzero((history.time > PRESSING_TIME) & (np.abs(history.bone_x) > 0.0))
     first = int(moved[0]) if len(moved) else count
     slip = np.flatnonzero((history.slipping >= ALL) & (np.arange(count) >= first))
     return first, int(slip[0]) + 1 if len(slip) else count, count

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve, solve
+from solver import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve, solve
 from solver.accuracy.residual_overstress import relaxing_scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
@@ -105,3 +105,20 @@ def test_what_tissues_would_still_hold_is_what_a_course_in_small_steps_on_a_fine
     settled = solve(replace(scene(surface), solve=Solve(kinematics)))
     marched = solve(replace(relaxing_scene(settled.scene), solve=Solve(kinematics, "history")))
     assert entry(settled, "viscosity")["estimate"] == pytest.approx(still_held(settled, marched), rel=0.1)
+
+
+def test_a_rigid_bone_too_stiff_to_be_meshed_with_the_tissues_leaves_the_estimate_with_the_reason():
+    usual = scene(SLIPPERINESS[4])
+    stiff = replace(usual.materials, bone=Material(1e12, 0.3))
+    found = solve(replace(usual, materials=stiff, solve=Solve(tolerance=0.5, evidence="measured")))
+    told = entry(found, "bone compliance")
+    assert told["estimate"] == told["estimated"]
+    assert "was to be measured, but: materials.bone.E" in told["how"]
+
+
+def test_tissues_that_would_be_too_stiff_at_once_have_no_relaxing_scene():
+    stiff = Material(9e11, 0.3)
+    tissues = Materials(stiff, stiff, stiff)
+    pressed = Scene(materials=tissues, friction=Friction(0.3), loading=Loading(1.0), solve=Solve(tolerance=0.5))
+    assert relaxing_scene(pressed) is None
+    assert solve(pressed).sed_ending > 0.0

@@ -44,6 +44,18 @@ def test_a_course_without_a_part_has_no_rate_there():
 
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_the_press_before_a_drag_ends_after_its_second_although_the_bone_moves_along_the_surface(kinematics):
+    dragged = Loading(slide="+x", normal_force=0.05, tangential_force=0.01)
+    scene = Scene(friction=Friction(0.5), loading=dragged, solve=Solve(kinematics, "history", 0.1, "quick"))
+    course = solve(scene).history
+    pressed = int(np.flatnonzero(course.time == 1.0)[0])
+    assert course.bone_x[pressed] != 0.0
+    found = rates(course)["sed"]
+    assert found.press == pytest.approx(course.sed_ending[pressed])
+    assert found.break_away == pytest.approx(course.sed_ending[-1] - course.sed_ending[pressed])
+
+
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_twice_as_fast_a_slide_breaks_away_twice_as_fast_and_its_end_is_the_prediction(kinematics):
     scene = Scene(friction=Friction(0.3), loading=Loading(1.0, "-x", 10.0), solve=Solve(kinematics, "history"))
     found = [solve(replace(scene, loading=replace(scene.loading, speed=speed))) for speed in (10.0, 20.0)]
