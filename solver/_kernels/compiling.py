@@ -47,7 +47,8 @@ def _cache_folder() -> Path:
         places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
     for place in places:
         with suppress(OSError):
-            (place / version).mkdir(mode=0o700, parents=True, exist_ok=True)
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)  # `mode` is not that of the parents it makes
+            (place / version).mkdir(mode=0o700, exist_ok=True)
             if all(is_private(folder) for folder in (place, place / version)):
                 return place / version
     return Path(mkdtemp(prefix="daq-app-"))

@@ -10,10 +10,12 @@ import pytest
 CODE = "import solver._kernels.compiling, os; print(os.environ['NUMBA_CACHE_DIR'])"
 
 
-def used(folder):
-    """Return the folder that a process uses whose environment names `folder`."""
+def used(folder, umask=-1):
+    """Return the folder that a process with a `umask` uses whose environment names `folder`."""
     told = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
-    done = subprocess.run([sys.executable, "-c", CODE], env=told, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", CODE], env=told, capture_output=True, text=True, check=True, umask=umask
+    )
     return Path(done.stdout.strip())
 
 
@@ -24,6 +26,12 @@ def test_machine_code_in_a_folder_that_others_may_write_is_not_loaded(tmp_path, 
     folder.mkdir()
     folder.chmod(mode)
     assert folder not in used(folder).parents
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owners here")
+def test_machine_code_is_kept_where_new_folders_are_open_to_the_users_group(tmp_path):
+    folder = tmp_path / "caches" / "new"
+    assert used(folder, 0o002).parent == folder
 
 
 def test_machine_code_in_a_folder_of_ones_own_is_kept_there(tmp_path):
