@@ -14,7 +14,7 @@ from solver._kernels import elements as element_loops
 from solver._kernels.multifrontal import DEFINITE
 from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
 from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements
-from solver.body.validation import check_body, check_held, check_loads, loose
+from solver.body.validation import BodyError, check_body, check_held, check_loads, loose
 from solver.constitutive import Elasticity
 from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
@@ -346,7 +346,15 @@ def skin_lengths(mesh: Mesh) -> Array:
 
 
 def edge_load(mesh: Mesh, chain: Indices, traction: Array) -> Array:
-    """Return the nodal forces (nodes, c) of a traction (2 k + 1, c) [MPa] along a chain of edges (2 k + 1,)."""
+    """Return the nodal forces (nodes, c) of a traction (2 k + 1, c) [MPa] along a chain of edges (2 k + 1,).
+
+    Raises BodyError where these are no whole edges, or there is not one traction for each node.
+    """
+    if len(chain) != len(traction) or (len(chain) and (len(chain) < 3 or len(chain) % 2 == 0)):
+        raise BodyError(
+            f"the chain has {len(chain)} nodes and {len(traction)} tractions; name whole edges, from end by middle to "
+            "end, and so on, and give a traction for each node"
+        )
     out = np.zeros((len(mesh.nodes), traction.shape[1]))
     edges = np.arange(0, len(chain) - 2, 2)[:, None] + np.arange(3)
     tangent = _SLOPES @ mesh.nodes[chain[edges]]  # (e, q, 2)

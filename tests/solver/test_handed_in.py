@@ -5,7 +5,7 @@ import pytest
 
 from solver import Material
 from solver.body.finite import FiniteBody
-from solver.body.linear import LinearBody
+from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
 from solver.constitutive import Hooke, NeoHooke, Ogden, Prony
 from solver.contact import FrictionLaw
@@ -54,6 +54,8 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: linear(replace(MESH, held_y=MESH.elements[0, 8:]), TISSUE), "is the centre of element 0"),
         (lambda: FiniteBody.of(replace(MESH, held=MESH.elements[1, 8:]), SKIN), "is the centre of element 1"),
         (lambda: linear(replace(STRAY, held=np.array([*MESH.held, 25])), TISSUE), "node 25 is held and belongs to no"),
+        (lambda: edge_load(MESH, MESH.skin[:4], np.ones((4, 2))), "the chain has 4 nodes"),
+        (lambda: edge_load(MESH, MESH.skin, np.ones((4, 2))), "5 nodes and 4 tractions"),
         (lambda: linear(STRAY, TISSUE, np.ones((26, 2))), "loads pull at node 25, which belongs to no element"),
         (lambda: linear(MESH, [Hooke(-0.08, 0.3)]), "E must be above 0"),
         (lambda: linear(replace(MESH, region=MESH.region + 1), TISSUE), "region 1 of the mesh has no material"),
