@@ -10,6 +10,11 @@ from solver.scene.tables import LAWS_OF, TISSUES, Finger, Friction, Loading, Mat
 
 STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond it, round-off swamps the softer one
 
+TABLES = {
+    "finger": Finger, "materials": Materials, "friction": Friction, "loading": Loading, "receptor": Receptor,
+    "solve": Solve,
+}  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
@@ -24,7 +29,10 @@ class Scene:
     solve: Solve = field(default_factory=Solve)
 
     def __post_init__(self) -> None:
-        """Check combinations of tables. Raises SceneError."""
+        """Check the types of tables and combinations of them. Raises SceneError."""
+        for name, table in TABLES.items():
+            if not isinstance(getattr(self, name), table):
+                raise SceneError(name, getattr(self, name), f"it must be a {table.__name__}")
         self._check_laws()
         self._check_stiffnesses()
         skin = self.finger.epidermis + self.finger.dermis

@@ -197,7 +197,10 @@ class Materials:
     def __post_init__(self) -> None:
         """Check each tissue under its key. Raises SceneError."""
         for name in TISSUES:
-            self.of(name).check(f"materials.{name}")
+            tissue = cast("object", self.of(name))
+            if not isinstance(tissue, Material):
+                raise SceneError(f"materials.{name}", tissue, "it must be a Material")
+            tissue.check(f"materials.{name}")
 
     def of(self, name: str) -> Material:
         """Return the tissue called `name`, one of TISSUES."""
