@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
-from solver.accuracy.error_estimate import errors
+from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
+from solver.accuracy.error_estimate import errors, untried
 from solver.continuation.small_states import expected_depth, nearest, settled_state
 from solver.equilibrium import EQUILIBRIUM
 from solver.equilibrium.finger import LinearFinger
@@ -204,3 +204,14 @@ def test_an_answer_warns_where_no_trial_of_the_estimates_had_tissues_so_differen
     said = [warning for warning in found.warnings if "times as stiff" in warning]
     assert len(said) == bool(words)
     assert words in "".join(said)
+
+
+def test_tissues_that_relax_warn_of_a_difference_in_stiffness_as_the_elastic_ones_that_they_relax_to():
+    # With half its shear modulus relaxed, G = 0.08 and K = 0.1 MPa become G = 0.04 and K = 0.1: E = 0.105882.
+    relaxing = Material(9.0 * 0.08 * 0.1 / 0.38, 0.14 / 0.76, prony=(Relaxation(0.5, 1.0),))
+    elastic = Material(9.0 * 0.04 * 0.1 / 0.34, 0.22 / 0.68)
+    scenes = [
+        Scene(materials=Materials(Material(12.0, 0.3), one), friction=Friction(0.3), loading=Loading(0.5, "+x"))
+        for one in (relaxing, elastic)
+    ]
+    assert untried(scenes[0]) == untried(scenes[1]) != ""
