@@ -1,7 +1,7 @@
 """Solutions of scenes, and their predictions: numbers with error estimates, skin, history and omitted effects."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import STATE_NAMES
+from solver.continuation.small_states import expected_depth
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, Way
@@ -136,9 +137,10 @@ Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None] 
 class Meshing(ABC):
     """Solves scenes of one finger on meshes of any fineness, and keeps meshes for reuse."""
 
-    def __init__(self, depth: float, progress: Progress | None) -> None:
-        """Start without meshes. `depth` [mm] is the deepest indentation, an estimate where forces are given."""
-        self.depth, self.progress = depth, progress
+    def __init__(self, scenes: Sequence[Scene], progress: Progress | None) -> None:
+        """Start without meshes, which are made for the depths of `scenes`, estimates where forces are given."""
+        self.depths = [expected_depth(scene) for scene in scenes]
+        self.progress = progress
 
     @abstractmethod
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:

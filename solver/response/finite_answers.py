@@ -1,5 +1,6 @@
 """Solve scenes at finite strain with error estimates, on finer and finer meshes that start from coarser solutions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -231,10 +232,13 @@ class FiniteMeshing(Meshing):
     Scenes that are pressed and move alike share meshes. They are solved by rising friction, each from the one before.
     """
 
-    def __init__(self, depth: float, progress: Progress | None) -> None:
+    def __init__(self, scenes: Sequence[Scene], progress: Progress | None) -> None:
         """Start without meshes."""
-        super().__init__(depth, progress)
+        super().__init__(scenes, progress)
         self._meshes: dict[LoadingGroup, Meshes] = {}
+        self._deepest: dict[LoadingGroup, float] = {}  # [mm]
+        for scene, depth in zip(scenes, self.depths, strict=True):
+            self._deepest[scene.loading_group] = max(depth, self._deepest.get(scene.loading_group, 0.0))
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
         """Do as `Meshing` says."""
@@ -247,7 +251,7 @@ class FiniteMeshing(Meshing):
                 meshes = self._meshes.setdefault(scene.loading_group, Meshes())
                 meshes.keep(fineness)
                 try:
-                    coarse = coarse_solution(scene, self.depth, fineness, meshes)
+                    coarse = coarse_solution(scene, self._deepest[scene.loading_group], fineness, meshes)
                     answers[number] = _predict(scene, refine(scene, fineness, coarse, meshes), meshes, start)
                 except SolveFailure as failure:
                     answers[number] = failure

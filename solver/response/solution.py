@@ -11,7 +11,6 @@ from solver.accuracy.adaptivity import refine_lines
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error, untried
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
 from solver.accuracy.residual_overstress import with_viscosity
-from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
@@ -148,7 +147,7 @@ def _solve_group(
 ) -> list[Answer]:
     """Return the answers of scenes that share meshes."""
     kind = scenes[0].solve.kinematics
-    meshing = MESHINGS[kind](max(expected_depth(scene) for scene in scenes), progress)
+    meshing = MESHINGS[kind](scenes, progress)
     has_course = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if has_course and (any(map(_has_tolerance, scenes)) or compared_sets(scenes)):
         return _march(scenes, meshing, watch)

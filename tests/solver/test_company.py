@@ -67,6 +67,15 @@ def test_under_steep_friction_a_mesh_that_is_tried_at_last_says_that_it_misses_t
     assert any("above the tolerance" in warning for warning in answer.warnings)
 
 
+def test_at_finite_strain_a_scene_under_a_force_has_the_mesh_that_it_has_alone_beside_a_deeper_one():
+    light, deep = (
+        Scene(friction=Friction(0.2), loading=loading, solve=Solve("finite", evidence="quick"))
+        for loading in (Loading(normal_force=0.05), Loading(2.0))
+    )
+    beside = solve_many((deep, light))[1]
+    assert beside.sed_ending == pytest.approx(solve(light).sed_ending, rel=1e-12)
+
+
 def test_threads_find_the_depths_under_forces_that_one_thread_finds():
     surfaces = [
         Scene(friction=Friction(mu), loading=Loading(normal_force=force)) for mu in (0.1, 0.7) for force in (0.05, 0.2)
