@@ -171,27 +171,25 @@ def _first_finenesses(scenes: Sequence[Scene], contrast_sets: Sequence[Sequence[
 
 
 def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
-    """Return the answers of load paths, each marched once, on the mesh that its settled state needs.
+    """Return the answers of load paths, each marched once, on the finest mesh that a settled state needs.
 
     Warnings of a settled state hold for its load path too.
     """
     ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
     refinement = _refine(ends, meshing, None, None)
-    meshes = [
-        settled.geometry.sizing.fineness if isinstance(settled, Prediction) else DEFAULT_FINENESS["small"]
-        for settled in refinement.answers
-    ]
-    out: dict[int, Answer] = {}
+    settled = [answer for answer in refinement.answers if isinstance(answer, Prediction)]
+    mesh: float | Lines = DEFAULT_FINENESS["small"]
+    if settled:
+        mesh = max(settled, key=lambda answer: answer.dofs).geometry.sizing.fineness
+    answers_of_courses: dict[int, Answer] = {}
 
-    def record(i: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
-        out[i] = _add_warnings(answer, refinement.warnings[i])
+    def record(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
+        answers_of_courses[number] = _add_warnings(answer, refinement.warnings[number])
         if watch is not None:
-            watch(i, out[i], finger, way)
+            watch(number, answers_of_courses[number], finger, way)
 
-    for mesh, todo in _positions(meshes).items():
-        marched = meshing.answers([scenes[i] for i in todo], mesh, _within(record, todo))
-        out = dict(zip(todo, marched, strict=True)) | out
-    return [out[i] for i in range(len(scenes))]
+    answers = meshing.answers(scenes, mesh, record)
+    return [answers_of_courses.get(number, answer) for number, answer in enumerate(answers)]
 
 
 class _Refinement(NamedTuple):
