@@ -332,7 +332,7 @@ def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Gen
     """
     left = dict(jobs)
     try:
-        for name, answer in _in_pool(work, dict(left), workers):
+        for name, answer in _in_pool(work, dict(left), workers) if left else ():
             del left[name]
             yield name, answer
     except BrokenProcessPool:  # a worker died, and nobody knows over which job: each gets a worker of its own

@@ -83,7 +83,7 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
     """Return the results of a cylinder of radius 5 mm under `load`, pressed from above by Hertz's pressure."""
     mesh = disc(5.0, 0.05, 1.0)
     x, y = (mesh.nodes - [0.0, 5.0]).T
-    top = chain(np.isclose(np.hypot(x, y), 5.0) & (y > 0), x)
+    top = chain(np.isclose(np.hypot(x, y), 5.0) & (y > -1e-9), x)
     traction = np.zeros((len(top), 2))
     traction[:, 1] = -peak * np.sqrt(np.clip(1 - (mesh.nodes[top, 0] / half_width) ** 2, 0, None))
     loads = edge_load(mesh, top, traction)
