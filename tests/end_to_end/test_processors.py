@@ -16,7 +16,7 @@ from daq_app.simulation.synthetic import synthetic_study
 
 NEAR = 1e-12
 # A mean, its spread and its interval, or an effect and its interval, are one quantity: each counts against the largest.
-ONE_QUANTITY = ("estimate", "mean", "sd", "low", "high")
+ONE_QUANTITY = ("estimate", "found", "mean", "sd", "low", "high")  # `found` is the former name of `estimate`
 SPREAD_OF = {"between_sd": 0, "slope_sd": 1}  # in a mixed model: of which term, whose spread between subjects it is
 # Probabilities, correlations, differences of two of these, also in units of their own errors (z), and estimated errors
 # of SEDs and forces as parts of them: counted against 1.
