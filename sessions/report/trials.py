@@ -197,7 +197,11 @@ def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
     return (
         *(Fact(name, _share(entries), entries[0]["how"]) for name, entries in by_effect.items()),
         *(
-            Fact("warning", same[0], f"the first of {plural(len(same), 'trial')} with this warning")
+            Fact(
+                "warning",
+                max(same, key=_numbers_in),
+                f"the greatest numbers of {plural(len(same), 'trial')} with this warning",
+            )
             for same in warned.values()
         ),
     )
@@ -238,6 +242,10 @@ def field_of(experiment: str, row: TrialPrediction) -> Field | None:
     if picture is None or row.stimulus is None:
         return None
     return Field(experiment, row.stimulus.known_index, *picture)
+
+
+def _numbers_in(sentence: str) -> list[float]:
+    return [float(number.group()) for number in _NUMBER.finditer(sentence)]
 
 
 NO_ESTIMATE = "no estimate"  # of what leaving an effect out changes

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from sessions.report.tables import predictions as of_predictions
 from sessions.report.tables.session import paths_sentence, planted_table, relation_table
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
+from sessions.report.trials import omissions
 from sessions.report.wording import correlation
 
 FORCE = Variant("small", "computed", "force")
@@ -185,3 +187,11 @@ def test_the_table_of_rivals_names_the_weights_of_mixed_models_only_where_there_
         assert ("AIC weight" in [column.name for column in table.columns]) == weighed
         assert ("AIC" in table.caption + " ".join(words for _, words in table.notes)) == weighed
         assert {len(row) for group in table.groups for row in group.rows} == {len(table.columns)}
+
+
+def test_a_warning_of_several_trials_is_shown_with_its_greatest_numbers():
+    said = ("Strains reach 54 % there.", "Strains reach 186 % there.", "Strains reach 99 % there.")
+    trials = [SimpleNamespace(prediction=SimpleNamespace(model={}, warnings=(one,))) for one in said]
+    assert omissions(SimpleNamespace(trials=trials)) == (
+        Fact("warning", said[1], "the greatest numbers of 3 trials with this warning"),
+    )
