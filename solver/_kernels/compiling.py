@@ -41,13 +41,15 @@ def _cache_folder() -> Path:
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
     setting = os.environ.get("NUMBA_CACHE_DIR")
-    places = [_FOLDER / "__pycache__"] if is_private(_FOLDER) else []
-    places.append(user_cache_path("daq-app", appauthor=False))
+    own = user_cache_path("daq-app", appauthor=False)
+    places = [_FOLDER / "__pycache__", own] if is_private(_FOLDER) else [own]
     if setting:
         places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
     for place in places:
         with suppress(OSError):
             place.mkdir(mode=0o700, parents=True, exist_ok=True)  # `mode` is not that of the parents it makes
+            if place == own:
+                place.chmod(0o700)  # another program, or an earlier run, may have made it open to a group
             (place / version).mkdir(mode=0o700, exist_ok=True)
             if all(is_private(folder) for folder in (place, place / version)):
                 return place / version

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from solver._kernels import compiling
+
 CODE = "import solver._kernels.compiling, os; print(os.environ['NUMBA_CACHE_DIR'])"
 
 
@@ -32,6 +34,19 @@ def test_machine_code_in_a_folder_that_others_may_write_is_not_loaded(tmp_path, 
 def test_machine_code_is_kept_where_new_folders_are_open_to_the_users_group(tmp_path):
     folder = tmp_path / "caches" / "new"
     assert used(folder, 0o002).parent == folder
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the user's caches lie elsewhere here")
+def test_the_users_own_cache_that_is_open_to_a_group_is_closed_and_used(tmp_path, monkeypatch):
+    sources, cache = tmp_path / "sources", tmp_path / "daq-app"
+    for folder in (sources, cache):
+        folder.mkdir()
+        folder.chmod(0o775)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setattr(compiling, "_FOLDER", sources)
+    assert compiling._cache_folder().parent == cache
+    assert cache.stat().st_mode & 0o777 == 0o700
 
 
 def test_machine_code_in_a_folder_of_ones_own_is_kept_there(tmp_path):
