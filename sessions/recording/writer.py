@@ -231,7 +231,7 @@ class SessionWriter:
             if self._failure is None:
                 self.commit()
                 self._failure = "it was closed"
-                # One plain file that any reader opens without side files; when this fails the log stays beside it.
+                # Readers then need one file alone. Where folding the log into it fails, the log stays.
                 with suppress(sqlite3.Error):
                     self._connection.execute("PRAGMA journal_mode=DELETE")
         finally:

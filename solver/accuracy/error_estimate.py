@@ -240,7 +240,7 @@ ROUND_OFF = 1e-12  # relative, of a stiffness
 TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
 
 
-def untried(scene: Scene) -> str:
+def stiffness_warning(scene: Scene) -> str:
     """Return a warning where neighbouring tissues differ more in stiffness than in trials of the estimates, else "".
 
     Tissues are relaxed, as in the answer.

