@@ -4,11 +4,11 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from daq_app.console import Console, WrongValue
 from sessions.plan.plan import SessionPlan
-from sessions.plan.study import is_study
+from sessions.plan.study import StudyError, is_study
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, part_of, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
 from sessions.prediction.stored import check_prediction, with_present_names
@@ -22,6 +22,7 @@ from sessions.recording.derived import (
     load_derived,
     parse_gain_error,
     reveal,
+    sessions_of,
     set_gain_error,
     store_derived,
     why,
@@ -251,19 +252,34 @@ def is_current(stored: Mapping[str, Any], decisions: Decisions) -> bool:
     return stored.get("decisions", []) == now
 
 
-def open_visit(path: Path, subject: str | None) -> Recording:
-    """Return a session with all that is known of its stimuli, or a subject's visit with forces to a study.
+class OpenVisit(NamedTuple):
+    """A session with all that is known of its stimuli, and of its study where that was named."""
+
+    recording: Recording
+    other_sessions: tuple[Recording, ...] = ()  # every other session of the study
+    unreadable: tuple[str, ...] = ()  # a sentence for each session of the study that cannot be read
+
+
+def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
+    """Return a session, or a subject's visit with forces to a study; sessions that cannot be read are named.
 
     Raises RecordingError, StudyError, WrongValue.
     """
     if is_study(path):
         if subject is None:
             raise WrongValue(f"{path} is a study: say whose visit with --subject")
-        return force_visit(path, subject)
+        sessions, unreadable = sessions_of(path)
+        console.note(*unreadable)
+        visit = force_visit(sessions, subject)
+        if visit is None:
+            raise StudyError(
+                f"{subject} has no visit with forces in {path}: run one with --device, or give another code"
+            )
+        return OpenVisit(visit, tuple(one for one in sessions if one is not visit), unreadable)
     recording = reveal(Recording.open(path))
     if subject not in (None, recording.plan.subject):
         raise WrongValue(f"--subject {subject} is not allowed: {path} is a session of {recording.plan.subject}")
-    return recording
+    return OpenVisit(recording)
 
 
 def _store(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from sessions.file_access import json_object, json_text, name_failure, read_within_limit, write_whole
-from sessions.plan.study import Key, StudyError
+from sessions.plan.study import Key
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
 from sessions.recording.manifest import is_sealed, list_in_manifest
@@ -41,7 +41,7 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     try:
         return json_object(bytes_of(path))
     except ValueError as error:
-        raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
+        raise RecordingError(f"{path} is damaged ({error}); delete it, and make it anew from the recording") from error
 
 
 def bytes_of(path: Path) -> bytes:
@@ -195,7 +195,9 @@ def reveal(recording: Recording) -> Recording:
             raise ValueError("its SHA-256 is not that in the plan")
         plan = key.plan(recording.plan)
     except (ValueError, KeyError, TypeError) as error:
-        raise RecordingError(f"{path} is not the key that was sealed ({error}); unblind the session anew") from error
+        raise RecordingError(
+            f"{path} is not the key that was sealed ({error}); delete it, and unblind the session anew"
+        ) from error
     return replace(recording, plan=plan, trials=trial_records(plan, recording.events))
 
 
@@ -208,28 +210,22 @@ def session_folders(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(p for p in inside if not os.access(p, os.R_OK | os.X_OK) or (p / LIVE_FILE).is_file()))
 
 
-def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:
-    """Return the sessions in a study's folder, by name, those of one subject where a code is given."""
-    recordings = (reveal(Recording.open(path)) for path in session_folders(folder))
-    return tuple(recording for recording in recordings if subject in (None, recording.plan.subject))
+def sessions_of(folder: Path) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """Return the sessions in a study's folder, by name, and a sentence for each that cannot be read."""
+    recordings: list[Recording] = []
+    unreadable: list[str] = []
+    for path in session_folders(folder):
+        try:
+            recordings.append(reveal(Recording.open(path)))
+        except RecordingError as error:
+            unreadable.append(str(error))
+    return tuple(recordings), tuple(unreadable)
 
 
-def force_visit(folder: Path, subject: str) -> Recording:
-    """Return the visit in which a subject stroked on the transducer: the latest that came to its end.
-
-    Raises StudyError where there is none.
-    """
-    visits = [recording for recording in sessions_of(folder, subject) if recording.plan.forces]
-    if not visits:
-        raise StudyError(f"{subject} has no visit with forces in {folder}: run one with --device, or give another code")
-    return max(visits, key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", ""))))
-
-
-def score_visits(folder: Path, besides: Recording | None = None) -> tuple[Recording, ...]:
-    """Return every visit of every subject in which scores were given on the line, but for the one named."""
-    return tuple(
-        recording
-        for recording in sessions_of(folder)
-        if any(record.score is not None for record in recording.trials)
-        and (besides is None or recording.folder.resolve() != besides.folder.resolve())
+def force_visit(recordings: Sequence[Recording], subject: str) -> Recording | None:
+    """Return the visit in which a subject stroked on the transducer: the latest that came to its end, if any."""
+    visits = [recording for recording in recordings if recording.plan.subject == subject and recording.plan.forces]
+    latest = sorted(
+        visits, key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", "")))
     )
+    return latest[-1] if latest else None

@@ -26,6 +26,7 @@ from sessions.report.contents import (
 )
 from sessions.report.facts import scene_file, session_commands
 from sessions.report.trials import course, fields, flaws, model_in_short, omissions, predictions, strokes
+from sessions.report.wording import full_stop
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.psychometric import Psychometric, function_of
@@ -44,6 +45,7 @@ class Further:
     firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
     response: str = SED.name  # the quantity at the ending that is held against scores
     paths: Mapping[int, Values] | None = None  # trial -> that quantity along many paths of the analysis
+    unreadable: tuple[str, ...] = ()  # a sentence for each session of the study that cannot be read
 
 
 def findings(
@@ -77,7 +79,10 @@ def findings(
         versions=tuple(Fact(name, version) for name, version in software_versions().items()),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
-        excluded=facts.exclusion_sentences(recording, analysis, stroke_findings, tables),
+        excluded=(
+            *map(full_stop, more.unreadable),
+            *facts.exclusion_sentences(recording, analysis, stroke_findings, tables),
+        ),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
         experiments=with_psychometric(judged, recording, analysis),

@@ -1,6 +1,7 @@
 """A blinded study from its making to its report, by the command line alone."""
 
 import json
+import shutil
 
 import pytest
 from examples import short_protocol
@@ -37,7 +38,32 @@ def said(capsys, *words):
     return code, json.loads(capsys.readouterr().out or "null")
 
 
-def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, capsys):
+def test_a_session_that_cannot_be_read_is_named_and_the_rest_of_its_study_is_done(study, tmp_path, capsys):
+    friction = shutil.copytree(study, tmp_path / "friction")
+    torn = friction / "P02_scores" / "session.sqlite"
+    torn.chmod(0o600)
+    torn.write_bytes(b"torn")
+    assert run(["unblind", str(friction), "--by", "E02"]) == 3
+    assert run(["unblind", str(friction), "--by", "E02"]) == 1
+    assert str(torn) in capsys.readouterr().err  # nothing is left but this one
+    page = tmp_path / "page.html"
+    assert run(["report", str(friction), "--subject", "P01", "-o", str(page)]) == 3
+    assert str(torn) in capsys.readouterr().err
+    assert str(torn) in page.read_text()
+    code, predicted = said(capsys, "predict", friction, "--subject", "P01", "--variants", "none")
+    assert (code, {row["stimulus"]["index"] for row in predicted["trials"]}) == (3, {0})
+
+
+def test_a_session_that_cannot_be_written_stays_blinded_and_the_others_are_opened(study, tmp_path, capsys):
+    friction = shutil.copytree(study, tmp_path / "friction")
+    (friction / "P01_forces" / "unblinding.json").mkdir()
+    code, opened = said(capsys, "unblind", friction, "--by", "E02")
+    assert (code, opened["sessions"]) == (3, ["P01_scores", "P02_scores"])
+    assert "P01_forces" in "".join(opened["left_out"])
+
+
+def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, tmp_path, capsys):
+    study = shutil.copytree(study, tmp_path / "friction")
     plan = Recording.open(study / "P01_forces").plan
     assert plan.blinded
     assert (plan.finger.tip_radius, plan.contact_angle, plan.blocks[0].indentation) == (5.5, 40.0, 1.8)

@@ -33,7 +33,7 @@ from sessions.plan.study import (
 )
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
-from sessions.recording.derived import UNBLINDING, reveal, score_visits, sessions_of, store_derived
+from sessions.recording.derived import UNBLINDING, reveal, sessions_of, store_derived
 from sessions.run.replay import different_events, different_readings, replay
 from sessions.run.runner import run_session
 from sessions.run.steps import AskScore, Scored
@@ -299,11 +299,13 @@ def test_after_a_study_was_unblinded_its_later_sessions_are_open(blind):
 # ---- visits
 
 
-def test_visits_are_joined_by_the_subjects_code(blind):
+def test_the_sessions_of_a_study_come_by_name_each_with_its_subject(blind):
     for subject in ("P01", "P02"):
         enrol(blind, subject, Body())
         scored_visit(blind, subject)
     shutil.copytree(blind / "P01_scores", blind / "P01_scores_again")
-    assert [r.folder.name for r in sessions_of(blind, "P01")] == ["P01_scores", "P01_scores_again"]
-    one = Recording.open(blind / "P01_scores")
-    assert [r.folder.name for r in score_visits(blind, besides=one)] == ["P01_scores_again", "P02_scores"]
+    assert [(r.folder.name, r.plan.subject) for r in sessions_of(blind)[0]] == [
+        ("P01_scores", "P01"),
+        ("P01_scores_again", "P01"),
+        ("P02_scores", "P02"),
+    ]

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     if options.scene is not None and not options.scene.parent.is_dir():
         raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
-    recording = open_visit(options.session, options.subject)
+    recording, _, unreadable = open_visit(options.session, options.subject, console)
     settings = stored_settings(recording)
     gain_error = calibration_error(options)
     if gain_error is not None:
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     )
     console.say(simulated)
     _print(outcome, options, console)
-    return FLAWED if flaws or outcome.check.deviation > AGREE else DONE
+    return FLAWED if unreadable or flaws or outcome.check.deviation > AGREE else DONE
 
 
 class _Outcome(NamedTuple):

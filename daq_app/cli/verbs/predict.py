@@ -80,7 +80,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.note(ignored or None)
     stated = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
     choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **stated)
-    recording = open_visit(options.session, options.subject)
+    recording, _, unreadable = open_visit(options.session, options.subject, console)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
@@ -117,7 +117,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
     _print_once(console, ((_trial_label(row), words) for row in prediction.trials for words in _reasons(row)))
-    return FLAWED if any(row.sed is None for row in prediction.trials) else DONE
+    return FLAWED if unreadable or any(row.sed is None for row in prediction.trials) else DONE
 
 
 def _reasons(row: TrialPrediction) -> Iterator[str]:

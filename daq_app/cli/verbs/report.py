@@ -20,11 +20,10 @@ from daq_app.cli.options import (
 )
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.plan.plan import Blinded
-from sessions.plan.study import is_study
 from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
-from sessions.recording.derived import reveal, score_visits, store_page
+from sessions.recording.derived import reveal, store_page
 from sessions.report import Further
 from sessions.report.trials import afferent_facts
 from sessions.statistics.multiverse import trial_paths
@@ -57,10 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
-    recording = open_visit(options.session, options.subject)
+    recording, other_sessions, unreadable = open_visit(options.session, options.subject, console)
     score_only = [reveal(Recording.open(folder)) for folder in options.scores]
-    if is_study(options.session):
-        score_only += score_visits(options.session, besides=recording)
+    score_only += [one for one in other_sessions if any(record.score is not None for record in one.trials)]
     folders = [one.folder.resolve() for one in (recording, *score_only)]
     if twice := next((folder for at, folder in enumerate(folders) if folder in folders[:at]), None):
         raise WrongValue(f"--scores {twice} is not allowed: its scores are in the report already")
@@ -82,7 +80,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     prediction = predict_session(recording, analysis, console, _prediction_options(recording, options), afferent)
     from sessions.report import findings
 
-    further = _further(recording, prediction, afferent, options, console)
+    further = replace(_further(recording, prediction, afferent, options, console), unreadable=unreadable)
     report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
@@ -94,7 +92,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     pictures = pages.write_figures(report, options.figures, drawings) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
-    return FLAWED if analysis.flawed else DONE
+    return FLAWED if analysis.flawed or unreadable else DONE
 
 
 def _check_scores(visit: Recording, recording: Recording) -> None:

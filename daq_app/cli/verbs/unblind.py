@@ -30,26 +30,30 @@ def run(options: argparse.Namespace, console: Console) -> int:
     check_code("--by", options.by)
     whole = is_study(path)
     folder = path if whole else options.study or path.resolve().parent
-    sessions = sessions_of(path) if whole else (Recording.open(path),)
+    sessions, unreadable = sessions_of(path) if whole else ((Recording.open(path),), ())
     key = study_key(folder) if whole or sessions[0].plan.blinded else None
     if key is None:
         raise StudyError(f"{path} is not blinded: there is nothing to open")
     chosen, refused = _select(sessions, key)
+    refused += unreadable
     if not whole and refused:
         raise RecordingError(refused[0])
     if whole and open_study(folder).unblinded and not chosen:
-        raise StudyError(f"{folder} was unblinded before, and so was each of its sessions")
+        rest = f": {'; '.join(refused)}" if refused else ", and so was each of its sessions"
+        raise StudyError(f"{folder} was unblinded before{rest}")
     utc = datetime.now(UTC).isoformat(timespec="seconds")
     note(folder, "unblinded", {"by": options.by, "session": None if whole else path.resolve().name})
+    names: list[str] = []
     for recording in chosen:
-        document = {
-            "unblinded_utc": utc,
-            "by": options.by,
-            "made_before": dict(_results_before(recording)),
-            "key": key.to_dict(),
-        }
-        store_derived(recording.folder, UNBLINDING, document)
-    names = [recording.folder.name for recording in chosen]
+        made_before = dict(_results_before(recording))
+        document = {"unblinded_utc": utc, "by": options.by, "made_before": made_before, "key": key.to_dict()}
+        try:
+            store_derived(recording.folder, UNBLINDING, document)
+            names.append(recording.folder.name)
+        except RecordingError as error:
+            if not whole:
+                raise
+            refused.append(str(error))
     console.result({"study": str(folder), "sessions": names, "left_out": refused, "by": options.by, "utc": utc})
     console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refused)
     if not whole:
