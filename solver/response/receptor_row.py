@@ -114,6 +114,8 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     alike do, each begun at the one with less friction. Raises as `Finger.of`.
     """
     out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
+    if not scenes:
+        return out
     finite = scenes[0].solve.kinematics == "finite"
     order = sorted(range(len(scenes)), key=lambda n: (scenes[n].loading_group, float(scenes[n].friction.mu)))
     for _, numbers in groupby(order, lambda n: scenes[n].loading_group if finite else None):

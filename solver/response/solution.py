@@ -1,6 +1,6 @@
 """Solve scenes to a prediction with an error estimate each, refining the mesh until tolerances are met."""
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
@@ -53,7 +53,7 @@ def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None
 
 
 def solve_many(
-    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, *, rough: Rough | None = None
+    scenes: Iterable[Scene], progress: Progress | None = None, watch: Watch | None = None, *, rough: Rough | None = None
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene, in their order, or the failure that says why it has none.
 
@@ -80,7 +80,7 @@ def solve_many(
         assert watch is not None
         watch(number, add_evidence(answer), finger, way)
 
-    answers = _answers(scenes, progress, watch_with_evidence if watch else None, rough)
+    answers = _answers(tuple(scenes), progress, watch_with_evidence if watch else None, rough)
     return tuple(add_evidence(answer) for answer in answers)
 
 

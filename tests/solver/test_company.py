@@ -29,7 +29,7 @@ def test_every_mesh_gives_its_answers_to_the_watch_by_the_positions_of_their_sce
 def test_a_scene_without_a_tolerance_has_the_default_mesh_beside_one_with_a_tolerance():
     plain, loose = sliding(0.3), sliding(0.3, "-x", tolerance=0.5)
     alone = [solve(scene) for scene in (plain, loose)]
-    for number, together in enumerate(solve_many((plain, loose))):
+    for number, together in enumerate(solve_many(scene for scene in (plain, loose))):
         assert together.dofs == alone[number].dofs
         assert together.sed_ending == pytest.approx(alone[number].sed_ending, rel=1e-12)
 

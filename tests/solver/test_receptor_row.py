@@ -48,6 +48,10 @@ def test_without_estimates_the_same_states_are_found_and_a_scene_that_cannot_sli
     assert np.isnan(rough[1]).all()
 
 
+def test_of_no_scene_there_is_no_response():
+    assert rough_responses([], (0.0, 1.0)).shape == (0, len(NAMES), 2)
+
+
 @pytest.mark.parametrize("kinematics", SCENES)
 def test_errors_along_a_row_at_another_depth_lie_above_the_true_ones(kinematics):
     scene, deep = SCENES[kinematics], Receptor(depth=0.4)
