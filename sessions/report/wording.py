@@ -10,28 +10,9 @@ from sessions.prediction.stored import Ends
 from sessions.report.contents import Numbers, PredictionFinding
 from sessions.statistics.correlations import Relation
 from sessions.statistics.scores import bounds
+from sessions.strokes.stroke import digits, significant
 
 NONE = "–"
-
-
-def digits(value: float, places: int) -> str:
-    """Return a number with so many decimals and a true minus sign.
-
-    >>> digits(-0.25, 2)
-    '−0.25'
-    """
-    return f"{value:z.{places}f}".replace("-", "−")
-
-
-def significant(value: float, figures: int) -> str:
-    """Return a number with so many significant figures, never in powers of ten.
-
-    >>> significant(8.0331, 3), significant(1523.4, 3), significant(0.0, 3)
-    ('8.03', '1523', '0')
-    """
-    if value == 0.0:
-        return "0"
-    return digits(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
 
 
 def with_error(value: float, error: float | None, least: int) -> str:

@@ -12,7 +12,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
 from sessions.strokes import invalid_readings as invalid
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.stroke import Flaw, FlawName
+from sessions.strokes.stroke import Flaw, FlawName, significant
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
@@ -167,8 +167,8 @@ def _flaws_of_axes(
             else "moves before or after: frozen there. These readings are left out."
         )
         sentence = (
-            f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {lasting:.2g} s in all, first "
-            f"at {time[runs[0].first]:.2f} s, and {what}"
+            f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {significant(lasting, 2)} s "
+            f"in all, first at {time[runs[0].first]:.2f} s, and {what}"
         )
         yield Flaw(FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful")
     if wild.any():

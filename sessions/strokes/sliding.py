@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sessions.strokes.settings import AnalysisSettings, SteadySettings
 from sessions.strokes.span import Span, Track, mean_vector
-from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName
+from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName, significant
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -210,12 +210,13 @@ def _rest(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple
         where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
         if where > limits.farthest:
             return FlawName.UNITS_IMPLAUSIBLE, (
-                f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
-                "torques and the face's height; nothing shows that the contact slides, so no friction is given."
+                f"The centre of pressure lies {significant(where, 3)} mm from the axis, where no finger is: check the "
+                "units of the torques and the face's height; nothing shows that the contact slides, so no "
+                "friction is given."
             )
         if way > max(limits.shear, limits.shear_steps * step):
             return _roll_flaw(track, uncut, float(np.nanmean(track.ratio[window])))
-    moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
+    moves = f"moves by {significant(way, 2)} mm" if np.isfinite(way) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
         "slides, and a ratio at rest is no coefficient of friction; torques in a wrong unit would look so too."
@@ -254,7 +255,7 @@ def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | N
     if step > limits.speed_step * (motion.speed * float(time[-1] - time[0])):
         why = f"The torques come in steps that move the centre of pressure by {step:.2g} mm"
     elif motion.error > limits.speed_error * motion.speed:
-        why = f"The centre of pressure moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s"
+        why = f"The centre of pressure moves at {significant(motion.speed, 2)} ± {significant(motion.error, 2)} mm/s"
     elif motion.explained < limits.speed_line:
         why = f"A straight line explains {100 * motion.explained:.0f} % of the centre of pressure's movement"
     if why:

@@ -5,6 +5,7 @@ A finger is neither; the exponent and the force at which the area is the planned
 them. No area is measured here.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
@@ -17,6 +18,26 @@ from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
+
+
+def digits(value: float, places: int) -> str:
+    """Return a number with so many decimals and a true minus sign.
+
+    >>> digits(-0.25, 2)
+    '−0.25'
+    """
+    return f"{value:z.{places}f}".replace("-", "−")
+
+
+def significant(value: float, figures: int) -> str:
+    """Return a number with so many significant figures, never in powers of ten.
+
+    >>> significant(8.0331, 3), significant(1523.4, 3), significant(0.0, 3)
+    ('8.03', '1523', '0')
+    """
+    if value == 0.0:
+        return "0"
+    return digits(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
 
 
 class Meaning(NamedTuple):

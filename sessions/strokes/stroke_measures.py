@@ -21,7 +21,18 @@ from sessions.strokes.span import (
     unfiltered_forces,
 )
 from sessions.strokes.stick import break_away, power_of_normal_force, stick_slip
-from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings, Flaw, FlawName, Stroke
+from sessions.strokes.stroke import (
+    COEFFICIENTS,
+    DIRECTION,
+    EVERYTHING,
+    PEAKS,
+    SPEED,
+    Findings,
+    Flaw,
+    FlawName,
+    Stroke,
+    significant,
+)
 
 Array = NDArray[np.float64]
 
@@ -165,15 +176,16 @@ def _judge_loads(findings: Findings, track: Track, planned: float) -> None:
         )
         findings.flaw(FlawName.TOO_LITTLE_FORCE, sentence, "refused", (*COEFFICIENTS, *SPEED, *DIRECTION))
     if peak > settings.contact.greatest_force:
-        sentence = f"The normal force reaches {peak:.3g} N, more than a finger presses: check the units of the forces."
+        reached = f"The normal force reaches {significant(peak, 3)} N"
+        sentence = f"{reached}, more than a finger presses: check the units of the forces."
         findings.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
     half = settings.ratio.light_half * peak
     light = (track.ratio > 1.0) & (track.normal < half)
     pressed = track.ratio[track.normal >= half]
     if light.any() and np.isfinite(pressed).any() and np.nanmedian(pressed) < 1.0:
         sentence = (
-            f"T/N exceeds 1 while N is below half its peak ({peak:.3g} N), and not above: drift or a side load makes "
-            "the ratio there; its maximum is that above half the peak."
+            f"T/N exceeds 1 while N is below half its peak ({significant(peak, 3)} N), and not above: drift or a side "
+            "load makes the ratio there; its maximum is that above half the peak."
         )
         findings.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful", ("mu_static",))
         findings.numbers["mu_max"] = _greatest_ratio(track, half)
@@ -263,8 +275,8 @@ def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> 
         return
     refused = share > limits.drift_refused
     sentence = (
-        f"With nothing pressing, the forces around this stroke lie {sideways:.2g} N sideways and {pressing:.2g} N "
-        f"along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
+        f"With nothing pressing, the forces around this stroke lie {significant(sideways, 2)} N sideways and "
+        f"{significant(pressing, 2)} N along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
         f"{', so no force, friction or speed is given' if refused else ''}."
     )
     findings.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())

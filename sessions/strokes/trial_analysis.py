@@ -28,7 +28,7 @@ from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.signal_quality import signal_quality
 from sessions.strokes.sliding import block_means, displacement
 from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, track_of, zero_for
-from sessions.strokes.stroke import Flaw, FlawName, Stroke
+from sessions.strokes.stroke import Flaw, FlawName, Stroke, significant
 from sessions.strokes.stroke_measures import measure_stroke
 
 ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recording's own zero is true
@@ -137,8 +137,8 @@ def _pull(span: Span, zero: StrokeZero) -> Flaw | None:
     if -low <= max(settings.contact.pull_share * high, onset_threshold(float(zero.noise[2]), settings.detector)):
         return None
     sentence = (
-        f"Along {axis} the recording reaches {high:.3g} N pressing but {-low:.3g} N pulling, and a finger does not "
-        "pull: the normal axis is another one, or there is none; no stroke is reported."
+        f"Along {axis} the recording reaches {significant(high, 3)} N pressing but {significant(-low, 3)} N pulling, "
+        "and a finger does not pull: the normal axis is another one, or there is none; no stroke is reported."
     )
     return Flaw(FlawName.NORMAL_IMPLAUSIBLE, sentence, "refused")
 
@@ -190,7 +190,7 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
             flaws.append(Flaw(gaps[0].cause, sentence, "doubtful"))
         else:
             what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
-            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is not a stroke."
+            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {significant(peak, 2)} N, is not a stroke."
             flaws.append(Flaw(name, sentence, "note"))
     return kept, flaws
 

@@ -1,6 +1,7 @@
 """What a missing zero, a wrong frame, unit or height costs a stroke in closed form."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -82,6 +83,12 @@ def test_torques_in_the_wrong_unit_give_no_speed_and_no_proof_of_sliding(factor,
     assert flaw in one.flaws
     assert one.speed is None
     assert one.mu_dynamic is None
+
+
+def test_a_sentence_has_all_digits_of_a_force_in_a_wrong_unit():
+    flaws = analysed(block(T, felt(PLAIN) * 6170.0), info=with_info(calibration=wide())).flaws
+    (sentence,) = [flaw.sentence for flaw in flaws if flaw.name == "units_implausible"]
+    assert re.search(r"reaches 12\d{3} N, more than a finger presses", sentence)  # 6170 times 2 N, and filtered
 
 
 def wide():
