@@ -23,7 +23,7 @@ from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, event_columns, tables
 from sessions.recording import Recording
 from sessions.recording.hdf5_file import new_hdf5
-from sessions.recording.head import json_text
+from sessions.recording.head import compact_json
 from sessions.recording.manifest import description
 
 if TYPE_CHECKING:
@@ -55,14 +55,14 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     first_ns = recording.events[0].time_ns if recording.events else 0
     file = pynwb.NWBFile(
         session_description=f"{mark}A subject strokes surfaces over a six-axis force transducer and judges them.",
-        identifier=hashlib.sha256(json_text(document["sha256"]).encode()).hexdigest(),
+        identifier=hashlib.sha256(compact_json(document["sha256"]).encode()).hexdigest(),
         session_start_time=_utc(recording, first_ns),
         experiment_description=f"{mark}Protocol {plan.protocol}, stimulus order {plan.order_rule}, seed {plan.seed}.",
         session_id=plan.subject,
         keywords=["friction", "touch", "psychophysics", *(["SIMULATED"] if mark else [])],
         source_script=f"daq-app {source.analysis['made_by'].get('daq-app', '')}",
         source_script_file_name="daq-app export",
-        notes=json_text(  # all that the file lacks
+        notes=compact_json(  # all that the file lacks
             {
                 **document,
                 "log": [asdict(event) for event in recording.events],

@@ -16,7 +16,7 @@ from sessions.exchange import ExportSource
 from sessions.prediction import Scene, TrialPrediction
 from sessions.prediction.stored import Alternative, Variant
 from sessions.recording import LoggedEvent, Recording
-from sessions.recording.head import json_text
+from sessions.recording.head import compact_json
 from sessions.recording.log import ANSWERS, OUTCOMES, event_data
 from sessions.strokes.bootstrap import NUMBERS
 from sessions.strokes.stroke import FrictionParameters, Stroke, meanings
@@ -253,7 +253,7 @@ def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column
         Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
         Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
         Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
-        Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),
+        Column("data", "", "what else is known, as JSON", tuple(compact_json(dict(e.data)) for e in events)),
     )
 
 

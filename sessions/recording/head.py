@@ -200,7 +200,7 @@ def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> 
     return f"SIMULATED: the {' and the '.join(parts)} of this recording {'are' if len(parts) > 1 else 'is'} simulated"
 
 
-def json_text(value: object) -> str:
+def compact_json(value: object) -> str:
     """Return `value` as compact JSON in which every float survives to the last bit.
 
     Raises ValueError for nan and infinities: JSON has none.

@@ -12,7 +12,7 @@ import msgspec
 
 from drivers.readings import ReadingBlock
 from sessions.file_access import as_type, json_object, name_failure, one_at_a_time, read_within_limit, write_whole
-from sessions.recording.head import json_text
+from sessions.recording.head import compact_json
 from sessions.recording.log import LoggedEvent, TrialRecord
 from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, MANIFEST_FILE, RecordingError
@@ -41,7 +41,7 @@ def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> 
             sums[name].update(getattr(block, name).astype(kind, copy=False).tobytes())
     log = sha256()
     for event in events:
-        log.update(json_text([event.time_ns, event.kind, event.trial, dict(event.data)]).encode() + b"\n")
+        log.update(compact_json([event.time_ns, event.kind, event.trial, dict(event.data)]).encode() + b"\n")
     return Digest(count, {name: digest.hexdigest() for name, digest in sums.items()}, log.hexdigest())
 
 

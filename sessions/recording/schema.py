@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
-from sessions.recording.head import json_text
+from sessions.recording.head import compact_json
 from sessions.recording.log import LoggedEvent
 
 
@@ -89,7 +89,7 @@ def event_crc(event: LoggedEvent, data: str) -> int:
 
 def event_row(event: LoggedEvent) -> tuple[int, int, str, int | None, int, str, int]:
     """Return the row of an event. Raises ValueError for nan or an infinity in its data: JSON has none."""
-    data = json_text(event.data)
+    data = compact_json(event.data)
     return event.number, event.time_ns, event.kind, event.trial, event.readings, data, event_crc(event, data)
 
 

@@ -15,7 +15,7 @@ from drivers.transducer import TransducerInfo
 from sessions.file_access import name_failure, remedy, sync_folder
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
-from sessions.recording.head import info_to_dict, json_text, simulated_sentence, without_home
+from sessions.recording.head import compact_json, info_to_dict, simulated_sentence, without_home
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
@@ -79,10 +79,10 @@ class SessionWriter:
         simulated = simulated_sentence(info, subject_simulated)
         head = {
             "simulated": simulated or "no",
-            "format": json_text({"name": schema.FORMAT, "version": schema.FORMAT_VERSION}),
-            "plan": json_text(to_builtins(plan)),
-            "transducer": json_text(info_to_dict(info) if info else None),
-            "provenance": json_text(dict(provenance)),
+            "format": compact_json({"name": schema.FORMAT, "version": schema.FORMAT_VERSION}),
+            "plan": compact_json(to_builtins(plan)),
+            "transducer": compact_json(info_to_dict(info) if info else None),
+            "provenance": compact_json(dict(provenance)),
         }
         path = folder / schema.LIVE_FILE
         try:

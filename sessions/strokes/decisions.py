@@ -16,7 +16,7 @@ from msgspec import Meta
 
 from sessions.file_access import as_type, json_object, remedy
 from sessions.recording.derived import bytes_of
-from sessions.recording.head import json_text
+from sessions.recording.head import compact_json
 from sessions.recording.schema import RecordingError, text_crc
 
 if TYPE_CHECKING:
@@ -271,7 +271,7 @@ def append(recording: "Recording", decision: Decision) -> Decision:
 def _line(decision: Decision, simulated: str | None) -> bytes:
     """Return a line: compact JSON whose last name, crc32, is that of the JSON text without it."""
     head: dict[str, Any] = {"SIMULATED": simulated} if simulated else {}
-    text = json_text({**head, **decision.to_dict()})
+    text = compact_json({**head, **decision.to_dict()})
     return f'{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode()
 
 
@@ -282,7 +282,7 @@ def _decision(line: bytes) -> Decision | str | None:
     try:
         document = json_object(line)
         crc = document.pop("crc32")
-        if text_crc(json_text(document)) != crc:
+        if text_crc(compact_json(document)) != crc:
             return "its CRC-32 is not that of its text, which was changed or damaged"
         document.pop("SIMULATED", None)
         decision = as_type(document, Decision)
