@@ -158,6 +158,7 @@ UNEVEN = 0.05  # time steps that spread more than this hold no one rate [-]
 NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _FEWEST = 2
 LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
+FASTEST = 1e6  # readings a second [Hz]: ten times those of the fastest device we drive
 GREATEST = 1e18  # of a time, force or torque: a thousand times the microseconds since 1970, and no product overflows
 _SIMULATED = "SIMULATED"  # at the head of whatever came from a simulator
 
@@ -183,8 +184,10 @@ class ImportOptions:
         except NotAllowed as error:
             raise SettingsError(str(error)) from error
         check_code("--subject", self.subject)
-        if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0.0):
-            raise SettingsError(f"--rate {self.rate} is not allowed: it must be a number of readings a second above 0")
+        if self.rate is not None and not 0.0 < self.rate <= FASTEST:
+            raise SettingsError(
+                f"--rate {self.rate} is not allowed: above 0, and at most {FASTEST:.0f} readings a second"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +211,11 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     content = content_of(path)
     layout, rows, lines = _table(path, content, stated)
     time, rate, rate_origin = _times(path, layout, rows, lines, stated)
+    if rate > FASTEST:
+        raise ImportRefused(
+            f"{path}: its times hold {rate:.3g} readings a second, more than any device gives ({FASTEST:.0f}); name "
+            f"the time's unit in the header ({', '.join(TIME_UNITS)})"
+        )
     if time[-1] > LONGEST:
         raise ImportRefused(
             f"{path}: its readings span {time[-1]:.3g} s, more than a session can ({LONGEST:g} s); name the time's "

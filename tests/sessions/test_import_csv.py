@@ -200,7 +200,14 @@ def test_a_file_without_times_needs_a_rate(tmp_path):
 
 @pytest.mark.parametrize(
     "options",
-    [{"rate": -1.0}, {"rate": float("nan")}, {"normal": "z"}, {"height": float("inf")}, {"subject": "Ada Lovelace"}],
+    [
+        {"rate": -1.0},
+        {"rate": float("nan")},
+        {"rate": 1e300},
+        {"normal": "z"},
+        {"height": float("inf")},
+        {"subject": "Ada Lovelace"},
+    ],
 )
 def test_options_that_mean_nothing_are_refused(options):
     with pytest.raises(SettingsError, match="not allowed"):
@@ -263,6 +270,11 @@ def test_a_separator_that_ends_no_line_of_a_file_ends_none_here(tmp_path):
 def test_readings_over_more_years_than_a_session_s_clock_counts_are_refused(tmp_path, header, rate):
     rows = [f"{1e10 * i!r},0,0,-1,0,0,0" for i in range(3)]
     assert "more than a session can" in refusal(tmp_path, options=ImportOptions(rate=rate), header=header, rows=rows)
+
+
+def test_times_closer_than_any_device_reads_are_refused_with_what_may_be_wrong(tmp_path):
+    rows = [f"{1e-9 * i!r},0,0,-1,0,0,0" for i in range(3)]
+    assert "1e+09 readings a second, more than any device gives" in refusal(tmp_path, rows=rows)
 
 
 def test_a_header_alone_is_refused(tmp_path):
