@@ -1,5 +1,6 @@
-"""What a verb says to people and to scripts, kept apart."""
+"""What a verb says to people and to scripts, kept apart, and how it reads what they ask for."""
 
+import argparse
 import io
 import json
 import os
@@ -10,7 +11,7 @@ import time
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, TextIO
+from typing import Any, NoReturn, TextIO
 
 from solver.progress import listening
 
@@ -199,6 +200,23 @@ class Console:
         if self._line_open:
             self._tell("")
             self._line_open = False
+
+
+class Parser(argparse.ArgumentParser):
+    """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  argparse's own
+        """Take what argparse takes."""
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # argparse's own takes -1e-3 for an option
+
+    def error(self, message: str) -> NoReturn:
+        """Raise WrongValue."""
+        raise WrongValue(f"{message}; '{self.prog} --help' explains")
+
+    def print_help(self, file: object = None) -> None:  # noqa: ARG002  argparse's own
+        """Print how a command line is used; argparse itself would say nothing where that cannot be written."""
+        Console(as_json=False).say(self.format_help().rstrip())
 
 
 def table(rows: list[list[str]], *, head: list[str]) -> str:

@@ -5,9 +5,8 @@ import importlib
 import sys
 import traceback
 from types import ModuleType
-from typing import NoReturn
 
-from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, WrongValue, takes_all
+from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, Parser, WrongValue, takes_all
 
 HELP = frozenset({"-h", "--help"})
 LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
@@ -84,52 +83,41 @@ def run(arguments: list[str]) -> int:
         return _report(*_failure(error))
 
 
-class _Parser(argparse.ArgumentParser):
-    """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
-
-    def error(self, message: str) -> NoReturn:
-        raise WrongValue(f"{message}; '{self.prog} --help' explains")
-
-
 def _dispatch(arguments: list[str]) -> int:
     if not arguments:
         Console(as_json=False).note(_overview().format_help().rstrip())
         return WRONG
     name, *rest = arguments
     if name in HELP:
-        return _help(_overview())
+        _overview().print_help()
+        return DONE
     if name not in VERBS:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
     verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
     parser = _parser(name, verb)
     if HELP & {*rest}:
-        return _help(parser)
-    options = parser.parse_args(_join_normal(rest))
+        parser.print_help()
+        return DONE
+    options = parser.parse_args(_join_values(rest))
     return verb.run(options, Console(as_json=options.json))
 
 
-def _help(parser: argparse.ArgumentParser) -> int:
-    """Print how a command line is used; argparse itself would say nothing where that cannot be written."""
-    Console(as_json=False).say(parser.format_help().rstrip())
-    return DONE
+def _join_values(arguments: list[str]) -> list[str]:
+    """Join --normal and --axes to their values, which may begin with a hyphen and would be taken for an option.
 
-
-def _join_normal(arguments: list[str]) -> list[str]:
-    """Join --normal to its value, which may begin with a hyphen and would be taken for an option.
-
-    >>> _join_normal(["a.csv", "--normal", "-z", "--json"])
-    ['a.csv', '--normal=-z', '--json']
+    >>> _join_values(["a.csv", "--normal", "-z", "--axes", "-,t"])
+    ['a.csv', '--normal=-z', '--axes=-,t']
     """
-    if "--normal" not in arguments[:-1]:
-        return arguments
-    at = arguments.index("--normal")
-    return [*arguments[:at], f"--normal={arguments[at + 1]}", *arguments[at + 2 :]]
+    for name in {"--normal", "--axes"} & {*arguments[:-1]}:
+        at = arguments.index(name)
+        arguments = [*arguments[:at], f"{name}={arguments[at + 1]}", *arguments[at + 2 :]]
+    return arguments
 
 
 def _overview() -> argparse.ArgumentParser:
     width = max(map(len, VERBS))
     verbs = "\n".join(f"  {name:<{width}}  {does}" for name, does in VERBS.items())
-    return argparse.ArgumentParser(
+    return Parser(
         prog="daq-app",
         usage="daq-app VERB [options]",
         description="Friction psychophysics: the experiment, the transducer, the finite-element finger.",
@@ -142,7 +130,7 @@ def _overview() -> argparse.ArgumentParser:
 
 
 def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog=f"daq-app {name}",
         description=verb.__doc__,
         epilog=f"example:\n  {verb.EXAMPLE}",

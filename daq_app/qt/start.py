@@ -1,6 +1,5 @@
 """Starts the window: checks that there is a screen, opens it at once with the simulated bench, and runs it."""
 
-import argparse
 import ctypes
 import gc
 import os
@@ -12,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from daq_app.console import FAILED, STOPPED
+from daq_app.console import FAILED, STOPPED, WRONG, NotWritten, Parser, WrongValue
 from daq_app.wording import VARIABLE
 
 if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
@@ -44,15 +43,22 @@ LIBRARIES = {
 def window(arguments: list[str]) -> int:
     """Open the analyst's window on the session named, or the experimenter's without one; return the exit code."""
     parser = command_line()
-    options = parser.parse_args(arguments)
-    folder: Path | None = options.session
-    web = options.subject_screen == "web"
+    try:
+        options = parser.parse_args(arguments)
+        folder: Path | None = options.session
+        web = options.subject_screen == "web"
+        if web and folder is not None:
+            parser.error("a session that is reviewed has no subject: leave out SESSION or --subject-screen")
+        if options.subject_address is not None and not web:
+            parser.error("--subject-address is a tablet's way to this machine: give --subject-screen web too")
+    except WrongValue as error:
+        return _fail(str(error), WRONG)
+    except (NotWritten, BrokenPipeError) as error:
+        return _fail(str(error))
     if folder is None:
         return _show_window(
             lambda application: open_window(application, tablet=_tablet(options.subject_address) if web else None)
         )
-    if web:
-        parser.error("a session that is reviewed has no subject: leave out SESSION or --subject-screen")
     if not folder.is_dir():
         return _fail(f"{folder} is no folder: give a session's folder")
 
@@ -69,11 +75,9 @@ def window(arguments: list[str]) -> int:
     return _show_window(analyst)
 
 
-def command_line() -> argparse.ArgumentParser:
+def command_line() -> Parser:
     """Return what `daq-app window` understands."""
-    parser = argparse.ArgumentParser(
-        "daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07"
-    )
+    parser = Parser("daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07")
     parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
     parser.add_argument(
         "--subject-screen",
@@ -211,9 +215,9 @@ def _dress(application: "QApplication", tokens: "Tokens") -> None:
     application.setStyleSheet(style_sheet(tokens))
 
 
-def _fail(sentence: str) -> int:
+def _fail(sentence: str, code: int = FAILED) -> int:
     sys.stderr.write(f"daq-app: {sentence}\n")
-    return FAILED
+    return code
 
 
 def what_is_missing() -> str | None:

@@ -123,7 +123,7 @@ def test_every_failure_the_command_line_tells_of_exists_where_it_is_looked_for(n
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize("words", [["--help"], ["solve", "--help"]])
+@pytest.mark.parametrize("words", [["--help"], ["solve", "--help"], ["window", "--help"]])
 def test_help_that_cannot_be_written_is_exit_code_1_and_a_sentence(words):
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(

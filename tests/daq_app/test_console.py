@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from daq_app.cli.main import run
-from daq_app.console import Console, NotWritten, Underway, takes_all
+from daq_app.console import Console, NotWritten, Parser, Underway, takes_all
 from solver.progress import listening, report_progress
 
 
@@ -183,3 +183,10 @@ def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_b
         work()
     assert "s so far; Ctrl-C stops" in err.getvalue()
     assert all(thread.name != "progress" for thread in threading.enumerate())
+
+
+@pytest.mark.parametrize("text", ["-1e-3", "-.5e2", "-7"])
+def test_a_negative_number_is_the_value_of_an_option(text):
+    parser = Parser()
+    parser.add_argument("--shift", type=float)
+    assert parser.parse_args(["--shift", text]).shift == float(text)
