@@ -1,6 +1,7 @@
 """The program's own texts in other languages, from XLIFF files, which every process reads."""
 
 import os
+import re
 from collections.abc import Mapping
 from functools import lru_cache
 from math import isfinite
@@ -13,6 +14,7 @@ FOLDER = Path(__file__).parent / "translations"
 VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this process and to those that it starts
 SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.xlf
 
+POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
 _MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 
 T = TypeVar("T")
@@ -79,6 +81,24 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     value *= factor
     shown = f"{value:#.{digits}g}".rstrip(".")
     return f"{value:,.0f}" if 10.0**digits <= abs(float(shown)) < 1e6 else shown
+
+
+def typed_number(text: str, point: str = ".") -> float | None:
+    """Return the number that somebody typed, in digits of any script; None where it is no plain one.
+
+    Every mark stands before a fraction; but another one than the language's own `point`, with three digits behind it,
+    may group thousands.
+
+    >>> typed_number("12,5"), typed_number("1,000"), typed_number("1,000", ","), typed_number("0,125")
+    (12.5, None, 1.0, 0.125)
+    """
+    match = re.fullmatch(rf"(\d*)([{POINTS}]?)(\d*)", text.strip())
+    if match is None or not (match[1] or match[3]):
+        return None
+    whole, mark, fraction = match.groups()
+    if mark not in ("", point) and len(fraction) == 3 and len(whole) < 4 and float(whole or 0) > 0.0:
+        return None
+    return float(f"{whole or 0}.{fraction or 0}")
 
 
 def span(low: float, high: float, digits: int = 3) -> str:

@@ -9,6 +9,7 @@ from typing import Literal, TextIO
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
+from daq_app.wording import typed_number
 from drivers.transducer import LinkLost, SetupError
 from sessions.plan.plan import Trial
 from sessions.recording import RecordingError
@@ -127,8 +128,7 @@ class Terminal:
 
     def _parse_answer(self, line: str) -> steps.Event | None:
         """Return the answer that was typed; what a keyboard cannot tell stays open."""
-        text = line.replace(",", ".")  # as many keyboards have it
-        number = float(text) if text.replace(".", "", 1).isdecimal() else None
+        number = typed_number(line)
         if number is None and line != "-":
             return None
         match self._command:

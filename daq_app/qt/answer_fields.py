@@ -23,6 +23,7 @@ from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import LEAP, LENGTH, STEP, Answer, Choice, Device, Translate, Which
 from daq_app.window.subject import SubjectText as Text
+from daq_app.wording import POINTS, typed_number
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event, Scored
 
@@ -33,7 +34,6 @@ KEYS = {
     Qt.Key.Key_Left: -STEP, Qt.Key.Key_Down: -STEP, Qt.Key.Key_Right: STEP, Qt.Key.Key_Up: STEP,
     Qt.Key.Key_PageDown: -LEAP, Qt.Key.Key_PageUp: LEAP, Qt.Key.Key_Home: -100.0, Qt.Key.Key_End: 100.0,
 }  # fmt: skip
-POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
 NUMBER = QRegularExpression(
     rf"\d{{0,9}}[{POINTS}]?\d{{0,9}}", QRegularExpression.PatternOption.UseUnicodePropertiesOption
 )  # what can be typed of one
@@ -229,10 +229,11 @@ class _Field(QWidget):
 
 
 class NumberField(_Field):
-    """Takes a number above 0; a comma is a point."""
+    """Takes a number above 0; a comma is a point, but where it may group thousands."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(now)
+        self.point = "."  # of the subject's language
         self.field = QLineEdit()
         self.field.setAccessibleName(Text.OWN_NUMBER)
         self.field.setFixedWidth(px(260))
@@ -249,11 +250,7 @@ class NumberField(_Field):
         self.changed.emit()
 
     def _type(self, text: str) -> None:
-        try:
-            number = float(text.strip().translate(dict.fromkeys(map(ord, POINTS), ".")))
-        except ValueError:
-            number = None
-        self.answer = self.answer.type_number(self.now(), number)
+        self.answer = self.answer.type_number(self.now(), typed_number(text, self.point))
         self.changed.emit()
 
 

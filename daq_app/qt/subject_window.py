@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, QLocale, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEvent
 from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
@@ -130,6 +130,7 @@ class SubjectWindow(QWidget):
         self.next.setAccessibleName(words(Text.NEXT))
         self.line.speak(words)
         self.number.field.setAccessibleName(words(Text.OWN_NUMBER))
+        self.number.point = QLocale(language).decimalPoint()
         self.choice.setAccessibleName(words(Text.OF_TWO))
         self.press.setAccessibleName(words(Text.PRESSING))
         self.choice.set_words(words(Text.FIRST), words(Text.SECOND))

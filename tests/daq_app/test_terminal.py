@@ -18,6 +18,7 @@ from sessions.recording import Recording
 from sessions.run.steps import (
     Abort,
     AskMount,
+    AskNumber,
     AskScore,
     AskStroke,
     Note,
@@ -56,6 +57,12 @@ def meant(command, line, *, forces=True):
 )
 def test_a_line_means_what_was_asked_for(command, line, event):
     assert meant(command, line)[0] == (event,)
+
+
+def test_a_number_that_may_be_a_thousand_is_asked_for_again():
+    events, said = meant(AskNumber(TRIAL, "How rough?"), "1,000")
+    assert events == ()
+    assert "'1,000' means nothing now" in said
 
 
 def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():

@@ -138,6 +138,12 @@ def test_a_number_is_typed_of_digits_alone():
     QTest.keyClicks(field.field, "-1x2,5")
     assert field.field.text() == "12,5"
     assert field.answer.value == 12.5
+    field.field.clear()
+    QTest.keyClicks(field.field, "1,000")  # a thousand, in English
+    assert field.answer.value is None
+    field.point = ","
+    QTest.keyClicks(field.field, "0")
+    assert field.answer.value == 1.0
 
 
 def test_a_choice_by_touch_is_kept_as_one_by_touch(application):

@@ -166,6 +166,19 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     window.bridge.send(NewSession())
 
 
+READ = [
+    ("1,000", "en", None),
+    ("1.000", "en", 1),
+    ("1,000", "de", 1),
+    ("1.000", "de", None),
+    ("0.125", "de", 0.125),
+    ("\u0661\u0662\u066b\u0665", "ar", 12.5),
+    ("1e3", "en", None),
+    ("0x10", "en", None),
+    ("1,000,000", "en", None),
+]  # text, language of the page, and the number that it is
+
+
 @pytest.mark.parametrize(
     ("protocol", "give", "expected"),
     [
@@ -189,6 +202,11 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     ask(driver)
     browser.until("asked()", "the question")
     assert not browser.shown("next")
+    if protocol == "magnitude-estimation":
+        for text, language, number in READ:
+            browser.value(f"page.view.language = '{language}', document.getElementById('number').value = '{text}'")
+            assert browser.value("number()") == number, (text, language)
+        browser.value("page.view.language = 'en', document.getElementById('number').value = ''")
     give(browser)
     browser.until("!document.getElementById('next').hidden")
     browser.click("next")
