@@ -28,12 +28,6 @@ PARTS = (
 )  # of a solve  # fmt: skip
 
 
-def _panel(
-    drawn: style.Sheet, name: str, title: str, header: tuple[str, ...], rows: Sequence[tuple[style.Cell, ...]]
-) -> style.Panel:
-    return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, tuple(rows))
-
-
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
@@ -59,7 +53,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     _logarithmic(axes)
     axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
     header = ("kinematics", "unknowns", "largest true error [-]", "median time [s]")
-    return _panel(drawn, f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
+    return drawn.panel(f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
 
 
 def _curve(drawn: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
@@ -100,7 +94,7 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
          "not known" if r.worst_error is None else r.worst_error, r.took_s / r.surfaces)
         for r in rows
     ]  # fmt: skip
-    return _panel(drawn, "speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
+    return drawn.panel("speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
 
 
 def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel | None:
@@ -133,9 +127,9 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel | None:
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
     if timed:
         axes.set(xlabel="error [–]", ylabel="time of a solve [s]")
-        return _panel(drawn, "benchmarks", "Time against true error on published problems", header, table)
+        return drawn.panel("benchmarks", "Time against true error on published problems", header, table)
     axes.set(xlabel="element size, by the unit of each problem [–]", ylabel="error [–]")
-    return _panel(drawn, "orders", "Error against element size", header, table)
+    return drawn.panel("orders", "Error against element size", header, table)
 
 
 def _mark(problem: str) -> str:
@@ -169,7 +163,7 @@ def _estimate_panel(every: Sequence[Estimate], number: str) -> style.Panel | Non
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
     table = [(r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows]
     name = "estimate-" + number.split()[0].lower()
-    return _panel(drawn, name, f"Estimated against true error of the {number}", header, table)
+    return drawn.panel(name, f"Estimated against true error of the {number}", header, table)
 
 
 def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
@@ -196,7 +190,7 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.05))
     axes.set_xlabel("time [ms]")
     header = ("kinematics", "tolerance", "unknowns", "part", "share [-]", "time [s]")
-    return _panel(drawn, "costs", "Where the time of a solve goes", header, table)
+    return drawn.panel("costs", "Where the time of a solve goes", header, table)
 
 
 def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
@@ -220,7 +214,7 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
     axes.set(xlabel="unknowns", ylabel="time [ms]")
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
     table = [(r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows]
-    return _panel(drawn, "growth", "Growth of the time with the unknowns", header, table)
+    return drawn.panel("growth", "Growth of the time with the unknowns", header, table)
 
 
 def _speed_panels(measured: RunResults) -> tuple[style.Panel | None, ...]:

@@ -175,9 +175,9 @@ class Work:
             if what in ("finger", "contact"):
                 every = self._fields()
                 if (field := self._field(of, every)) is not None:
-                    with look():
+                    with look(simulated=report.simulated):
                         levels = common_levels(tuple(every.values()) or (field,))
-                        panel = finger_panels(field, levels, simulated=report.simulated)[what == "contact"]
+                        panel = finger_panels(field, levels)[what == "contact"]
             elif what == "compared":
                 panel = self._comparison_panel()
             elif what == "stroke":
@@ -220,8 +220,8 @@ class Work:
         if (other := self._other) is None:
             return None
         names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
-        with look():
-            return comparison_panel(NAMES, names, compare_reports(self._report, other), simulated=simulated)
+        with look(simulated=simulated):
+            return comparison_panel(NAMES, names, compare_reports(self._report, other))
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""

@@ -32,14 +32,14 @@ def test_fields_without_any_sed_have_colours_up_to_a_kilopascal(sed):
 def test_a_finger_with_a_node_without_an_sed_is_drawn():
     gone = with_sed(np.append(np.nan, SED[1:]))
     with look():
-        panels = finger_panels(gone, common_levels((gone,)), simulated=True)
+        panels = finger_panels(gone, common_levels((gone,)))
     assert all(panel.svg for panel in panels)
 
 
 def test_a_finger_without_any_sed_is_drawn_without_colours_and_says_so_in_one_sentence():
     gone = with_sed(np.full_like(SED, np.nan))
     with look():
-        panels = finger_panels(gone, common_levels((gone,)), simulated=True)
-        usual = finger_panels(FIELD, common_levels((FIELD,)), simulated=True)
+        panels = finger_panels(gone, common_levels((gone,)))
+        usual = finger_panels(FIELD, common_levels((FIELD,)))
     assert all(NO_SED in panel.svg and "SED [kPa]" not in panel.svg for panel in panels)
     assert not any(NO_SED in panel.svg for panel in usual)

@@ -83,12 +83,12 @@ def test_a_name_with_control_characters_and_dollar_signs_still_makes_a_picture_t
     with look():
         drawn = sheet(200, 100)
         drawn.axes[0].set_title("a $\\frac$")
-        ET.fromstring(svg(drawn, "a\x01b", "a\x01b", simulated=False))
+        ET.fromstring(svg(drawn, "a\x01b", "a\x01b"))
 
 
 def test_different_names_have_different_identifiers():
     with look():
-        one, other = (svg(sheet(100, 50), name, name, simulated=False) for name in ("a b", "a_b"))
+        one, other = (svg(sheet(100, 50), name, name) for name in ("a b", "a_b"))
     assert not set(re.findall(r'\bid="([^"]+)"', one)) & set(re.findall(r'\bid="([^"]+)"', other))
 
 

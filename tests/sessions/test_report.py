@@ -116,7 +116,7 @@ def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(ses
     assert here.own_relation.pearson == pytest.approx(np.corrcoef(np.transpose(both))[0, 1])
     rows = [row[0].text for row in relation_table(more).groups[0].rows]
     assert rows == ["mean score", "own score", "index"]
-    panel = relation_panel(here, [p for p in more.predictions if p.experiment == here.name], simulated=True)
+    panel = relation_panel(here, [p for p in more.predictions if p.experiment == here.name])
     assert {row[0]: row[panel.header.index("own score")] for row in panel.rows} == given
 
 
@@ -204,7 +204,7 @@ def test_another_quantity_than_the_sed_is_held_against_scores_in_figure_table_an
     assert any("shear along the skin predicted" in sentence for sentence in summary(report))
     assert "shear along the skin" in relation_table(report).caption
     assert any("--quantity shear_along_skin" in line for line in report.commands)
-    panel = relation_panel(sticky, [one for one in report.predictions if one.experiment == sticky.name], simulated=True)
+    panel = relation_panel(sticky, [one for one in report.predictions if one.experiment == sticky.name])
     assert panel is None or "shear along the skin [-]" in panel.header
 
 

@@ -129,7 +129,7 @@ def test_a_visit_for_scores_alone_asks_about_no_friction_and_has_no_forces(repor
 
 
 def test_the_axis_of_many_paths_names_the_quantity_that_they_are_of(report):
-    panel = paths_panel("stickiness", report.experiments[0].paths, "pressure", simulated=True)
+    panel = paths_panel("stickiness", report.experiments[0].paths, "pressure")
     assert "correlation of pressure with score [–]" in panel.svg
 
 
@@ -159,12 +159,12 @@ def test_a_trial_whose_planted_stroke_was_not_found_stands_among_its_experiment_
 
 def test_the_error_bars_of_prediction_against_score_hold_what_the_uncertainty_of_friction_makes(report):
     own = [p for p in report.predictions if p.experiment == "stickiness"]
-    panel = relation_panel(report.experiments[0], own, simulated=True)
+    panel = relation_panel(report.experiments[0], own)
     low, high = (panel.header.index(f"95 % interval of SED by friction, {end} [MPa]") for end in ("low", "high"))
     seds = np.array([row[3] for row in TABLES["stickiness"].values()])
     assert [row[low] for row in panel.rows] == pytest.approx(0.995 * seds)  # as the example's intervals are
     assert [row[high] for row in panel.rows] == pytest.approx(1.005 * seds)
-    doubted = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own], simulated=True)
+    doubted = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own])
     assert {row[low] for row in doubted.rows} == {None}
 
 

@@ -26,11 +26,10 @@ from sessions.report.figures.style import (
     rows_of,
     shades,
     sheet,
-    svg,
 )
 
 
-def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulated: bool) -> Panel:
+def course_panel(course: Course, strokes: tuple[StrokeFinding, ...]) -> Panel:
     """Return both forces against time; strokes are grey bands with their number."""
     drawn = sheet(672, 270, (1.0, 1.0), share_x=True)
     upper, lower = drawn.axes
@@ -51,10 +50,9 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
     lower.set_xlabel("time on the device's clock [s]")
     for stroke, middle in _strokes_with_room(strokes, first, last):
         _mark(upper, str(stroke.number), (middle, 1.0), (0, 2), ha="center", va="bottom", color=INK, fontsize=7.5)
-    name, title = "course", "Normal and tangential force over the whole recording"
     header = ("time [s]", "normal force [N]", "tangential force [N]")
     rows = rows_of(course.time, course.normal, course.tangential)
-    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+    return drawn.panel("course", "Normal and tangential force over the whole recording", header, rows)
 
 
 def _mark(axes: Axes, text: str, at: tuple[float, float], off: tuple[float, float], **look: Any) -> None:  # noqa: ANN401 - matplotlib's
@@ -104,9 +102,7 @@ SPEED = StrokeQuantity(
 )
 
 
-def stroke_panel(
-    of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str, *, simulated: bool
-) -> Panel | None:
+def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str) -> Panel | None:
     """Return a quantity of one experiment's strokes from contact onset on; None where nothing can be drawn.
 
     Strokes whose speed was refused are left out of speeds.
@@ -126,7 +122,7 @@ def stroke_panel(
     name = f"{of.name}-{experiment}" if experiment else of.name
     title = f"{of.values} against time, {experiment or 'all strokes'}"
     header = ("stroke", "index", "time since contact [s]", of.column, "in steady window")
-    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+    return drawn.panel(name, title, header, rows)
 
 
 Row = tuple[int, int | None, float, float, int]
@@ -171,7 +167,7 @@ def _name(stroke: StrokeFinding) -> str:
 PRESSED = 1.0  # the model presses for 1 s, then slides [s]
 
 
-def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simulated: bool) -> Panel | None:
+def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel | None:
     """Return SED against time: the whole course above, sliding alone on its own scale below."""
     courses = sorted(
         ((p, p.history) for p in predictions if p.history is not None),
@@ -213,4 +209,4 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
     title = f"Predicted response in time, {name or 'all strokes'}"
     name = f"response-{name}" if name else "response"
     header = ("trial", "index", "time [s]", "SED [MPa]")
-    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, tuple(rows))
+    return drawn.panel(name, title, header, rows)

@@ -14,7 +14,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation, TriContourSet
 
 from sessions.report.contents import Field
-from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, rows_of, sheet, svg
+from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, rows_of, sheet
 
 # Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.
 COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
@@ -30,7 +30,7 @@ _STYLE = {"slip": "solid", "cap": (0, (4, 1.2)), "stick": (0, (1, 1))}
 _WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
 
 
-def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -> tuple[Panel, Panel]:
+def finger_panels(field: Field, levels: tuple[float, ...]) -> tuple[Panel, Panel]:
     """Return the whole finger and a close view of its contact; `levels` [kPa] are the borders of the colours."""
     whole, close = sheet(328, 330), sheet(328, 330)
     filled = _tissue(whole.axes[0], field, levels)
@@ -53,20 +53,13 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
         drawn.axes[0].set_title(f"{field.experiment}, index {field.index}")
     stem = f"finger-{field.experiment}-{field.index}"
     of = f"index {field.index} of {field.experiment}"
-    title, near = f"Strain-energy density in the finger, {of}", f"Contact and receptor, {of}"
-    skin = field.skin
-    touched = rows_of(skin.x, skin.gap, skin.pressure, skin.traction)
-    other, header = f"{stem}-contact", ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state")
-    picture = svg(whole, stem, title, simulated=simulated)
+    skin, header = field.skin, ("x [mm]", "y [mm]", "SED [MPa]")
+    touched = zip(rows_of(skin.x, skin.gap, skin.pressure, skin.traction), skin.state, strict=True)
+    of_contact = ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state")
+    rows = ((*row, state) for row, state in touched)
     return (
-        Panel(stem, title, picture, ("x [mm]", "y [mm]", "SED [MPa]"), rows_of(x, y, field.drawn.sed)),
-        Panel(
-            other,
-            near,
-            svg(close, other, near, simulated=simulated),
-            header,
-            tuple((*row, state) for row, state in zip(touched, skin.state, strict=True)),
-        ),
+        whole.panel(stem, f"Strain-energy density in the finger, {of}", header, rows_of(x, y, field.drawn.sed)),
+        close.panel(f"{stem}-contact", f"Contact and receptor, {of}", of_contact, rows),
     )
 
 

@@ -25,8 +25,8 @@ from sessions.report.figures.style import (
     Plate,
     Sheet,
     look,
+    plate,
     sheet,
-    svg,
 )
 from sessions.report.tables.rivals import rival_words
 from sessions.report.tables.study_models import study_model
@@ -39,8 +39,10 @@ from sessions.statistics.scores import MeanScore
 _TICKS = [0, 20, 40, 60, 80, 100]  # of a scale of scores
 
 
-def score_panel(judged: Experiment | DescriptorFindings, *, simulated: bool) -> Panel:
-    """Return mean score against index, with 95 % t intervals and every subject's answer beside them."""
+def score_panel(judged: Experiment | DescriptorFindings) -> Panel | None:
+    """Return mean score against index, with 95 % t intervals and every subject's answer beside them; None of none."""
+    if not judged.scores:
+        return None
     name = judged.name if isinstance(judged, Experiment) else judged.descriptor
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
@@ -59,7 +61,7 @@ def score_panel(judged: Experiment | DescriptorFindings, *, simulated: bool) -> 
     header += tuple(f"score of {subject}" for subject in judged.answers)
     by_index = dict(zip(judged.indices, zip(*judged.answers.values(), strict=True), strict=False))
     rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in judged.scores)
-    return Panel(f"scores-{name}", title, svg(drawn, f"scores-{name}", title, simulated=simulated), header, rows)
+    return drawn.panel(f"scores-{name}", title, header, rows)
 
 
 def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
@@ -73,22 +75,18 @@ def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
 
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     """Return the figures a study has numbers for, in their order."""
-    simulated, shown = bool(study.simulated), shown_response(study.response)
-    with look():
-        scores = tuple(score_panel(one, simulated=simulated) for one in study.descriptors if one.scores)
-        relations = tuple(_relation(one, shown, simulated=simulated) for one in study.descriptors if one.points)
-    of_paths = [one for one in study.descriptors if one.paths]
-    along = (paths_panel(one.descriptor, one.paths, shown.label, simulated=simulated) for one in of_paths)
+    shown = shown_response(study.response)
     caption = (
         f"Score against the {shown.label} predicted from the same subject's own stroke. Small dots and thin lines: "
         "each subject; large dots: means over subjects with the surface's index, bars their 95 % t intervals. "
         f"Model: {study_model(study)}."
     )
-    plates = (
-        Plate("relation", caption, relations),
-        Plate("scores", SCORES_CAPTION, scores),
-        Plate("paths", PATHS_CAPTION, tuple(panel for panel in along if panel is not None)),
-    )
+    with look(simulated=bool(study.simulated)):
+        plates = (
+            plate("relation", caption, (_relation(one, shown) for one in study.descriptors if one.points)),
+            plate("scores", SCORES_CAPTION, map(score_panel, study.descriptors)),
+            plate("paths", PATHS_CAPTION, (paths_panel(d.descriptor, d.paths, shown.label) for d in study.descriptors)),
+        )
     return tuple(plate for plate in plates if plate.panels)
 
 
@@ -100,7 +98,7 @@ SCORES_CAPTION = (
 MOST = 400  # points that tell their values each on their own
 
 
-def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool) -> Panel:
+def _relation(one: DescriptorFindings, shown: ShownResponse) -> Panel:
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
     each = len(one.points) <= MOST  # of more points only hovering names the subject
@@ -132,12 +130,10 @@ def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool)
     axes.set_title(f"{one.descriptor}{within}\n{rival_words(one.rivals)}".strip())
     name, title = f"study-relation-{one.descriptor}", f"Score of {one.descriptor} against predicted {shown.label}"
     header = ("subject", "index", f"{shown.label} [{shown.kept_unit}]", "score")
-    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, one.points)
+    return drawn.panel(name, title, header, one.points)
 
 
-def relation_panel(
-    experiment: Experiment, predictions: Sequence[PredictionFinding], *, simulated: bool
-) -> Panel | None:
+def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFinding]) -> Panel | None:
     """Return the experiment's response against mean score with both errors, their line, r, its interval and n."""
     means = {mean.index: mean for mean in experiment.scores}
     shown = shown_response(experiment.response)
@@ -179,11 +175,11 @@ def relation_panel(
     header += (f"{shown.label} [{shown.kept_unit}]", f"error estimate of {shown.label} [-]")
     header += tuple(f"95 % interval of {shown.label} by friction, {end} [{shown.kept_unit}]" for end in ("low", "high"))
     relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n, _ in points]
-    rows = tuple(
+    rows = (
         (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), n[0], error, *(friction or (None, None)))
         for (m, n, friction), error in zip(points, relative, strict=True)
     )
-    return Panel(name, title, svg(figure_sheet, name, title, simulated=simulated), header, rows)
+    return figure_sheet.panel(name, title, header, rows)
 
 
 def relation_words(experiment: Experiment) -> str:
@@ -246,7 +242,7 @@ PATHS_CAPTION = (
 _BINS = 24
 
 
-def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str, *, simulated: bool) -> Panel | None:
+def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) -> Panel | None:
     """Return the distribution of the correlation of the quantity `label` over all paths; None where none has one."""
     values = correlations(findings)
     numbers = [value for value in values if value is not None]
@@ -254,39 +250,37 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str, *,
         return None
     choices = by_choice(findings)
     usual = next((r for one, r in zip(findings, values, strict=True) if one.usual and r is not None), None)
-    with look():
-        drawn = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
-        above, below = drawn.axes
-        low, high = _ends(numbers)
-        counts, edges = np.histogram(numbers, _BINS, (low, high))
-        above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
-        above.set_ylabel("paths [number]")
-        above.set_title(f"{descriptor}: {len(numbers)} paths")
-        for y, (choice, name, of, is_usual) in enumerate(choices):
-            if of is None:
-                below.text(low, y, "none", fontsize=7, va="center", color=GREY)
-            else:
-                words = f"{CHOICE_LABELS[choice]} {name}: median r {correlation(of.median)} of {of.correlated} paths"
-                below.plot([of.least, of.greatest], [y, y], color=GREY, linewidth=1.1)
-                below.plot(of.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=drawn.note(words))
-            if is_usual:
-                below.plot(low - 0.02 * (high - low), y, "D", color=INK, markersize=2.6, clip_on=False)
-        below.set_yticks(range(len(choices)), [name for _, name, _, _ in choices], fontsize=7)
-        below.set_ylim(len(choices) - 0.4, -0.6)
-        for before in range(1, len(choices)):
-            if choices[before][0] != choices[before - 1][0]:
-                below.axhline(before - 0.5, color=PALE, linewidth=0.6)
-        below.set_xlabel(f"correlation of {label} with score [–]")
-        for axes in drawn.axes:
-            axes.set_xlim(low - 0.04 * (high - low), high)
-            if usual is not None:
-                axes.axvline(usual, color=INK, linewidth=0.9, linestyle=(0, (3, 2)), zorder=0)
-        name, title = f"paths-{descriptor}", f"Correlation of {descriptor} along many paths of the analysis"
-        text = svg(drawn, name, title, simulated=simulated)
+    drawn = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
+    above, below = drawn.axes
+    low, high = _ends(numbers)
+    counts, edges = np.histogram(numbers, _BINS, (low, high))
+    above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
+    above.set_ylabel("paths [number]")
+    above.set_title(f"{descriptor}: {len(numbers)} paths")
+    for y, (choice, name, of, is_usual) in enumerate(choices):
+        if of is None:
+            below.text(low, y, "none", fontsize=7, va="center", color=GREY)
+        else:
+            words = f"{CHOICE_LABELS[choice]} {name}: median r {correlation(of.median)} of {of.correlated} paths"
+            below.plot([of.least, of.greatest], [y, y], color=GREY, linewidth=1.1)
+            below.plot(of.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=drawn.note(words))
+        if is_usual:
+            below.plot(low - 0.02 * (high - low), y, "D", color=INK, markersize=2.6, clip_on=False)
+    below.set_yticks(range(len(choices)), [name for _, name, _, _ in choices], fontsize=7)
+    below.set_ylim(len(choices) - 0.4, -0.6)
+    for before in range(1, len(choices)):
+        if choices[before][0] != choices[before - 1][0]:
+            below.axhline(before - 0.5, color=PALE, linewidth=0.6)
+    below.set_xlabel(f"correlation of {label} with score [–]")
+    for axes in drawn.axes:
+        axes.set_xlim(low - 0.04 * (high - low), high)
+        if usual is not None:
+            axes.axvline(usual, color=INK, linewidth=0.9, linestyle=(0, (3, 2)), zorder=0)
     header = (*CHOICES, "usual", "surfaces", "trials", "r of means", "r within subjects", "low", "high")
     numbers_of = attrgetter("surfaces", "trials", "r", "within", "low", "high")
-    rows = tuple((*map(str, astuple(one.path)), int(one.usual), *numbers_of(one)) for one in findings)
-    return Panel(name, title, text, header, rows)
+    rows = ((*map(str, astuple(one.path)), int(one.usual), *numbers_of(one)) for one in findings)
+    title = f"Correlation of {descriptor} along many paths of the analysis"
+    return drawn.panel(f"paths-{descriptor}", title, header, rows)
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
@@ -304,11 +298,7 @@ Value = float | None
 
 
 def comparison_panel(
-    names: Sequence[str],
-    sessions: tuple[str, str],
-    rows: Sequence[tuple[str, Sequence[tuple[Value, Value]]]],
-    *,
-    simulated: bool,
+    names: Sequence[str], sessions: tuple[str, str], rows: Sequence[tuple[str, Sequence[tuple[Value, Value]]]]
 ) -> Panel | None:
     """Return the picture of `rows`: a stimulus and its values of both sessions for each of `names`.
 
@@ -333,10 +323,9 @@ def comparison_panel(
     last = drawn.axes[-1]
     last.set_xticks(range(len(rows)), [stimulus for stimulus, _ in rows], rotation=60, ha="right")
     last.set_xlim(-0.6, len(rows) - 0.4)
-    title = f"{sessions[0]} and {sessions[1]} compared"
     header = ("stimulus", *(f"{name} {part}" for name in names for part in (*sessions, "difference")))
-    table = tuple(
+    table = (
         (stimulus, *(cell for a, b in pairs for cell in (a, b, None if a is None or b is None else b - a)))
         for stimulus, pairs in rows
     )
-    return Panel("compared", title, svg(drawn, "compared", title, simulated=simulated), header, table)
+    return drawn.panel("compared", f"{sessions[0]} and {sessions[1]} compared", header, table)

@@ -5,8 +5,8 @@
 
 import io
 import re
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,6 +36,7 @@ POINTS = 72.0  # in an inch: SVG is laid out in them
 DOTS = 220  # of a picture in pixels, in an inch
 _PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
 _NOTE: ContextVar[str] = ContextVar("note", default="")  # likewise
+_SIMULATED: ContextVar[bool] = ContextVar("simulated", default=False)  # see `look`
 _LOOK: dict[Any, Any] = {
     "font.family": "sans-serif",
     # Text stays text, so that it can be searched, copied and read aloud. The layout is made for the first font, which
@@ -94,6 +95,11 @@ class Plate:
     panels: tuple[Panel, ...]
 
 
+def plate(name: str, caption: str, panels: Iterable[Panel | None]) -> Plate:
+    """Return a figure of those panels that there are."""
+    return Plate(name, caption, tuple(panel for panel in panels if panel is not None))
+
+
 @dataclass(frozen=True, slots=True)
 class Sheet:
     """An empty picture with one or more axes, drawn on and then turned to SVG."""
@@ -109,10 +115,20 @@ class Sheet:
         self.hover[gid] = text
         return gid
 
+    def panel(self, name: str, title: str, header: tuple[str, ...], rows: Iterable[tuple[Cell, ...]]) -> Panel:
+        """Return the picture as it is drawn, with the numbers it shows; inside `look`."""
+        return Panel(name, title, svg(self, name, title), header, tuple(rows))
 
-def look() -> AbstractContextManager[None]:
-    """Return the context every picture is drawn in."""
-    return mpl.rc_context(_LOOK)
+
+@contextmanager
+def look(*, simulated: bool = False) -> Generator[None]:
+    """Be the context every picture is drawn in; all in it say so where they show what was `simulated`."""
+    before = _SIMULATED.set(simulated)
+    try:
+        with mpl.rc_context(_LOOK):
+            yield
+    finally:
+        _SIMULATED.reset(before)
 
 
 def sheet(width: float, height: float, heights: tuple[float, ...] = (1.0,), *, share_x: bool = False) -> Sheet:
@@ -161,9 +177,9 @@ def rows_of(*columns: Array) -> tuple[tuple[Cell, ...], ...]:
     return tuple(zip(*cells, strict=True))
 
 
-def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
+def svg(drawn: Sheet, name: str, title: str) -> str:
     """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
-    if simulated:
+    if _SIMULATED.get():
         drawn.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
     if note := _NOTE.get():
         drawn.figure.supxlabel(note, x=0.01, ha="left", fontsize=6.5, color=GREY, wrap=True)
@@ -180,10 +196,10 @@ def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
         pixels = io.BytesIO()
         drawn.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
         images[name] = pixels.getvalue()
-    return _finish_svg(buffer.getvalue(), name, title, drawn.hover, simulated=simulated)
+    return _finish_svg(buffer.getvalue(), name, title, drawn.hover)
 
 
-def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str], *, simulated: bool) -> str:
+def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> str:
     """Return the SVG with titles for hovering, fallback fonts, and ids that are unique on a page."""
     text = text[text.index("<svg") :]
     name = identifier(name)
@@ -196,7 +212,7 @@ def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str], *, s
     text = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', text)
     text = text.replace("<svg ", f'<svg role="img" aria-label="{escape(title)}" ', 1)
     head = '<?xml version="1.0" encoding="utf-8"?>\n'
-    if simulated:
+    if _SIMULATED.get():
         head += "<!-- SIMULATED: this picture shows no measurement of a real device or person -->\n"
     return head + _NOT_XML.sub("\ufffd", text)
 
