@@ -1,9 +1,11 @@
-"""Numbers, names and quantities at the ending as people read them."""
+"""Numbers, names and quantities at the ending as people read them, and the captions in `captions.toml`."""
 
 import math
 import re
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import Ends
@@ -13,6 +15,12 @@ from sessions.statistics.scores import bounds
 from sessions.strokes.stroke import digits, significant
 
 NONE = "–"
+_CAPTIONS: Mapping[str, str] = tomllib.loads((Path(__file__).parent / "captions.toml").read_text("utf-8"))
+
+
+def caption(name: str, **words: object) -> str:
+    """Return the caption of a table or figure, with `words` in their places."""
+    return _CAPTIONS[name].format(**words)
 
 
 def with_error(value: float, error: float | None, least: int) -> str:

@@ -15,9 +15,9 @@ from sessions.report.figures.courses import (
     stroke_panel,
 )
 from sessions.report.figures.finger import common_levels, finger_panels
-from sessions.report.figures.relation import PATHS_CAPTION, SCORES_CAPTION, paths_panel, relation_panel, score_panel
+from sessions.report.figures.relation import paths_panel, relation_panel, score_panel
 from sessions.report.figures.style import Panel, Plate, look, plate
-from sessions.report.wording import shown_response
+from sessions.report.wording import caption, shown_response
 from sessions.statistics.scores import by_key
 
 __all__ = ["Panel", "Plate", "picture", "plates"]
@@ -28,7 +28,7 @@ Panels = Iterable[Panel | None]
 def plates(report: Report) -> tuple[Plate, ...]:
     """Return the figures that a report has numbers for, in their order."""
     with look(simulated=report.simulated):
-        drawn = tuple(_plate(report, name) for name in _PLATES)
+        drawn = tuple(_plate(report, name) for name in _PANELS)
     return tuple(plate for plate in drawn if plate.panels)
 
 
@@ -46,9 +46,9 @@ def picture(report: Report, plate: str, experiment: str | None = None) -> Panel 
 
 
 def _plate(report: Report, name: str) -> Plate:
-    panels, caption = _PLATES[name]
     model = f" Model: {report.model}." if report.model and name in _OF_THE_MODEL else ""
-    return plate(name, caption.format(response=shown_response(report.response).label) + model, panels(report))
+    words = caption(f"figure-{name}", label=shown_response(report.response).label)
+    return plate(name, words + model, _PANELS[name](report))
 
 
 def _course(report: Report) -> Panels:
@@ -91,50 +91,14 @@ def _paths(report: Report) -> Panels:
 
 
 _OF_THE_MODEL = {"finger", "response", "relation"}
-_PLATES: Mapping[str, tuple[Callable[[Report], Panels], str]] = {  # what draws each figure, and its caption
-    "course": (
-        _course,
-        "Normal and tangential force over the whole recording, unfiltered; each stretch is drawn by its least and its"
-        " greatest value. Curves break where readings are missing. Grey: the strokes that were found, with their"
-        " numbers; discarded takes are not searched.",
-    ),
-    "scores": (_scores, SCORES_CAPTION),
-    "friction": (
-        _of_strokes(MU),
-        "Ratio of tangential to normal force from contact onset on. Thick: the steady window, over which the dynamic "
-        "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
-        "left out where the normal force is too small to divide by.",
-    ),
-    "speed": (
-        _of_strokes(SPEED),
-        "Speed of the centre of pressure along the stroke from contact onset on. Thick: the steady window. It moves "
-        "by rolling and by skin shear as well as by sliding, most of all at onset; the tables give its mean slope "
-        "over the steady window. Strokes whose speed was refused are left out.",
-    ),
-    "forces": (
-        _of_strokes(NORMAL, TANGENTIAL),
-        "Normal force N and tangential force T of the strokes of each series, laid over each other from contact onset "
-        "on, zero taken off and filtered as for the analysis. Thick: the steady window. Dashed: a stroke without a "
-        "steady window.",
-    ),
-    "finger": (
-        _fingers,
-        "Strain-energy density (SED) in the deformed finger in its settled state, sliding; lengths are true. Thin "
-        "lines: borders of skin and layers; outlined: the ending. Close view: tractions as arrows; which skin slips. "
-        "One scale of colours, which ends below the peaks.",
-    ),
-    "response": (
-        _responses,
-        "Predicted response: SED averaged over the ending while the finger is pressed down for 1 s and then slides. "
-        "Above the whole course, below the sliding alone on its own scale, which does not begin at 0. Dashed: "
-        "settled, not computed further.",
-    ),
-    "relation": (
-        _relations,
-        "Predicted {response} against mean score, with the stimulus's index. Circles: scores of whoever made the "
-        "strokes. Across: 95 % t interval. Upright: thick, error of the mesh; thin, 95 % interval of friction. "
-        "Line: least squares. r: Pearson's, Fisher's z interval. Range: greatest less least, and its share of their "
-        "middle.",
-    ),
-    "paths": (_paths, PATHS_CAPTION),
+_PANELS: Mapping[str, Callable[[Report], Panels]] = {
+    "course": _course,
+    "scores": _scores,
+    "friction": _of_strokes(MU),
+    "speed": _of_strokes(SPEED),
+    "forces": _of_strokes(NORMAL, TANGENTIAL),
+    "finger": _fingers,
+    "response": _responses,
+    "relation": _relations,
+    "paths": _paths,
 }

@@ -30,7 +30,7 @@ from sessions.report.figures.style import (
 )
 from sessions.report.tables.rivals import rival_words
 from sessions.report.tables.study_models import study_model
-from sessions.report.wording import ShownResponse, correlation, plural, shown_response, spread_share
+from sessions.report.wording import ShownResponse, caption, correlation, plural, shown_response, spread_share
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import CHOICE_LABELS, CHOICES, PathFinding, by_choice, correlations
@@ -76,25 +76,17 @@ def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     """Return the figures a study has numbers for, in their order."""
     shown = shown_response(study.response)
-    caption = (
-        f"Score against the {shown.label} predicted from the same subject's own stroke. Small dots and thin lines: "
-        "each subject; large dots: means over subjects with the surface's index, bars their 95 % t intervals. "
-        f"Model: {study_model(study)}."
-    )
+    words = caption("figure-study-relation", label=shown.label, model=study_model(study))
+    paths = (paths_panel(one.descriptor, one.paths, shown.label) for one in study.descriptors)
     with look(simulated=bool(study.simulated)):
         plates = (
-            plate("relation", caption, (_relation(one, shown) for one in study.descriptors if one.points)),
-            plate("scores", SCORES_CAPTION, map(score_panel, study.descriptors)),
-            plate("paths", PATHS_CAPTION, (paths_panel(d.descriptor, d.paths, shown.label) for d in study.descriptors)),
+            plate("relation", words, (_relation(one, shown) for one in study.descriptors if one.points)),
+            plate("scores", caption("figure-scores"), map(score_panel, study.descriptors)),
+            plate("paths", caption("figure-paths"), paths),
         )
     return tuple(plate for plate in plates if plate.panels)
 
 
-SCORES_CAPTION = (
-    "Scores against the index its maker gave each surface. Large dots: mean over subjects; bars: 95 % interval of the "
-    "mean, mean ± t(0.975, n − 1) s / √n with n subjects. Small dots, moved left: each subject's own score (the mean "
-    "of its repeats). Grey line: score equal to index."
-)
 MOST = 400  # points that tell their values each on their own
 
 
@@ -233,12 +225,6 @@ def _point(
     axes.annotate(str(mean.index), (mean.mean, value), xytext=off, textcoords="offset points", zorder=4, **sides)
 
 
-PATHS_CAPTION = (
-    "Correlation of the predicted response with scores along every path of the analysis. Above: how many paths come "
-    "to which correlation; dashed: the usual path. Below: what each choice does, all others varied: line from the "
-    "least to the greatest, mark at the median, filled diamond at the usual choice. Medians that lie apart say that a "
-    "choice matters."
-)
 _BINS = 24
 
 

@@ -8,7 +8,17 @@ from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.tables import Cell, Notes, Row, Rows, Table, group_by_experiment, table
-from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
+from sessions.report.wording import (
+    ShownResponse,
+    caption,
+    direction,
+    places,
+    sed,
+    shown_response,
+    significant,
+    tau,
+    with_error,
+)
 
 
 def prediction_table(report: Report) -> Table | None:
@@ -35,14 +45,8 @@ def prediction_table(report: Report) -> Table | None:
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
-    caption = (
-        "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
-        "steady window, or the maximum; under µ and τ max their bootstrap intervals. Under the SED: the 95 % interval "
-        f"that the uncertainty of friction alone makes of it, {_HOW}; the model's own error is not in it. ± and "
-        "estimated error: of one SED, from the mesh; differences between stimuli, which share the mesh, are more "
-        f"accurate. Model: {report.model}."
-    )
-    return _table(report, "table-predictions", caption, columns, _rows(report, row), notes)
+    words = caption("predictions", how=_HOW, model=report.model)
+    return _table(report, "table-predictions", words, columns, _rows(report, row), notes)
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
@@ -108,14 +112,8 @@ def afferent_table(report: Report) -> Table | None:
         return (_stroke_sed(p, notes) if published else _responding(p, shown, notes), *rates)
 
     below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
-    caption = (
-        f"Firing of an SA-II afferent: an illustration. No fitted map from {shown.label} to the rate of a human SA-II "
-        "afferent is known; every parameter is listed below, assumed unless it says that somebody set it. The order of "
-        f"the settled rates is that of the size of the {shown.label} as long as no rate lies at a bound, every size "
-        "is beyond the threshold and the adaptation gain stays below the static gain. "
-        f"{below if published else ''}±: the error from the mesh. Model: {report.model}."
-    )
-    return _table(report, "table-afferent", caption, columns, _rows(report, row), notes)
+    words = caption("afferent", label=shown.label, below=below if published else "", model=report.model)
+    return _table(report, "table-afferent", words, columns, _rows(report, row), notes)
 
 
 def _responding(p: PredictionFinding, shown: ShownResponse, notes: Notes) -> Cell:
@@ -139,13 +137,9 @@ def variants_table(report: Report) -> Table | None:
         return _sed(notes, _Estimate(one.sed, one.error_estimate, one.reason, ends, why, one.doubt), star=star)
 
     legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
-    caption = (
-        f"The same trials predicted otherwise, SED in kPa: {legend}. ±: the solver's estimate of its error, from the "
-        "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
-        f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
-    )
     columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
-    return _table(report, "table-beside", caption, columns, _by_strain(report, cell), notes)
+    words = caption("variants", legend=legend, how=_HOW)
+    return _table(report, "table-beside", words, columns, _by_strain(report, cell), notes)
 
 
 def variant_forces_table(report: Report) -> Table | None:
@@ -166,13 +160,8 @@ def variant_forces_table(report: Report) -> Table | None:
 
     alternatives = [one.variant for p in report.predictions for one in p.alternatives]
     units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in alternatives}
-    caption = (
-        "The model's normal force in each column of the table before, or the depth that the measured force presses it "
-        "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
-        "friction makes, and of the force where that drives the model, by derivatives."
-    )
     columns = " | ".join(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))
-    return _table(report, "table-beside-forces", caption, columns, _by_strain(report, cell), notes)
+    return _table(report, "table-beside-forces", caption("variant-forces"), columns, _by_strain(report, cell), notes)
 
 
 def _ways(report: Report) -> tuple[str, ...]:
@@ -227,14 +216,8 @@ def force_table(report: Report) -> Table | None:
 
     origin = f" ({report.width_origin})" if report.width_origin else ""
     width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm{origin}"
-    caption = (
-        f"Forces of the model, per mm and times {width}, beside the means measured over the steady window. "
-        "Depth to match: indentation at which the model would press as hard as the subject did. ±: the solver's "
-        "estimate of its error, from the mesh. Under each number of the model: the 95 % interval that the uncertainty "
-        "of friction makes, and of the measured force where that is to be matched, by derivatives; the width is taken "
-        f"as given. Under what was measured: its bootstrap interval. Model: {report.model}."
-    )
-    return _table(report, "table-forces", caption, columns, _rows(report, row), notes)
+    words = caption("forces", width=width, model=report.model)
+    return _table(report, "table-forces", words, columns, _rows(report, row), notes)
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
@@ -263,14 +246,8 @@ def direction_table(report: Report) -> Table | None:
             notes.estimate(ratio, places(3), why, None if doubt else ends, unknown),
         )
 
-    caption = (
-        "Both directions at equal depth, each with its trial's friction. ±: the solver's estimate of its error, from "
-        f"the mesh. Under each: the 95 % interval that the uncertainty of friction makes, {_HOW}. "
-        "Last column: SED while sliding from distal to proximal over SED while sliding from proximal to distal, and "
-        "the least and greatest that both intervals allow: no narrower than 95 %, for both move with one friction. "
-        f"Model: {report.model}."
-    )
-    return _table(report, "table-directions", caption, columns, _rows(report, row), notes)
+    words = caption("directions", how=_HOW, model=report.model)
+    return _table(report, "table-directions", words, columns, _rows(report, row), notes)
 
 
 def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:

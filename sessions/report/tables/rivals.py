@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from textwrap import fill
 
 from sessions.report.tables import Notes, Row, Table, table
-from sessions.report.wording import NONE, capital, correlation, digits, p_value, places
+from sessions.report.wording import NONE, capital, caption, correlation, digits, p_value, places
 from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
@@ -24,18 +24,15 @@ def rivals_table(compared: Compared, quantity: str, model: str) -> Table | None:
     The model's other quantities stand in `responses_table`.
     """
     within = "Steiger (1980), within subjects by bootstrap" if _weighed(compared) else "Steiger (1980)"
-    caption = (
-        f"r of scores with the {quantity} ({model}) and with what was measured. Differences: with both r made "
-        f"positive; Zou (2007), {within}. Left-out error: root mean square over surfaces left out. "
-        f"{'AIC: crossed mixed models. ' if _weighed(compared) else ''}Exploratory, not corrected."
-    )
-    return _table("table-rivals", caption, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
+    aic = "AIC: crossed mixed models. " if _weighed(compared) else ""
+    words = caption("rivals", label=quantity, model=model, within=within, aic=aic)
+    return _table("table-rivals", words, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
 
 
 def responses_table(compared: Compared, quantity: str, model: str) -> Table | None:
     """Return the model's other quantities beside one of them, as `rivals_table` has what was measured."""
-    caption = f"The same of the model's other responses ({model}) beside the {quantity}."
-    return _table("table-responses", caption, compared, quantity, lambda name: name != quantity and name in RESPONSES)
+    words = caption("responses", model=model, label=quantity)
+    return _table("table-responses", words, compared, quantity, lambda name: name != quantity and name in RESPONSES)
 
 
 def _weighed(compared: Compared) -> bool:

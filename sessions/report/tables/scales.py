@@ -7,7 +7,7 @@ import numpy as np
 
 from sessions.report.contents import Report
 from sessions.report.tables import Cell, Notes, Row, Rows, Table, table
-from sessions.report.wording import NONE, capital, digits, p_value, places, plural
+from sessions.report.wording import NONE, capital, caption, digits, p_value, places, plural
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.scales import JUDGEMENTS, Judgement, PairedScale
@@ -20,11 +20,7 @@ def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     """Return the values of each surface by both models, where subjects chose between two."""
     notes = Notes()
     groups = [(one.descriptor, tuple(_rows(one, notes))) for one in descriptors if one.scales]
-    caption = (
-        "Scales from choices between two surfaces, with mean 0: Bradley and Terry's in logits, Thurstone's case V in z,"
-        " by maximum likelihood, with 95 % intervals of a bootstrap over subjects. Last row: what coming first adds."
-    )
-    return table("table-scales", caption, "surface | Bradley–Terry [logit] | Thurstone V [z]", groups, notes)
+    return table("table-scales", caption("scales"), "surface | Bradley–Terry [logit] | Thurstone V [z]", groups, notes)
 
 
 def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
@@ -46,12 +42,7 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
         )
         groups.append((one.descriptor, tuple(rows)))
     heads = " | ".join(f"by {kind} [z]" for kind in judgements)
-    caption = (
-        "One latent scale, with mean 0. Its unit is the standard deviation of the difference of two judgements: √2 "
-        "times the scatter of single scores or log estimates, Thurstone's z of choices, the JND of comparisons by "
-        "0.674. 95 % intervals: bootstrap over subjects; of comparisons the JND's. People who differ count as scatter."
-    )
-    return table("table-latent", caption, f"surface | mean score [0–100] | {heads}", groups, notes)
+    return table("table-latent", caption("latent"), f"surface | mean score [0–100] | {heads}", groups, notes)
 
 
 def _latent(one: DescriptorFindings, kind: Judgement, index: int, notes: Notes) -> Cell:
@@ -120,13 +111,8 @@ def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
         for name, functions, means in judgements
         if functions
     ]
-    caption = (
-        "Comparisons with a standard, by cumulative normal functions of log µ of the subject's own strokes. PSE: µ "
-        "judged equal, by the standard's. JND: from there to three choices of four. Order: what coming second adds. By "
-        "maximum likelihood, with 95 % profile intervals; over subjects geometric means with t intervals."
-    )
     columns = "subject | answers | PSE [times µ] | JND [% of µ] | lapses [%] | order [% of µ] | correlation of answers"
-    return table("table-psychometric", caption, columns, groups, notes)
+    return table("table-psychometric", caption("psychometric"), columns, groups, notes)
 
 
 def session_functions(report: Report) -> list[Judged]:

@@ -22,6 +22,7 @@ from sessions.report.tables.scales import psychometric_table, session_functions
 from sessions.report.wording import (
     NONE,
     capital,
+    caption,
     correlation,
     digits,
     identifier,
@@ -69,12 +70,7 @@ def stroke_table(report: Report) -> Table | None:
         )
 
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
-    caption = (
-        "Strokes. µ dynamic: mean over the steady window; µ static: height of the static peak; µ maximum: greatest "
-        "above the force floor; τ max: greatest tangential force over the contact area, which is taken as given; "
-        f"speed: slope of the centre of pressure.{kind}"
-    )
-    return _table(report, "table-strokes", caption, columns, row, notes)
+    return _table(report, "table-strokes", caption("session-strokes", kind=kind), columns, row, notes)
 
 
 def course_table(report: Report) -> Table | None:
@@ -101,14 +97,7 @@ def course_table(report: Report) -> Table | None:
         )
 
     kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
-    caption = (
-        "Forces, direction and instants of the strokes, each over its interval from the same repeats. Forces: means "
-        "over the steady window. Heading: angle of the movement from +x (proximal to distal) towards +y; agree: share "
-        "of repeats with the reported direction. Onset: where N leaves its noise. Break-away: where T/N stops rising. "
-        "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
-        f"{kinds}."
-    )
-    return _table(report, "table-courses", caption, columns, row, notes)
+    return _table(report, "table-courses", caption("session-courses", kinds=kinds), columns, row, notes)
 
 
 def _table(
@@ -166,11 +155,7 @@ def planted_table(report: Report) -> Table | None:
 
     names = {trial: one.experiment for trial, one in {**predictions, **strokes_by_trial}.items()}
     groups = group_by_experiment(report, report.planted, lambda p: names.get(p.trial, ""), row)
-    caption = (
-        "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
-        "analysis does not know what was planted. Under what was found: its 95 % bootstrap interval."
-    )
-    return table("table-planted", caption, columns, groups, notes)
+    return table("table-planted", caption("session-planted"), columns, groups, notes)
 
 
 def score_table(report: Report) -> Table | None:
@@ -178,11 +163,7 @@ def score_table(report: Report) -> Table | None:
     notes = Notes()
     groups = [(e.name, [score_cells(m, notes) for m in e.scores]) for e in report.experiments]
     columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
-    caption = (
-        "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
-        "standard deviation s: its 95 % interval by chi squared."
-    )
-    return table("table-scores", caption, columns, groups, notes)
+    return table("table-scores", caption("session-scores"), columns, groups, notes)
 
 
 def score_cells(mean: MeanScore, notes: Notes) -> Row:
@@ -229,14 +210,9 @@ def relation_table(report: Report) -> Table | None:
     )
     any_own = any(e.own_relation is not None for e in report.experiments)
     own = "The forces are those of one subject, whose scores are the own ones. " if any_own else ""
-    caption = (
-        f"Relation of the predicted {shown.label} ({report.model}) to {'scores and to ' if report.scored else ''}the "
-        "stimuli's indices. "
-        f"{own}Intervals: Fisher's z, for rho as by "
-        "Bonett and Wright (2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its "
-        "t interval. Last column: r when the stimulus of that index is left out."
-    )
-    return table("table-relation", caption, columns, groups, notes)
+    scores = "scores and to " if report.scored else ""
+    words = caption("session-relation", label=shown.label, model=report.model, scores=scores, own=own)
+    return table("table-relation", words, columns, groups, notes)
 
 
 def rank_interval(related: Relation, notes: Notes) -> Cell:
@@ -278,16 +254,7 @@ def paths_table(named: Iterable[Named]) -> Table | None:
     columns = (
         "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
     )
-    caption = (
-        "The correlation of the predicted response with scores as a distribution over paths of the analysis: every "
-        "choice below crossed with every other at small strain; finite strain, where it was tried, with the other "
-        "choices as usual. "
-        "Contact is solved at every friction that was met, from the trial's own prediction on and on its mesh. All of "
-        "them are reasonable and none is a sample of others: quartiles describe, and are no intervals. Different r: "
-        "how many are left where those that agree within "
-        f"{SAME:g} count once. A path of which fewer than three surfaces have a prediction gives no r."
-    )
-    return table("table-paths", caption, columns, groups)
+    return table("table-paths", caption("paths", same=SAME), columns, groups)
 
 
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:

@@ -4,13 +4,14 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
-from sessions.report.tables import Cell, Notes, Row, Rows, Table, range_cell, sections_of, table
+from sessions.report.tables import Cell, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table, study_model, trials_table
 from sessions.report.wording import (
     NONE,
+    caption,
     correlation,
     digits,
     p_value,
@@ -24,6 +25,8 @@ from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scores import Average, MeanScore
 from sessions.statistics.visit import Visit
 from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
+
+RowsOf = Callable[[DescriptorFindings], Iterable[Row]]
 
 
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
@@ -54,8 +57,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
 def _visits(study: StudyFindings) -> Table | None:
     rows = tuple(_visit_row(visit, study) for visit in study.visits)
     columns = "session | subject | answers | strokes with SED | ended as planned | flawed trials | counted"
-    caption = "Visits in the order of their names; flawed: doubtful or worse, the table of trials names each flaw."
-    return table("table-visits", caption, columns, [("", rows)])
+    return table("table-visits", caption("study-visits"), columns, [("", rows)])
 
 
 def _visit_row(visit: Visit, study: StudyFindings) -> Row:
@@ -89,12 +91,8 @@ def _scores(study: StudyFindings) -> Table | None:
         "within subjects [0–100] | standard deviation [0–100]"
     )
     complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
-    caption = (
-        "Scores: t interval of the mean over subjects; and interval within subjects (Cousineau 2005, Morey 2008), for "
-        f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'}). Under "
-        "the standard deviation: its 95 % interval by chi squared."
-    )
-    return table("table-scores", caption, columns, _by_descriptor(study, rows), notes)
+    words = caption("study-scores", complete=complete or "none")
+    return _table(study, "table-scores", words, columns, rows, notes)
 
 
 def _agreement(study: StudyFindings) -> Table | None:
@@ -104,11 +102,7 @@ def _agreement(study: StudyFindings) -> Table | None:
         if (of := one.agreement) is not None
     )
     columns = "descriptor | subjects | Kendall's W | Friedman's p | Page's p"
-    caption = (
-        "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index. "
-        "Exploratory: neither p is corrected, and neither belongs to a family that is."
-    )
-    return table("table-agreement", caption, columns, [("", rows)])
+    return table("table-agreement", caption("study-agreement"), columns, [("", rows)])
 
 
 def _normalised_scores(study: StudyFindings) -> Table | None:
@@ -120,12 +114,7 @@ def _normalised_scores(study: StudyFindings) -> Table | None:
     columns = (
         "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
     )
-    caption = (
-        "Scores as they were given and standardised: each subject's own mean taken away and the rest divided by its "
-        "own standard deviation over the surfaces, which takes away what part of the scale a subject uses; of the "
-        "subjects who scored every surface. t intervals of the mean over subjects."
-    )
-    return table("table-normalised", caption, columns, _by_descriptor(study, rows))
+    return _table(study, "table-normalised", caption("study-normalised"), columns, rows)
 
 
 def _differences(study: StudyFindings) -> Table | None:
@@ -135,12 +124,7 @@ def _differences(study: StudyFindings) -> Table | None:
             yield (name, *_with_interval(pair, 1), p_value(pair.p), p_value(pair.p_holm))
 
     columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
-    caption = (
-        "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
-        "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979), a family of its own for each "
-        "descriptor. Exploratory; the intervals are not corrected."
-    )
-    return table("table-differences", caption, columns, _by_descriptor(study, rows))
+    return _table(study, "table-differences", caption("study-differences"), columns, rows)
 
 
 def _estimates(study: StudyFindings) -> Table | None:
@@ -159,18 +143,14 @@ def _estimates(study: StudyFindings) -> Table | None:
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]
     left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
-    caption = (
-        "Magnitude estimates, each subject on a scale of its own: geometric means over subjects with t intervals of "
-        f"the logarithms, as they were given and with every subject's own modulus taken away (Stevens 1957).{left}"
-    )
-    return table("table-estimates", caption, columns, _by_descriptor(study, rows), notes)
+    return _table(study, "table-estimates", caption("study-estimates", left=left), columns, rows, notes)
 
 
 def _surfaces(study: StudyFindings) -> Table | None:
     notes = Notes()
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
-        for s in one.surfaces:
+        for s in one.surfaces if any(s.subjects for s in one.surfaces) else ():
             cells = (*_mean(s.mu, places(3), notes), *_mean(s.response, written, notes))
             yield (s.index, s.subjects, *cells, _spread(s.response, shown.factor, notes))
 
@@ -183,13 +163,8 @@ def _surfaces(study: StudyFindings) -> Table | None:
         f"index | subjects | µ [1] | 95 % interval [1] | {shown.label} [{unit}] | 95 % interval [{unit}] | "
         f"standard deviation [{unit}]"
     )
-    caption = (
-        f"Friction that the model got, and predicted {shown.label}: means over subjects, each from its own strokes, "
-        f"with t intervals; standard deviation of the {shown.label} with its interval by chi squared. "
-        f"Model: {study_model(study)}."
-    )
-    groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
-    return table("table-surfaces", caption, columns, groups, notes)
+    words = caption("study-surfaces", label=shown.label, model=study_model(study))
+    return _table(study, "table-surfaces", words, columns, row, notes)
 
 
 def _spread(mean: Average | None, factor: float, notes: Notes) -> Cell:
@@ -212,13 +187,7 @@ def _forces(study: StudyFindings) -> Table | None:
         "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
         "depth to match [mm] | 95 % interval [mm]"
     )
-    caption = (
-        "Normal force as measured over the steady window, that of the model at the depth of its block (times the "
-        "finger's width, assumed unless it was measured), and the depth at which the two would be equal (on a rough "
-        "mesh, to some tenths of a per cent). Means over subjects with t intervals, which hold what errs from trial to "
-        f"trial. Model: {study_model(study)}."
-    )
-    return table("table-forces", caption, columns, _by_descriptor(study, row), notes)
+    return _table(study, "table-forces", caption("study-forces", model=study_model(study)), columns, row, notes)
 
 
 def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row:
@@ -251,18 +220,8 @@ def _relation(study: StudyFindings) -> Table | None:
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
-    caption = (
-        f"Predicted {BY_NAME[study.response].label} ({study_model(study)}) with scores. Means: Pearson's r of means "
-        "over the subjects who have both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett "
-        "and Wright 2000) and exact p. Within subjects: repeated-measures correlation of each subject's scores with "
-        "what its own strokes give (Bakdash and Marusich 2017), with an interval and a p for other people who meet "
-        "these very surfaces (jackknife of Fisher's z over subjects, Miller 1974). Of other surfaces only the "
-        "intervals of means speak. Confirmatory are these correlations of scores as given alone, one for each "
-        "descriptor: they are the family of p, Holm (Holm 1979). Every other p, of means, of standardised scores and "
-        "of estimates, is exploratory and not corrected; nor are the intervals. Last column: least and greatest r "
-        "when one surface, or one subject, is left out, and which."
-    )
-    return table("table-relation", caption, columns, _by_descriptor(study, rows), notes)
+    words = caption("study-relation", label=BY_NAME[study.response].label, model=study_model(study))
+    return _table(study, "table-relation", words, columns, rows, notes)
 
 
 def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
@@ -321,5 +280,8 @@ def _without(left_out: Sequence[tuple[str, float]]) -> str:
     return ", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest))
 
 
-def _by_descriptor(study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[Row]]) -> list[Rows]:
-    return [(one.descriptor, rows(one)) for one in study.descriptors]
+def _table(
+    study: StudyFindings, name: str, words: str, columns: str, rows: RowsOf, notes: Notes | None = None
+) -> Table | None:
+    """Return a table with the rows of each descriptor under its name."""
+    return table(name, words, columns, ((one.descriptor, rows(one)) for one in study.descriptors), notes)

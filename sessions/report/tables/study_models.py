@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from sessions.prediction import BY_NAME, Quantity
 from sessions.report.tables import Cell, Notes, Row, Table, range_cell, table
 from sessions.report.trials import model_in_short
-from sessions.report.wording import NONE, digits, p_value, places, plural, sed, significant, tau, three_figures
+from sessions.report.wording import NONE, caption, digits, p_value, places, plural, sed, significant, tau, three_figures
 from sessions.statistics.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
 from sessions.statistics.mixed_model import INTERCEPT, MixedModel, Spread, Term
 from sessions.statistics.pooled import response_term
@@ -27,18 +27,8 @@ def models_table(study: StudyFindings) -> Table | None:
         for what, model in _models(one, study)
         if not isinstance(model, str)
     ]
-    caption = (
-        "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
-        "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
-        "The first trial of a block counts as if index 50 had been stroked before. "
-        "Exploratory: p is not corrected, for terms, models or descriptors. "
-        f"The level is that at the mean of {quantity.label} or index. t intervals, for other people on these surfaces. "
-        "Standard deviations of the subjects' own levels and slopes, and of single scores about them: by least "
-        "squares, the error of each subject's own line taken away; intervals by modified large sample (Ting et al. "
-        "1990), of single scores by chi squared. A singular fit "
-        "finds that subjects differ in fewer ways than it allows."
-    )
-    return table("table-models", caption, "term | unit | estimate | 95 % interval | p", groups)
+    words = caption("study-models", label=quantity.label)
+    return table("table-models", words, "term | unit | estimate | 95 % interval | p", groups)
 
 
 def _models(one: DescriptorFindings, study: StudyFindings) -> tuple[tuple[str, MixedModel | str], ...]:
@@ -121,22 +111,13 @@ def planted_table(study: StudyFindings) -> Table | None:
         for one in study.effects
     )
     columns = "descriptor | effect | unit | planted | found | 95 % interval | inside"
-    caption = (
-        "What was planted and what was found. Slopes of the score, spreads of levels and slopes, and noise, which are "
-        "standard deviations: by the mixed model on index and µ, both of which the simulated people judged by. "
-        "They know no model of a finger: the planted r, and the planted slope on SED, are those of 2000 more such "
-        "people, each with a finger of its own, on the same surfaces, with the SEDs that the model gives at their "
-        "friction (the noise of judgement is added by its variance). Every interval is for other people on these "
-        "surfaces; one in twenty misses."
-    )
-    return table("table-planted", caption, columns, [("", rows)])
+    return table("table-planted", caption("study-planted"), columns, [("", rows)])
 
 
 def flaws_table(study: StudyFindings) -> Table | None:
     """Return what was spoilt in a simulated study, and whether it was found."""
     rows = tuple((one.session, one.expected, "yes" if one.detected else "no") for one in study.flaws)
-    caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
-    return table("table-planted-flaws", caption, "session | planted | found", [("", rows)])
+    return table("table-planted-flaws", caption("study-planted-flaws"), "session | planted | found", [("", rows)])
 
 
 _FEW = "too few readings"
@@ -162,14 +143,8 @@ def trials_table(study: StudyFindings) -> Table | None:
     ]
     known = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
     calibrations = f" (calibration: {'; '.join(known)})" if known else ""
-    caption = (
-        "Every trial, from which all numbers above come. µ: what the model got; τ max, normal force N and speed of the "
-        f"stroke, each over its 95 % interval by block bootstrap{calibrations}. SED: at "
-        f"{study_model(study)}, over what the uncertainty of friction makes of it; error: that estimated from its "
-        "mesh. A dash says why. Means, correlations and models above take each number as it "
-        "stands: their own intervals come from how subjects and trials differ, which holds these errors too."
-    )
-    return table("table-trials", caption, columns, groups, notes)
+    words = caption("study-trials", calibrations=calibrations, model=study_model(study))
+    return table("table-trials", words, columns, groups, notes)
 
 
 def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
