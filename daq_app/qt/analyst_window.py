@@ -86,6 +86,7 @@ class AnalystWindow(QMainWindow):
         self.setWindowTitle(f"{folder.name} – daq-app")
         self.setAccessibleName(tr("analyst's window"))
         self.state = AnalystState(folder)
+        self.tokens = tokens
         self._work = work or Analyst(folder)
         self.keys = KeysPage(self, ANALYST_KEYS)
         self._head = label("", "simulated")
@@ -172,6 +173,14 @@ class AnalystWindow(QMainWindow):
         self._timer.stop()
         self._work.close()
         super().closeEvent(event)
+
+    def hand_over(self, tokens: Tokens) -> "AnalystWindow":
+        """Return a window in another theme that shows what this one does and goes on with its work."""
+        self._timer.stop()
+        window = AnalystWindow(self.state.folder, tokens, self._work)
+        window.state = self.state
+        window._show()
+        return window
 
     def _go_to(self, column: int) -> None:
         self._pages.setCurrentIndex(column)

@@ -7,7 +7,7 @@ from pathlib import Path
 from platform import python_version
 from typing import TYPE_CHECKING, Literal
 
-from PySide6.QtCore import Qt, QUrl, qVersion
+from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -221,19 +221,38 @@ class ReviewRoom(QWidget):
         self._list()
         from daq_app.qt.analyst_window import AnalystWindow  # loaded when somebody looks at a session
 
-        self.analyst = AnalystWindow(folder, theme_of(self))
-        self.analyst.setWindowFlags(Qt.WindowType.Widget)
-        self._none.hide()
-        self._row.addWidget(self.analyst, 1)
-        self.analyst.show()
+        self._place(AnalystWindow(folder, theme_of(self)))
 
     def leave(self) -> None:
         if self.analyst is not None:
             self.analyst.close()
-            self._row.removeWidget(self.analyst)
-            self.analyst.deleteLater()
+            self._remove(self.analyst)
             self.analyst = None
             self._none.show()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Show the session in the colours of another theme, once all else has them."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.StyleChange:
+            QTimer.singleShot(0, self, self._follow_theme)
+
+    def _follow_theme(self) -> None:
+        """Show the session in another window: plots keep the colours that they were made with."""
+        before, tokens = self.analyst, theme_of(self)
+        if before is not None and before.tokens is not tokens:
+            self._place(before.hand_over(tokens))
+            self._remove(before)
+
+    def _place(self, analyst: "AnalystWindow") -> None:
+        self.analyst = analyst
+        analyst.setWindowFlags(Qt.WindowType.Widget)
+        self._none.hide()
+        self._row.addWidget(analyst, 1)
+        analyst.show()
+
+    def _remove(self, analyst: "AnalystWindow") -> None:
+        self._row.removeWidget(analyst)
+        analyst.deleteLater()
 
     def _list(self) -> None:
         self.recent.clear()

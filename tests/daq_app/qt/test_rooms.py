@@ -8,6 +8,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu, QWidget
 
+from daq_app.analyst.state import Choose
 from daq_app.qt import preferences, tokens
 from daq_app.qt.rooms import about_words
 from daq_app.recorder.messages import Stop
@@ -116,6 +117,28 @@ def test_a_session_that_is_open_stays_as_it_is_when_it_is_chosen_again(rooms, mo
     shown = rooms.analyst
     rooms.review.recent.itemClicked.emit(rooms.review.recent.item(0))
     assert rooms.analyst is shown
+
+
+@pytest.mark.parametrize("away", [False, True])
+def test_a_session_that_is_open_follows_the_theme_with_its_plots_and_all_that_it_shows(driver, rooms, away):
+    found = entries(driver.window.menuBar())
+    rooms.open(SESSION)
+    before = rooms.analyst
+    driver.until(lambda: before.state.report is not None, "the report")
+    if away:
+        driver.window.go_to("prepare")
+    try:
+        found["Dark"].trigger()
+        driver.application.processEvents()
+        driver.window.go_to("review")
+        driver.application.processEvents()
+        plot = rooms.analyst.stroke.stroke._plots[0]
+        assert plot.backgroundBrush().color().name() == tokens.DARK.surface
+        assert rooms.analyst.state.report is before.state.report
+        rooms.analyst.ask(Choose(0))
+        driver.until(lambda: rooms.analyst.state.row == 0 and rooms.analyst.state.step is None, "the trial")
+    finally:
+        found["System"].trigger()
 
 
 def test_a_new_session_that_is_asked_for_in_review_is_prepared_in_sight(driver, rooms):
