@@ -75,6 +75,7 @@ def _work(folder: Path) -> None:
 def _painting(film) -> None:  # noqa: ANN001
     """Print what painting a state of the finger takes."""
     from PySide6.QtWidgets import QApplication
+    from shiboken6 import delete
 
     from daq_app.analyst.frame import FIELD_CHOICES
     from daq_app.qt.finger_canvas import FingerCanvas, Look
@@ -93,6 +94,7 @@ def _painting(film) -> None:  # noqa: ANN001
         print(
             f"painting the {'contact' if near else 'finger '}                  {1e3 * statistics.median(took):5.0f} ms"
         )
+    delete(canvas)  # a widget that outlives its application makes the process end with a fault
     del application
 
 

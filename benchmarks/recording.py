@@ -78,6 +78,7 @@ def measure_writer(folder: Path, seconds: int) -> None:
     )
     raw = np.round(np.random.default_rng(0).normal(0, 4000, (BLOCK, 6)))
     calls: list[float] = []
+    early_s = min(10, seconds // 2)
     worked = time.process_time()
     for first in range(0, seconds * RATE, BLOCK):
         i = np.arange(first, first + BLOCK)
@@ -86,11 +87,10 @@ def measure_writer(folder: Path, seconds: int) -> None:
         began = time.perf_counter()
         writer.readings(block)
         calls.append(time.perf_counter() - began)
-        if first == 10 * RATE:
+        if first == early_s * RATE:
             early = memory()
     worked = time.process_time() - worked
     late = memory()
-    began = time.perf_counter()
     event_times: list[float] = []
     for _ in range(50):
         began = time.perf_counter()
@@ -102,7 +102,7 @@ def measure_writer(folder: Path, seconds: int) -> None:
         f"writing: {100 * sum(calls) / seconds:.2f} % of real time by the clock, {100 * worked / seconds:.2f} % by the"
         f" processor, the making of the readings included; longest call {1e3 * max(calls):.0f} ms"
     )
-    print(f"memory of the writer: {early:.0f} MB after 10 s, {late:.0f} MB after {seconds} s")
+    print(f"memory of the writer: {early:.0f} MB after {early_s} s, {late:.0f} MB after {seconds} s")
     print(
         f"an event made safe: median {1e3 * statistics.median(event_times):.1f} ms,"
         f" most {1e3 * max(event_times):.0f} ms"
