@@ -173,8 +173,12 @@ def locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
 
 def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
     """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
+    return stress_at(body, displacement, *locate(body.mesh, points))
+
+
+def stress_at(body: LinearBody, displacement: Array, element: Indices, local: Array) -> Array:
+    """Return the in-plane stress (p, 2, 2) [MPa] at `local` coordinates (p, 2) of `element` (p,)."""
     mesh, elastic = body.mesh, body.elastic
-    element, local = locate(mesh, points)
     probes = Probes.at(mesh, elastic.centre, element, local)
     strain = probes.displacement_gradient(mesh, displacement)
     at = elastic.state(elastic.places(probes), displacement)
