@@ -51,10 +51,6 @@ def cases(kinematics: Kinematics) -> tuple[Case, ...]:
 
 def judge(case: Case, neighbour: Outcome | None = None) -> HardCase:
     """Run one case and return its flaw, if any; `neighbour` is the outcome of the case named in `same_as`."""
-    return _judge(case, neighbour)[0]
-
-
-def _judge(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
     start, outcome = clock(), case.run()
     flaws = [outcome.flaw] if outcome.flaw else []
     if not outcome.answered and case.must == ANSWER:
@@ -65,22 +61,19 @@ def _judge(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
         off = abs(outcome.numbers[0] / neighbour.numbers[0] - 1.0)
         if off > case.within:
             flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
-    whole = "; ".join(flaws)
-    row = HardCase(case.kinematics, case.name, case.must, outcome.answered, whole, outcome.summary, clock() - start)
-    return row, outcome
+    took_s = clock() - start
+    return HardCase(case.kinematics, case.name, case.must, outcome.answered, "; ".join(flaws), outcome.summary, took_s)
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[HardCase | LeftOut]:
     """Yield a row for every case; in a quick run for the most telling ones."""
     del measurements
-    suite = [case for kinematics in bodies.BODIES for case in cases(kinematics)]
-    todo = [case for case in suite if not request.quick or case.name in TELLING]
+    suite = {(case.kinematics, case.name): case for kinematics in bodies.BODIES for case in cases(kinematics)}
+    todo = [case for case in suite.values() if not request.quick or case.name in TELLING]
     if len(todo) < len(suite):
         yield LeftOut(f"{len(suite) - len(todo)} hard cases are left to a full run.")
-    kept: dict[tuple[Kinematics, str], Outcome] = {}
 
     def rows(case: Case) -> Iterator[HardCase]:
-        row, kept[case.kinematics, case.name] = _judge(case, kept.get((case.kinematics, case.same_as)))
-        yield row
+        yield judge(case, suite[case.kinematics, case.same_as].run() if case.same_as else None)
 
     yield from rows_within(request, todo, "hard cases", rows)
