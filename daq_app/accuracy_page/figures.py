@@ -218,7 +218,7 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
 
 
 def _speed_panels(measured: RunResults) -> tuple[style.Panel | None, ...]:
-    rows, truths = measured.of(Speed), [truth for truth in measured.of(Truth) if truth.case in JUDGED]
+    rows, truths = measured.of(Speed), [truth for truth in measured.of(Truth) if truth.case in JUDGED and truth.doubt]
     doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
     return (
         _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),

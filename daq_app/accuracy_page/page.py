@@ -92,6 +92,7 @@ def _machine(measured: RunResults) -> Table:
             ("processes wanting a core before it began", "not known" if row.load is None else f"{row.load:.2f}"),
             ("took", f"{sum(measured.took_s.values()):.0f} s" + (", stopped by hand" if measured.stopped else "")),
             *row.versions.items(),
+            *(("not measured", sentence) for sentence in measured.left_out),
         ]  # fmt: skip
     return Table("machine", "Machine, load and versions.", ("", ""), tuple(rows))
 
@@ -254,14 +255,19 @@ def tables(measured: RunResults) -> dict[str, Table]:
     return {table.name: table for table in (make(measured) for make in TABLES) if table.rows}
 
 
-def fill(docs: Path, tables: Mapping[str, Table]) -> None:
-    """Write the tables into the pages below `docs`. Raises OSError, and ValueError for a page without marks."""
+def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:
+    """Return the text of the pages below `docs` with the tables of one run, and of no other, by file.
+
+    A table that the run has no rows for is said to be missing. Raises OSError, and ValueError for a page without marks.
+    """
+    filled: dict[Path, str] = {}
     for page, names in PAGES.items():
         text = (docs / page).read_text(encoding="utf-8")
         for name in names:
-            if name in tables:
-                text = fill_marks(text, name, f"{tables[name].caption}\n\n{tables[name].markdown()}")
-        (docs / page).write_text(text, encoding="utf-8")
+            content = f"{tables[name].caption}\n\n{tables[name].markdown()}" if name in tables else "Not measured."
+            text = fill_marks(text, name, content)
+        filled[docs / page] = text
+    return filled
 
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"

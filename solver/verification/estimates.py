@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import stiffness_warning
 from solver.failures import SolveFailure
-from solver.prediction import Prediction
+from solver.prediction import Prediction, percent
 from solver.response.solution import solve_many
 from solver.scene.tables import Solve
 from solver.verification.fine_meshes import fine_numbers
@@ -72,7 +72,7 @@ class GuaranteedCost:
     setup_s: float  # its mesh and tables
     estimate_s: float  # its estimates
     worst_estimate: float
-    worst_error: float | None  # where the truth is certain to a third of the tolerance
+    worst_error: float | None  # None where the truth of a surface is not certain to a third of the tolerance
 
 
 def measure(request: Request, measurements: Measurements) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
@@ -91,22 +91,26 @@ def _estimate_published(
     if not chosen:
         return iter([LeftOut(f"No truth is known at {kinematics} strain.")])
 
-    def rows_at(tolerance: float) -> Iterator[Estimate | GuaranteedCost]:
+    def rows_at(tolerance: float) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
         start = clock()
         results = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
         elapsed_s = clock() - start
         rows: list[Estimate] = []
         answers = [a for a in results if isinstance(a, Prediction)]
+        for scene, result in zip(chosen, results, strict=True):
+            if isinstance(result, SolveFailure):
+                yield LeftOut(f"{scene.title} at {kinematics} strain has no answer at {percent(tolerance)}: {result}")
         for answer in answers:
             truth = truths[answer.scene.title]
             rows += compare(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
         yield from rows
         if answers:
+            sed = [row for row in rows if row.number == NUMBERS[0]]
             yield GuaranteedCost(
-                kinematics, tolerance, len(chosen), max(a.dofs for a in answers), elapsed_s,
+                kinematics, tolerance, len(answers), max(a.dofs for a in answers), elapsed_s,
                 sum(a.wall_s for a in answers), answers[0].setup_s, sum(a.estimate_s for a in answers),
                 max(a.error_estimate for a in answers),
-                max((r.error for r in rows if r.number == NUMBERS[0] and r.met is not None), default=None),
+                None if any(row.met is None for row in sed) else max(row.error for row in sed),
             )  # fmt: skip
 
     tolerances = request.pick(TOLERANCES, TOLERANCES[:1])

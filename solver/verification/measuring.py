@@ -2,7 +2,8 @@
 
 import datetime
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
+from math import nan
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -74,17 +75,19 @@ class RunResults:
 
 def restore(document: dict[str, Any]) -> RunResults:
     """Return the results from the data of `to_dict`. Raises msgspec.ValidationError for data of another form."""
-    rows = {
-        subject.name: tuple(
-            msgspec.convert({name: value for name, value in row.items() if name != "kind"}, KINDS[row["kind"]])
-            for row in document[subject.name]
-        )
-        for subject in SUBJECTS
-        if subject.name in document
-    }
+    names = [subject.name for subject in SUBJECTS if subject.name in document]
+    rows = {name: tuple(map(_restore_row, document[name])) for name in names}
     return RunResults(
         document["begun"], document["quick"], document["stopped"], document["took_s"], rows, tuple(document["left_out"])
     )
+
+
+def _restore_row(row: dict[str, Any]) -> "DataclassInstance":
+    """Return a row from its data, where the null of a field that is always a number is nan."""
+    kind = KINDS[row["kind"]]
+    numbers = {field.name for field in fields(kind) if field.type is float}
+    data = {name: nan if value is None and name in numbers else value for name, value in row.items() if name != "kind"}
+    return msgspec.convert(data, kind)
 
 
 def measure(

@@ -73,6 +73,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Cold | Mem
     with tempfile.TemporaryDirectory() as folder:
         for what, command in _commands(Path(folder), request.host.python):
             if request.seconds_left <= 0.0 and not what.startswith("daq-app"):
+                yield LeftOut(f"Time was over before the cold start of {what}.")
                 continue
             runs = 5 if not request.quick else 2 if what.startswith("daq-app") else 1
             try:

@@ -21,14 +21,14 @@ from solver.verification.request import LeftOut, Measurements, Request, clock
 
 KINEMATICS = tuple(MESHED)
 NUMBERS = ("SED of the ending", "normal force", "drag")
-# fineness of three meshes, and whether they are moved along the skin by half an element
+# fineness of three meshes, finer than all whose speed is measured, and whether they are moved by half an element
 SHIFTED = {
     "small": ((26.0, False), (26.0, True), (23.0, False)),
-    "finite": ((18.0, False), (18.0, True), (16.0, False)),
+    "finite": ((30.0, False), (30.0, True), (26.0, False)),
 }
 SHIFTED_QUICK = {
     "small": ((18.0, False), (18.0, True), (16.0, False)),
-    "finite": ((13.0, False), (13.0, True), (11.0, False)),
+    "finite": ((20.0, False), (20.0, True), (18.0, False)),
 }
 # the judged cases, whose speeds count
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")

@@ -2,19 +2,23 @@
 
 import ast
 import json
+import math
 import re
+import shutil
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
 import pytest
 
 from daq_app.accuracy_page.figures import plates
-from daq_app.accuracy_page.page import Table, page, tables, write
+from daq_app.accuracy_page.page import Table, filled_pages, page, tables, write
 from daq_app.child_process import interpreter
-from solver import solve
+from daq_app.cli.main import run
+from solver import NotConverged, solve
 from solver.response.solution import DEFAULT_FINENESS
-from solver.verification import estimates, targets
+from solver.verification import estimates, processes, targets
 from solver.verification.costs import ENTIRE, PARTS, Cost, shares
 from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth, exponent
@@ -23,12 +27,13 @@ from solver.verification.machine import Machine
 from solver.verification.measuring import RunResults, measure, restore
 from solver.verification.methods import FiniteMethod
 from solver.verification.orders import Order
+from solver.verification.processes import Cold
 from solver.verification.published.problems import Problem
 from solver.verification.random_scenes import random_scene
 from solver.verification.request import Host, LeftOut, Measurements, Request, median_time, rows_within
-from solver.verification.speed import Speed
+from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.subjects import Subject
-from solver.verification.truth import JUDGED, Truth, cases
+from solver.verification.truth import JUDGED, SHIFTED, SHIFTED_QUICK, Truth, cases
 from solver.verification.warm import Warm
 
 HOST = Host({}, tuple(interpreter()))
@@ -147,6 +152,49 @@ def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, writ
     assert tables(again) == tables(example)
 
 
+def test_a_number_that_is_none_comes_back_from_the_data_and_is_told_as_missed(example):
+    row = Problem("Cattaneo", "", "half stick c/a", 0.1, math.nan, math.nan, 0.02, 0.1)  # no node sticks
+    again = restore(replace(example, rows={"problems": (row,)}).to_dict())
+    assert tables(again)["problems"].rows[0][-1] == "MISSED"
+
+
+def test_a_surface_that_is_refused_on_the_fine_meshes_keeps_no_figure_from_being_drawn(example):
+    refused = Truth("finite", "slipperiness 0", (), (), (), 1.0, "On an overkill mesh: it folds.")
+    found = replace(example, rows={**example.rows, "truth": (*example.rows["truth"], refused)})
+    assert plates(found).keys() == plates(example).keys()
+
+
+def test_pages_of_the_docs_hold_the_tables_of_one_run_alone(example, tmp_path):
+    shutil.copytree(Path(__file__).parents[2] / "docs", tmp_path, dirs_exist_ok=True)
+    short = replace(example, rows={name: rows for name, rows in example.rows.items() if name != "orders"})
+    filled = {path.name: text for path, text in filled_pages(tmp_path, tables(short)).items()}
+    between = filled["convergence.md"].partition("<!-- orders: begin -->")[2].partition("<!-- orders: end -->")[0]
+    assert between.strip() == "Not measured."
+    assert "| mu 9 | answer | FAILED" in filled["hard-cases-finite.md"]
+    assert "| not measured | Growth was not followed further. |" in filled["benchmarks.md"]
+
+
+@pytest.mark.parametrize("spoil", [lambda page: page.write_text("no marks"), Path.unlink], ids=["no marks", "no page"])
+def test_a_folder_that_is_not_the_docs_is_refused_before_anything_is_measured(spoil, tmp_path, monkeypatch, capsys):
+    docs = tmp_path / "docs"
+    shutil.copytree(Path(__file__).parents[2] / "docs", docs)
+    spoil(docs / "benchmarks/convergence.md")
+    monkeypatch.setattr("solver.verification.measuring.measure", lambda *_: pytest.fail("three minutes are spent"))
+    assert run(["accuracy", "--docs", str(docs), "--out", str(tmp_path / "out")]) in {1, 2}
+    told = capsys.readouterr().err
+    assert "docs" in told
+    assert "unexpected" not in told
+
+
+def test_a_run_that_was_stopped_leaves_the_docs_as_they_are_and_is_drawn_again_without_a_failure(example, tmp_path):
+    docs, out = tmp_path / "docs", tmp_path / "out"
+    shutil.copytree(Path(__file__).parents[2] / "docs", docs)
+    before = (docs / "benchmarks.md").read_bytes()
+    write(replace(example, stopped=True), out)
+    assert run(["accuracy", "--data", str(out / "accuracy.json"), "--docs", str(docs), "--out", str(out)]) == 0
+    assert (docs / "benchmarks.md").read_bytes() == before
+
+
 def verdict(example, work, at=None):
     (row,) = [r for r in example.of(targets.Target) if r.work == work and at in (None, r.at_error)]
     return row
@@ -179,6 +227,72 @@ def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
     assert lame.judged_error is None
     rows = {r.work: r for r in targets.measure(FOREVER, Measurements([lame]))}
     assert rows["finite strain, one surface from undeformed"].measured is None
+
+
+@pytest.mark.parametrize(
+    ("speeds", "truths"), [(MESHES, SHIFTED), (QUICK, SHIFTED_QUICK)], ids=["full run", "quick run"]
+)
+def test_the_truth_is_of_meshes_that_are_finer_than_all_whose_error_is_held_against_it(speeds, truths):
+    """A mesh that is itself a third of the truth would seem a third nearer to it than it is."""
+    assert all(max(speeds[kind]) <= 0.8 * min(fineness for fineness, _ in truths[kind]) for kind in speeds)
+
+
+def test_an_error_that_the_truth_is_too_uncertain_to_tell_is_neither_met_nor_missed():
+    truths = [Truth("finite", name, (5e-3, 0.1, 0.06), (4e-4, 0.0, 0.0), (9,) * 3, 1.0, "") for name in JUDGED]
+    meshes = [speed("finite", 900 + n, 5e-4, 1e-2) for n in range(len(QUICK["finite"]))]
+    found = Measurements([*truths, *meshes])
+    rows = {r.at_error: r for r in targets.measure(FOREVER, found) if r.work == "finite strain, one surface"}
+    assert rows["0.15 %"].verdict == "aim met"
+    assert rows["0.06 %"].verdict == "not measured"
+    assert "0.05 %, 0.09 % at most" in rows["0.06 %"].how
+
+
+def test_a_guaranteed_tolerance_has_no_true_error_where_the_truth_of_one_surface_cannot_tell(monkeypatch):
+    small = cases("small")[:2]
+    doubts = ((0.0,) * 3, (0.1,) * 3)
+    truths = [Truth("small", one.title, (5e-3, 0.1, 0.06), doubts[n], (9,) * 3, 1.0, "") for n, one in enumerate(small)]
+    monkeypatch.setattr(estimates, "TOLERANCES", (0.1,))
+    rows = [list(estimates.measure(OVER, Measurements(truths[:count]))) for count in (1, 2)]
+    worst = [row.worst_error for part in rows for row in part if isinstance(row, GuaranteedCost)]
+    assert worst[0] is not None
+    assert worst[1] is None
+
+
+def test_a_mesh_without_the_truth_of_one_of_the_surfaces_meets_nothing():
+    rough = speed("finite", 900, 1e-6, 1e-3)
+    del rough.errors["slipperiness 55"]  # its truth was refused, so that nothing is known of its error
+    assert rough.judged_error is None
+
+
+def test_a_cold_start_at_one_kinematics_says_that_it_is_only_one():
+    (row,) = [
+        row
+        for row in targets.measure(FOREVER, Measurements([Cold("daq-app solve, small strain", 5, 0.3, 0.3)]))
+        if row.work.startswith("`daq-app solve`")
+    ]
+    assert row.verdict == "aim met by 1 of 2 processes"
+
+
+def test_a_cold_start_for_which_time_is_over_is_named(monkeypatch):
+    monkeypatch.setattr(processes, "_run", lambda _: (1.0, 1.0))
+    rows = list(processes.measure(OVER, Measurements()))
+    assert [row.what for row in rows if isinstance(row, Cold)] == [
+        f"daq-app solve, {kinematics} strain" for kinematics in ("small", "finite")
+    ]
+    assert LeftOut("Time was over before the cold start of Python alone.") in rows
+
+
+def test_a_published_surface_without_an_answer_is_named_and_not_counted(monkeypatch):
+    small = cases("small")
+    truths = [Truth("small", one.title, (5e-3, 0.1, 0.06), (0.0,) * 3, (9,) * 3, 1.0, "") for one in small[:2]]
+    monkeypatch.setattr(
+        estimates,
+        "solve_many",
+        lambda scenes: [NotConverged("It folds.") if n else solve(one) for n, one in enumerate(scenes)],
+    )
+    rows = list(estimates.measure(OVER, Measurements(truths)))
+    assert [row.surfaces for row in rows if isinstance(row, GuaranteedCost)] == [1]
+    assert LeftOut(f"{small[1].title} at small strain has no answer at 1 %: It folds.") in rows
 
 
 def test_what_was_not_measured_is_said_to_be_so_and_not_missed():

@@ -12,6 +12,9 @@ from daq_app.child_process import interpreter
 from daq_app.console import DONE, STOPPED, Console, WrongValue, table
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from daq_app.accuracy_page.page import Table
     from solver.verification.measuring import RunResults
 
 EXAMPLE = "daq-app accuracy --quick --out accuracy"
@@ -27,26 +30,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from daq_app.accuracy_page.page import PAGE, fill, tables, write
+    from daq_app.accuracy_page.page import PAGE, tables, write
 
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
+    _docs(options, {})
     measured = _measure_or_restore(options, console)
     if measured.stopped:
-        console.note("stopped; drawing what was measured until now")
+        unfilled = "; the docs stay as they are" if options.docs else ""
+        console.note(f"stopped; drawing what was measured until then{unfilled}")
     console.progress(0.99, "drawing")
     write(measured, options.out)
     console.result({"page": str(options.out / PAGE), **measured.to_dict()})
     page_tables = tables(measured)
-    if options.docs is not None:
-        fill(options.docs, page_tables)
+    if not measured.stopped:
+        for page, text in _docs(options, page_tables).items():
+            page.write_text(text, encoding="utf-8")
     if "targets" in page_tables:
         rows = [[cell for n, cell in enumerate(row) if n != 7] for row in page_tables["targets"].rows]
         console.say(table(rows, head=list(page_tables["targets"].header[:7])))
     console.say(*(page_tables[name].caption for name in ("hard-small", "hard-finite") if name in page_tables))
     console.note(*(f"note: {sentence}" for sentence in measured.left_out))
     console.say(f"{options.out / PAGE}")
-    return STOPPED if measured.stopped else DONE
+    return STOPPED if measured.stopped and options.data is None else DONE
+
+
+def _docs(options: argparse.Namespace, page_tables: "Mapping[str, Table]") -> dict[Path, str]:
+    """Return the pages of the docs with these tables, by file. Raises OSError and WrongValue for other folders."""
+    from daq_app.accuracy_page.page import filled_pages
+
+    if options.docs is None:
+        return {}
+    try:
+        return filled_pages(options.docs, page_tables)
+    except ValueError as error:
+        raise WrongValue(f"{options.docs} holds no docs of this program ({error}); give another folder") from error
 
 
 def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunResults":
