@@ -63,17 +63,16 @@ def findings(
     `further` is what took more solves, or was asked for.
     """
     plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
-    stroke_findings = strokes(recording, analysis)
     more = further or Further()
-    undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
-    predicted = predictions(prediction, more.firing, undone)
+    alone = numbers_alone(recording, analysis, prediction, more)
+    stroke_findings, predicted = alone.strokes, alone.predictions
     head = _head(recording, tables)
     other_sessions = [Path(table.session).name for table in tables[1:]]
     numbers = quantities(predicted, stroke_findings)
     judged = experiments(plan, tables, numbers, more.paths, analysis.settings.area, more.response)
-    return Report(
+    return replace(
+        alone,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
-        session=recording.folder.name,
         simulated=bool(head),
         head=head,
         versions=tuple(Fact(name, version) for name, version in software_versions().items()),
@@ -87,13 +86,9 @@ def findings(
         flaws=flaws(analysis),
         experiments=with_psychometric(judged, recording, analysis),
         course=course(recording),
-        strokes=stroke_findings,
-        predictions=predicted,
         fields=fields(prediction),
         planted=tuple(planted or ()),
         sealed=_seal_sentence(recording, tables, predicted),
-        response=more.response,
-        model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         modelled=tuple(Fact(*fact) for fact in model_facts(prediction)),
         left_out=omissions(prediction),
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
@@ -102,6 +97,20 @@ def findings(
             recording, analysis, prediction, more.firing_settings, more.paths, other_sessions, more.response
         ),
         scene=scene_file(recording, prediction),
+    )
+
+
+def numbers_alone(
+    recording: Recording, analysis: Analysis, prediction: SessionPrediction | None, more: Further
+) -> Report:
+    """Return a report of strokes and predictions alone: nothing is held against scores, so it may be blinded."""
+    undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
+    return Report(
+        session=recording.folder.name,
+        strokes=strokes(recording, analysis),
+        predictions=predictions(prediction, more.firing, undone),
+        response=more.response,
+        model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         width=None if prediction is None else prediction.width,
         width_origin="" if prediction is None else prediction.width_origin,
         interval_kind=analysis.bootstrap.kind,

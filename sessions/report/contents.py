@@ -143,31 +143,31 @@ class Course:
     tangential: Array  # [N]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     """Everything a reader needs; exports only lay it out."""
 
-    title: str
+    title: str = ""
     session: str
-    simulated: bool
-    head: str  # first line of whatever is made of a simulated session; "" for a real one
-    sealed: str  # whether predictions were sealed before scores
-    versions: tuple[Fact, ...]
-    people: tuple[Fact, ...]
-    apparatus: tuple[Fact, ...]
-    excluded: tuple[str, ...]
-    remarks: tuple[str, ...]  # what is missing and nobody excluded, decisions on what counts, doubts about it
-    flaws: tuple[Fact, ...]  # name, sentence, where
-    experiments: tuple[Experiment, ...]
-    course: Course | None
+    simulated: bool = False
+    head: str = ""  # first line of whatever is made of a simulated session; "" for a real one
+    sealed: str = ""  # whether predictions were sealed before scores
+    versions: tuple[Fact, ...] = ()
+    people: tuple[Fact, ...] = ()
+    apparatus: tuple[Fact, ...] = ()
+    excluded: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what is missing and nobody excluded, decisions on what counts, doubts about it
+    flaws: tuple[Fact, ...] = ()  # name, sentence, where
+    experiments: tuple[Experiment, ...] = ()
+    course: Course | None = None
     strokes: tuple[StrokeFinding, ...]
     predictions: tuple[PredictionFinding, ...]
-    fields: tuple[Field, ...]
-    planted: tuple[GroundTruth, ...]
-    modelled: tuple[Fact, ...]
-    left_out: tuple[Fact, ...]
-    again: tuple[Fact, ...]  # everything needed to do it again ...
-    commands: tuple[str, ...]  # ... and what to type
+    fields: tuple[Field, ...] = ()
+    planted: tuple[GroundTruth, ...] = ()
+    modelled: tuple[Fact, ...] = ()
+    left_out: tuple[Fact, ...] = ()
+    again: tuple[Fact, ...] = ()  # everything needed to do it again ...
+    commands: tuple[str, ...] = ()  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
     width_origin: str = ""  # "set" or "assumed"
     other_signs: tuple[str, ...] = ()  # where the SED goes another way on this finger than on the published one

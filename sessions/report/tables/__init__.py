@@ -164,8 +164,8 @@ def split_off_appendix(
 def group_by_experiment(
     report: Report, things: Sequence[Thing], experiment: Callable[[Thing], str], row: Callable[[Thing], Row]
 ) -> list[Rows]:
-    """Return the rows of all things under the names of their experiments."""
-    names = [e.name for e in report.experiments]
+    """Return the rows of all things under the names of their experiments, as they come where nothing was judged."""
+    names = [e.name for e in report.experiments] or list(dict.fromkeys(map(experiment, things)))
     groups: list[Rows] = [(name, [row(t) for t in things if experiment(t) == name]) for name in names]
     return [*groups, ("", [row(t) for t in things if experiment(t) not in names])]
 

@@ -272,7 +272,7 @@ def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]
     """Return the named rows of all trials by experiment; `row` gives the cells after the name."""
 
     def name_row(p: PredictionFinding) -> Row:
-        name = (str(p.stroke),) if p.trial is None else (p.trial, str(p.index))
+        name = (str(p.stroke),) if p.trial is None else (p.trial, p.code if p.index is None else str(p.index))
         return (*name, *row(p))
 
     return group_by_experiment(report, report.predictions, lambda p: p.experiment, name_row)

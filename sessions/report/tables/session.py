@@ -107,9 +107,11 @@ def _table(
     planned = any(stroke.trial is not None for stroke in report.strokes)
 
     def name_row(stroke: StrokeFinding) -> Row:
-        stimulus = (stroke.trial, stroke.index) if planned else ()
-        where = (notes.number(v, places(0), "no trial asks for it") for v in stimulus)
-        return (stroke.number, *where, *row(stroke))
+        if not planned:
+            return (stroke.number, *row(stroke))
+        cell = partial(notes.number, shown=places(0), reason="no trial asks for it")
+        coded = stroke.index is None and stroke.code
+        return (stroke.number, cell(stroke.trial), stroke.code if coded else cell(stroke.index), *row(stroke))
 
     groups = group_by_experiment(report, report.strokes, lambda s: s.experiment, name_row)
     return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
