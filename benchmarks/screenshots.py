@@ -15,9 +15,10 @@ import time
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 
 from daq_app.recorder import messages as m
-from drivers.calibration import Calibration
+from drivers.calibration import Calibration, loads
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import VisitSetting, plan, protocol
@@ -46,10 +47,13 @@ class PlayedRecorder:
         self._waiting: list[m.Report] = []
         self._bench = Bench(3)
         self._last = 0
+        self._health = health()  # as said last
+        self._peak = np.zeros(7)
 
     def play(self, *reports: m.Report) -> None:
         """Say these at the next poll."""
         self._waiting += reports
+        self._health = next((one for one in reports if isinstance(one, m.HealthReport)), self._health)
 
     def stroke(self, trial: int, at: float) -> None:
         """Have the finger stroke the surface of a trial at an instant [s, device time]."""
@@ -66,6 +70,10 @@ class PlayedRecorder:
             wrench = self._bench.wrench(time)
             status = np.zeros(len(number), np.int64)
             self._waiting.append(m.Live(1, number, time, number, wrench, status, (0.0,) * 6))
+            load = loads(wrench, np.array(RATED)).max(axis=0)
+            self._peak = np.fmax(self._peak, load)
+            shares = {"load": tuple(load.tolist()), "peak": tuple(self._peak.tolist())}
+            self._waiting.append(structs.replace(self._health, **shares))
             self._last = int(number[-1]) + 1
 
     def send(self, request: object) -> None:
@@ -87,7 +95,7 @@ class PlayedRecorder:
 def health(**counts: int) -> m.HealthReport:
     """Return a report of a bench that is well, save for these counts."""
     totals = Health(received=123_456, lag_ms=2.0, **counts)
-    return m.HealthReport(totals, 6999.7, (0.0,) * 6, (0.0,) * 6, 0)
+    return m.HealthReport(totals, 6999.7, (0.0,) * 7, (0.0,) * 7, 0)
 
 
 def logged(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:

@@ -1,7 +1,6 @@
 """From raw readings to the wrench the finger exerts on the stimulus, and how much of its range a transducer carries."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +76,9 @@ def _tool_matrix(tool: tuple[float, ...]) -> Array:
     return wrench_transform(np.array(tool[:3]), np.radians(tool[3:]))
 
 
-Level = Literal["fine", "warning", "alarm"]
-
 WARNING = 0.8  # of a range [-]
-ALARM = 1.0  # of the range of one axis
-ALARM_COMBINED = 1.05  # of two taken together: where the Ethernet Axia's manual calls a reading out of range
+# Of the range of each axis, and of two taken together: there the Ethernet Axia's manual calls a reading out of range.
+LIMITS = (1.0,) * 6 + (1.05,)
 
 
 def loads(wrench: Array, rated: Array) -> Array:
@@ -97,13 +94,3 @@ def loads(wrench: Array, rated: Array) -> Array:
     fx, fy, fz, tx, ty, tz = parts = np.abs(wrench / rated).T
     combined = np.maximum(np.hypot(fx, fy) + tz, fz + np.hypot(tx, ty))
     return np.column_stack([*parts, combined])
-
-
-def level(greatest: Array) -> Level:
-    """Return how grave the greatest loads (7,) are; nan counts as nothing.
-
-    >>> level(np.array([0.5, 0.1, 0.81, 0.0, 0.0, 0.0, 0.9])), level(np.array([0.9] * 6 + [1.06]))
-    ('warning', 'alarm')
-    """
-    over = np.nan_to_num(greatest) / np.array([ALARM] * 6 + [ALARM_COMBINED])
-    return "alarm" if np.any(over > 1.0) else "warning" if np.any(np.nan_to_num(greatest) > WARNING) else "fine"

@@ -153,7 +153,7 @@ def _announcement(trial: Trial) -> str:
     return f"{kind} {trial.number}"
 
 
-SILENCE = 3.0  # after which a recorder that should answer four times a second is wondered about [s]
+SILENCE = 3.0  # after which a recorder that should answer ten times a second is wondered about [s]
 LOOK = 0.02  # between two looks at recorder, terminal and Ctrl-C [s]
 _WRONG = frozenset({"AddressError", "NotNow"})  # failures that come of the command line
 

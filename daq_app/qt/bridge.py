@@ -21,7 +21,6 @@ from daq_app.window.state import (
     DrawingFailed,
     Judged,
     LifeKnown,
-    Loaded,
     Message,
     Searching,
     Tick,
@@ -36,7 +35,7 @@ from sessions.plan.plan import Frame
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
 BEGINNING = (m.Connect, m.StartSession, m.ResumeSession)  # requests for which another recorder is started
-TICK = 0.1  # between two looks at the clock, for what tells an age, and at the load [s]
+TICK = 0.1  # between two looks at the clock, for what tells an age [s]
 
 
 class Client(Protocol):
@@ -69,7 +68,6 @@ class Bridge(QObject):
         super().__init__()
         self._client, self._start, self._clock = client, start, clock
         self._ticked = -1.0
-        self._load = Load()  # the greatest since the last tick
         self._from_threads: SimpleQueue[Message] = SimpleQueue()
         self._judge = Judge(self._from_threads.put)
         self.state = fold(AppState(), Tick(clock()))
@@ -134,12 +132,6 @@ class Bridge(QObject):
         if now - self._ticked >= TICK:
             self._ticked = now
             self._fold(Tick(now))
-            # The load comes no more often than it can be read; overloads between are kept by the recorder.
-            before, bench = self.state.bench.peak.over, self.state.bench
-            self._fold(Loaded(self._load))
-            self._load = Load()
-            if self.state.bench.peak.over != before and bench.info is not None:
-                self._look_up_life(bench.info.serial)
         for report in together(self._client.poll()):
             try:
                 self._take(report)
@@ -162,15 +154,17 @@ class Bridge(QObject):
     def _take(self, report: Report) -> None:
         match report:
             case m.Live():
-                self._load = self._load.latch(self.feed.add(report, self._frame()))
+                self.feed.add(report, self._frame())
                 self._judge.look(self.feed, self.state)
                 self.model.add(report, self._frame())
                 return
             case m.Device(info):
                 self.feed.device(info)
                 self._look_up_life(info.serial)
-            case m.Tared() if self.state.bench.info is not None:
-                self._look_up_life(self.state.bench.info.serial)
+            case m.HealthReport(peak=peak) if Load(peak).over != self.state.bench.peak.over:
+                self._look_up_own_life()
+            case m.Tared():
+                self._look_up_own_life()
             case m.NoDevice():
                 self.feed.device(None)
             case m.SessionBegun(plan=plan, clock_offset_ns=offset):
@@ -180,6 +174,10 @@ class Bridge(QObject):
                 pass
         self._fold(report)
         self._judge.heard(report, self.feed)
+
+    def _look_up_own_life(self) -> None:
+        if self.state.bench.info is not None:
+            self._look_up_life(self.state.bench.info.serial)
 
     def _look_up_life(self, serial: str) -> None:
         """Look up what a serial number has been through, without holding up the window: its file grows for years."""

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from daq_app.recorder.device_history import remember_overload
 from daq_app.recorder.messages import HealthReport, Live, Report, Six
-from drivers.calibration import level, loads
+from drivers.calibration import LIMITS, loads
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, TransducerInfo
 
 Array = NDArray[np.float64]
 
 LIVE_EVERY = 1 / 60  # least time between two messages of readings [real s]
-HEALTH_EVERY = 0.25  # between two of health [real s]
+HEALTH_EVERY = 0.1  # between two of health [real s]
 RATE_OVER = 1.0  # stretch the rate is measured over [real s]
 UNLOADED: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -101,7 +101,7 @@ class Display:
         wrench = calibration.wrench(block.raw, np.zeros(6))
         load = loads(calibration.own(wrench), calibration.rated).max(axis=0)
         self._load, self._peak = np.fmax(self._load, load), np.fmax(self._peak, load)
-        if level(self._peak) == "alarm" and not self._overload_told:
+        if np.any(self._peak > LIMITS) and not self._overload_told:
             self._overload_told = True
             remember_overload(info, tuple(self._peak.tolist()))
         self._send(
@@ -130,12 +130,9 @@ class Display:
             HealthReport(
                 health,
                 count / span / self._factor if span > 0.2 * RATE_OVER else 0.0,
-                six(load[:6]),
-                six(peak[:6]),
+                tuple(load.tolist()),
+                tuple(peak.tolist()),
                 self._saturated_now - self._saturated_before,
-                float(load[6]),
-                float(peak[6]),
-                level(self._peak),
             )
         )
         self._load = np.zeros(7)

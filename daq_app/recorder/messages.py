@@ -6,7 +6,6 @@ recorder sends every command of `sessions.run.steps` (what they are asked for), 
 Nothing in it can be run.
 """
 
-import math
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ import numpy as np
 from msgspec import Struct, field
 from numpy.typing import NDArray
 
-from drivers.calibration import Level
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.recording import LoggedEvent, Setting
@@ -108,16 +106,13 @@ class NoDevice(Struct, frozen=True):
 
 
 class HealthReport(Struct, frozen=True):
-    """Four times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
+    """Ten times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
 
     health: Health  # totals since the stream began
     rate: float  # readings a second over the machine's last second [Hz]; of a paced clock simulated seconds
-    load: Six  # greatest |Fx .. Tz| since the last report, nothing subtracted, over the rated range [-]; nan: no range
-    peak: Six  # the same since somebody acknowledged overloads
+    load: tuple[float, ...]  # (7,) the greatest since the last report, nothing subtracted [-]; nan: no rated range
+    peak: tuple[float, ...]  # (7,) the same since somebody acknowledged overloads; both as `drivers.calibration.loads`
     saturated: int  # readings the device called invalid since somebody acknowledged
-    combined: float = math.nan  # load of the axes together (`drivers.calibration`) since the last report [-]
-    combined_peak: float = math.nan  # the same since somebody acknowledged
-    level: Level = "fine"  # of the peaks: latched until acknowledged
 
 
 class Live(Struct, frozen=True, eq=False):

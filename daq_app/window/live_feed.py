@@ -1,4 +1,4 @@
-"""From the recorder's live messages to what is drawn, how far the transducer is loaded, and the readings of a take."""
+"""From the recorder's live messages to what is drawn and the readings of a take; how far the transducer is loaded."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from daq_app.recorder.messages import Live, Report
 from daq_app.window.live_trace import CHANNELS, LiveTrace, broken
 from daq_app.wording import tr_noop
-from drivers.calibration import ALARM, ALARM_COMBINED, WARNING, loads
+from drivers.calibration import LIMITS, WARNING
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
@@ -40,33 +40,16 @@ class Load:
 
     shares: tuple[float, ...] = (nan,) * 7  # of LOADS, as `drivers.calibration.loads` has them
 
-    def latch(self, other: "Load") -> "Load":
-        """Return the greater of each share.
-
-        >>> Load((0.1, 0.0, 0.9, 0.0, 0.0, 0.0, 0.9)).latch(Load((0.2,) * 6 + (0.4,))).shares
-        (0.2, 0.2, 0.9, 0.2, 0.2, 0.2, 0.9)
-        """
-        return Load(tuple(np.fmax(self.shares, other.shares).tolist()))
-
     @property
     def over(self) -> tuple[str, ...]:
         """Return the names of what is beyond its rated load."""
-        limits = (*(ALARM,) * 6, ALARM_COMBINED)
-        named = zip(LOADS, self.shares, limits, strict=True)
+        named = zip(LOADS, self.shares, LIMITS, strict=True)
         return tuple(name for name, share, limit in named if share > limit)
 
     @property
     def near(self) -> tuple[str, ...]:
         """Return the names of what is near its rated load, or beyond it."""
         return tuple(name for name, share in zip(LOADS, self.shares, strict=True) if share > WARNING)
-
-
-def load_of(wrench: Array, rated: Array) -> Load:
-    """Return the greatest load within readings (n, 6) [N, N mm] of a transducer with rated ranges (6,) [N, N mm].
-
-    `wrench` is not zeroed: what strains the transducer includes its zero.
-    """
-    return Load(tuple(loads(wrench, rated).max(axis=0).tolist())) if len(wrench) else Load()
 
 
 def together(reports: Iterable[Report]) -> Iterator[Report]:
@@ -107,11 +90,10 @@ class LiveFeed:
         """Keep readings from now on for a new take."""
         self._take.clear()
 
-    def add(self, live: Live, frame: Frame) -> Load:
-        """Take readings; return how far they load the transducer."""
-        info = self._info
-        if info is None or not len(live.time):
-            return Load()
+    def add(self, live: Live, frame: Frame) -> None:
+        """Take readings."""
+        if self._info is None or not len(live.time):
+            return
         if live.stream != self._stream:
             self._stream = live.stream
             self._take.clear()
@@ -126,8 +108,6 @@ class LiveFeed:
         while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > KEPT:
             self._take.popleft()
         self.trace.add(time, drawn)
-        sensed = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
-        return load_of(info.calibration.own(sensed), info.calibration.rated)
 
     def take(self) -> ReadingBlock:
         """Return the readings of the take in hand, as a wrench: N, N mm."""

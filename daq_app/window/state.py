@@ -38,12 +38,6 @@ class DevicesFound(Struct, frozen=True):
     devices: tuple[Probe, ...]
 
 
-class Loaded(Struct, frozen=True):
-    """How far the readings that have just come load the transducer."""
-
-    load: Load
-
-
 class LifeKnown(Struct, frozen=True):
     """What a serial number has been through was looked up."""
 
@@ -72,8 +66,7 @@ class LanguageChosen(Struct, frozen=True):
 
 
 Own = (
-    Tick | Searching | DevicesFound | Loaded | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed
-    | LanguageChosen
+    Tick | Searching | DevicesFound | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed | LanguageChosen
 )  # fmt: skip
 Message = m.Request | m.Report | Own  # what `fold` takes
 
@@ -157,12 +150,8 @@ def _fold_tare(bench: BenchState, message: Message) -> BenchState:
 
 def _fold_load(bench: BenchState, message: Message) -> BenchState:
     match message:
-        case m.HealthReport():
-            # The recorder's is complete: latching it would bring back what was acknowledged while it was on its way.
-            peak = Load((*message.peak, message.combined_peak))
-            return replace(bench, health=message.health, rate=message.rate, saturated=message.saturated, peak=peak)
-        case Loaded(load):
-            return replace(bench, load=load, peak=bench.peak.latch(load))
+        case m.HealthReport(health, rate, load, peak, saturated):
+            return replace(bench, health=health, rate=rate, load=Load(load), peak=Load(peak), saturated=saturated)
         case LifeKnown(serial, life) if bench.info is not None and bench.info.serial == serial:
             return replace(bench, life=life)
         case m.AcknowledgeOverloads():

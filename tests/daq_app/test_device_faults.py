@@ -89,7 +89,7 @@ def test_a_session_in_which_the_units_change_ends_and_names_the_readings_in_doub
 
 def test_the_window_names_a_fault_of_the_device():
     health = Health(received=200, doubtful=200, flagged={"gauge excitation current too low": 200})
-    report = HealthReport(health, 200.0, (0.0,) * 6, (0.0,) * 6, 200)
+    report = HealthReport(health, 200.0, (0.0,) * 7, (0.0,) * 7, 200)
     view = bench_view(bench_after(BenchState(link="open"), report), recording=True)
     assert view.lamp == "wrong"
     assert "gauge excitation current too low" in view.lamp_words

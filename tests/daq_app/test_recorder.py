@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from desk import DEADLINE, PACE, SHORT, Desk
+from session_messages import INFO
 
 from daq_app.recorder.bench import Bench
 from daq_app.recorder.client import Recorder
@@ -41,6 +42,7 @@ from daq_app.recorder.messages import (
     Tared,
 )
 from drivers.clock import RealClock
+from drivers.readings import ReadingBlock
 from drivers.transducer import Health, SetupError
 from sessions.recording import LoggedEvent, Recording
 from sessions.run.runner import Status
@@ -346,6 +348,18 @@ def test_readings_called_invalid_are_counted_until_somebody_acknowledges_also_ac
     display.acknowledge()
     display.look(Health())
     assert [report.saturated for report in reports] == [3, 5, 5, 0]
+
+
+def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
+    reports = []
+    display = Display(reports.append, 1.0)
+    display.device(INFO)
+    display.set_zero((0.0, 0.0, -9e6, 0.0, 0.0, 0.0))  # a plate of 9 N
+    one = np.zeros(1, np.int64)
+    display.take(ReadingBlock(one, one, one, one / 1.0, one, np.array([[4.5e6, 0.0, -18e6, 0.0, 0.0, 0.0]])))
+    display.look(Health())
+    [report] = (one for one in reports if isinstance(one, HealthReport))
+    assert report.load[:3] == report.peak[:3] == pytest.approx((4.5 / 36, 0.0, 0.5))
 
 
 def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and_go_with_another(seat):

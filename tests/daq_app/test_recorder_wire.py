@@ -46,7 +46,7 @@ ASKED = [
 ]
 TOLD = [
     Device(INFO, Frame("-z", "set", 20.0, "set")),
-    HealthReport(Health(received=7), 200.5, SIX, SIX, 0),
+    HealthReport(Health(received=7), 200.5, (*SIX, 2.0), (*SIX, 2.0), 0),
     Live(
         1, np.arange(3), np.arange(3.0), np.arange(3) * 7, np.arange(18.0).reshape(3, 6), np.zeros(3, int), SIX[:6], 4
     ),

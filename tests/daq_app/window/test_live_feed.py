@@ -81,15 +81,6 @@ def test_a_reading_that_the_device_calls_invalid_moves_no_speed():
     assert speed[np.isfinite(speed)] == pytest.approx(25.0, rel=1e-6)
 
 
-def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
-    feed = LiveFeed()
-    feed.device(INFO)
-    zero = (0.0, 0.0, -9e6, 0.0, 0.0, 0.0)  # a plate of 9 N
-    load = feed.add(live(0, sliding(10, normal=9.0, mu=0.5), zero=zero), FRAME)
-    assert load.shares[2] == pytest.approx(0.5)
-    assert load.shares[0] == pytest.approx(4.5 / 36)
-
-
 def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time():
     feed = LiveFeed()
     feed.device(INFO)

@@ -29,8 +29,7 @@ from session_messages import (
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
-from daq_app.window.live_feed import Load
-from daq_app.window.state import AppState, Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
+from daq_app.window.state import AppState, Dismissed, DrawingFailed, Judged, LifeKnown, NewSession, Tick
 from daq_app.window.view import derive_view
 from drivers.transducer import Health
 from sessions.plan.plan import Frame, Visibility
@@ -38,6 +37,10 @@ from sessions.run import steps
 
 CUT_SHORT = (*MOUNT, m.SessionEnded("recordings/P07", LOST, True))
 RESUME = m.ResumeSession("recordings/P07")
+
+
+def loaded(load, peak=None):
+    return m.HealthReport(Health(), 7000.0, load, peak or load, 0)
 
 
 @pytest.mark.parametrize(
@@ -181,7 +184,7 @@ def test_a_session_that_has_ended_shows_no_recording():
             Dismissed(),
         ),
         (
-            (m.Device(INFO, None), Loaded(Load((0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.9)))),
+            (m.Device(INFO, None), loaded((0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.9))),
             "wrong",
             "Fz",
             m.AcknowledgeOverloads(),
@@ -226,7 +229,7 @@ def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
 
 
 def test_the_health_lamp_names_what_was_lost():
-    report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 6, (0.0,) * 6, 0)
+    report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 7, (0.0,) * 7, 0)
     bench = derive_view(after(m.Device(INFO, None), report)).bench
     assert (bench.lamp, bench.lamp_words) == ("look", "3 lost")
     assert bench.rate == "6998 Hz (set 7000)"
@@ -234,9 +237,7 @@ def test_the_health_lamp_names_what_was_lost():
 
 
 def test_an_overload_stays_until_somebody_acknowledges_it():
-    state = after(
-        m.Device(INFO, None), Loaded(Load((0.0, 0.0, 0.4, 0.0, 0.0, 0.9, 1.3))), Loaded(Load((0.1,) * 6 + (0.2,)))
-    )
+    state = after(m.Device(INFO, None), loaded((0.1,) * 6 + (0.2,), (0.1, 0.1, 0.4, 0.1, 0.1, 0.9, 1.3)))
     bench = derive_view(state).bench
     [combined] = [bar for bar in bench.bars if bar.name == "combined"]
     assert (combined.share, combined.peak, combined.over) == (0.2, 1.3, True)
@@ -247,9 +248,9 @@ def test_an_overload_stays_until_somebody_acknowledges_it():
 
 
 def test_what_was_acknowledged_does_not_come_back_with_a_report_that_was_on_its_way():
-    loaded = m.HealthReport(Health(), 7000.0, (0.0,) * 6, (1.4,) * 6, 0, 0.0, 1.4)
-    eased = m.HealthReport(Health(), 7000.0, (0.0,) * 6, (0.2,) * 6, 0, 0.0, 0.2)
-    state = after(m.Device(INFO, None), loaded, m.AcknowledgeOverloads(), loaded, eased)
+    state = after(
+        m.Device(INFO, None), loaded((1.4,) * 7), m.AcknowledgeOverloads(), loaded((1.4,) * 7), loaded((0.2,) * 7)
+    )
     assert not derive_view(state).bench.can_acknowledge
 
 
