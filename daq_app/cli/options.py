@@ -3,8 +3,9 @@
 import argparse
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from daq_app.console import WrongValue
 from sessions.plan.plan import Finger, SessionPlan
@@ -62,17 +63,6 @@ def add_seed(parser: argparse.ArgumentParser, use: str, default: int | None = 0,
     add_number(parser, "--seed", int, (0, largest), use, default)
 
 
-def add_simulated_people(parser: argparse.ArgumentParser, meaning: str) -> None:
-    """Declare --simulate-subject, the seed of simulated people."""
-    add_number(parser, "--simulate-subject", int, (0, LARGEST), meaning, metavar="SEED")
-
-
-def add_height(parser: argparse.ArgumentParser, meaning: str) -> None:
-    """Declare --height of the face, which a protocol may state as well."""
-    words = f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} (mm)"
-    add_number(parser, "--height", float, HEIGHTS, meaning, None, "MM", words)
-
-
 def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
     """Return the numbers of an option given as NAME=VALUE, by name. Raises WrongValue with the example."""
     numbers: dict[str, float] = {}
@@ -101,47 +91,46 @@ def add_visit(parser: argparse.ArgumentParser, further: str = "") -> None:
     parser.add_argument("--subject", metavar="CODE", help=f"of a study: whose visit with forces{further}")
 
 
-def add_quantity(parser: argparse.ArgumentParser, use: str) -> None:
-    """Declare --quantity, which is put to some use in place of the SED."""
-    meaning = f"of the ending, {use} in place of the SED: {', '.join(NAMES)}"
-    parser.add_argument("--quantity", choices=NAMES, default=SED.name, metavar="NAME", help=meaning)
-
-
-def add_kinematics(parser: argparse.ArgumentParser, meaning: str) -> None:
-    """Declare --kinematics."""
-    parser.add_argument("--kinematics", choices=["small", "finite"], default="small", help=meaning)
-
-
-def add_tau(parser: argparse.ArgumentParser, meaning: str) -> None:
-    """Declare --tau."""
-    parser.add_argument("--tau", choices=["computed", "as-printed"], default="computed", help=meaning)
-
-
-def add_paths(parser: argparse.ArgumentParser, meaning: str, default: str | None) -> None:
-    """Declare --paths, which is `default` where it is not given."""
-    choices = ["small", "finite"]
-    parser.add_argument(
-        "--paths", nargs="?", const="small", choices=choices, default=default, metavar="finite", help=meaning
-    )
-
-
-def add_variants(parser: argparse.ArgumentParser, meaning: str, default: str | None = None) -> None:
-    """Declare --variants, which was called --beside before."""
-    choices = ["none", "small", "both"]
-    parser.add_argument("--variants", "--beside", dest="variants", choices=choices, default=default, help=meaning)
-
-
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Declare where many solves run: processes of this computer or a Dask cluster."""
-    add_number(parser, "--workers", int, (1, 1024), "processes on this computer (as many as cores)", metavar="N")
-    meaning = "of a Dask cluster you trust, such as tls://host:8786, in place of this computer"
-    parser.add_argument("--scheduler", type=_address, metavar="ADDRESS", help=meaning)
-
-
 def _address(text: str) -> str:
     if re.fullmatch(r"[a-z]+://[^/\s]+:\d+", text) is None:
         raise WrongValue(f"--scheduler {text} is not allowed: scheme, host and port, as tcp://host:8786")
     return text
+
+
+_STRAINS = ["small", "finite"]
+_HEIGHTS = f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} (mm)"
+# Options that more than one verb declares. {} stands for what a verb says of them, which is all where no help is here.
+_SHARED: Mapping[str, dict[str, Any]] = {
+    "quantity": {
+        "choices": NAMES, "default": SED.name, "metavar": "NAME",
+        "help": f"of the ending, {{}} in place of the SED: {', '.join(NAMES)}",
+    },
+    "kinematics": {"choices": _STRAINS, "default": "small"},
+    "tau": {"choices": ["computed", "as-printed"], "default": "computed"},
+    "paths": {"nargs": "?", "const": "small", "choices": _STRAINS, "default": "none", "metavar": "finite"},
+    "variants": {"choices": ["none", "small", "both"], "default": "small"},
+    "height": {"type": within("--height", float, *HEIGHTS, _HEIGHTS), "metavar": "MM"},
+    "simulate_subject": {"type": within("--simulate-subject", int, 0, LARGEST), "metavar": "SEED"},
+    "headless": {"action": "store_true", "help": "no window: answers at the terminal, or simulated"},
+    "workers": {
+        "type": within("--workers", int, 1, 1024), "metavar": "N",
+        "help": "processes on this computer (as many as cores)",
+    },
+    "scheduler": {
+        "type": _address, "metavar": "ADDRESS",
+        "help": "of a Dask cluster you trust, such as tls://host:8786, in place of this computer",
+    },
+}  # fmt: skip
+_BEFORE = {"variants": ["--beside"]}  # what an option was called before
+
+
+def add_shared(parser: argparse.ArgumentParser, *names: str, **uses: str) -> None:
+    """Declare options that several verbs have; `uses` say what some of them mean in this one."""
+    for name in (*names, *uses):
+        options = [f"--{name.replace('_', '-')}", *_BEFORE.get(name, ())]
+        how: dict[str, Any] = {"help": "{}"} | _SHARED[name]
+        how["help"] = how["help"].format(uses.get(name))
+        parser.add_argument(*options, **how)
 
 
 FINGER = ("tip_radius", "width", "contact_angle")

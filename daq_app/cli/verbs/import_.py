@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.cli.options import add_height
+from daq_app.cli.options import add_shared
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.wording import number
 
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--units", metavar="N,Nmm", help="of forces and torques: N,Nmm or N,Nm")
     parser.add_argument("--axes", metavar="t,Fx,...", help="what the columns are, from the first on; - leaves one out")
     parser.add_argument("--normal", metavar="AXIS", help="axis along which pressing is positive, e.g. -z")
-    add_height(parser, "of the stimulus's face above the origin")
+    add_shared(parser, height="of the stimulus's face above the origin")
     parser.add_argument("--rate", type=float, metavar="HZ", help="readings a second, where the file has no times")
     parser.add_argument("--zeroed", action="store_true", help="the file's zeros are those of the unloaded transducer")
     parser.add_argument("--subject", metavar="CODE", help="a code, never a name (unknown)")

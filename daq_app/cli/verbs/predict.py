@@ -14,11 +14,8 @@ from daq_app.batch.derived import analyse_session, open_visit, predict_session
 from daq_app.cli.options import (
     add_analysis,
     add_flag,
-    add_kinematics,
     add_number,
-    add_quantity,
-    add_tau,
-    add_variants,
+    add_shared,
     add_visit,
     area_law,
     calibration_error,
@@ -40,22 +37,18 @@ EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_visit(parser)
-    add_kinematics(
-        parser, "small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding"
-    )
-    add_tau(
-        parser, "reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed"
+    add_shared(
+        parser,
+        kinematics="small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding",
+        tau="reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed",
+        quantity="to print (--json has all)",
+        variants="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about "
+        "a second), or at finite strain too (about a minute: limits are looked for where a surface has no settled "
+        "slide)",
     )
     meaning = "scene file with another finger; friction and loading are the trials'"
     parser.add_argument("--scene", type=Path, metavar="FILE", help=meaning)
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
-    add_quantity(parser, "to print (--json has all)")
-    add_variants(
-        parser,
-        "also with tau_max as printed, at the measured force, and slid the other way: at small strain (about a "
-        "second), or at finite strain too (about a minute: limits are looked for where a surface has no settled slide)",
-        "small",
-    )
     add_flag(parser, "--intervals", "also what the uncertainty of friction makes of each SED (more solves)")
     meaning = "also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration"
     add_flag(parser, "--afferent", meaning)

@@ -8,16 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_afferent, stored_options
-from daq_app.cli.options import (
-    add_analysis,
-    add_flag,
-    add_paths,
-    add_quantity,
-    add_variants,
-    add_visit,
-    area_law,
-    calibration_error,
-)
+from daq_app.cli.options import add_analysis, add_flag, add_shared, add_visit, area_law, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.plan.plan import Blinded
 from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
@@ -37,19 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_visit(parser, "; all its scores join in")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
-    add_paths(
+    add_shared(
         parser,
-        "also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
-        None,
-    )
-    add_variants(
-        parser,
-        "also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
-        "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
+        paths="also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
+        variants="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both "
+        "ways; with 'both' at finite strain too (about a minute); small, or all that was predicted before",
+        quantity="to hold against scores and rivals",
     )
     meaning = "also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept"
     add_flag(parser, "--afferent", f"{meaning} before)")
-    add_quantity(parser, "to hold against scores and rivals")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_analysis(parser)
 
@@ -107,7 +94,7 @@ def _check_scores(visit: Recording, recording: Recording) -> None:
 def _prediction_options(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
     """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
     before = stored_options(recording) or PredictionOptions()
-    variants = max(before.variants, options.variants or "small", key=("none", "small", "both").index)
+    variants = max(before.variants, options.variants, key=("none", "small", "both").index)
     return replace(before, intervals=True, variants=variants, course="history")
 
 
@@ -121,7 +108,7 @@ def _further(
     """Return the intervals of the SEDs, and what was asked for beside."""
     reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
     paths = None
-    if options.paths is not None and recording.plan.forces:
+    if options.paths != "none" and recording.plan.forces:
         finite = options.paths == "finite"
         progress = console.reporter("many paths of the analysis", until=0.9)
         paths = trial_paths(recording, prediction, progress, finite=finite, quantity=BY_NAME[options.quantity])

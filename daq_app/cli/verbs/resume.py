@@ -7,7 +7,7 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from daq_app.cli.options import add_flag, add_session, add_simulated_people
+from daq_app.cli.options import add_flag, add_session, add_shared
 from daq_app.cli.terminal import attend_session
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
@@ -23,8 +23,7 @@ EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
     parser.add_argument("--device", metavar="URI", help="the transducer (where it was when the session began)")
-    add_flag(parser, "--headless", "no window: answers at the terminal, or simulated")
-    add_simulated_people(parser, "simulated people (those of the beginning)")
+    add_shared(parser, "headless", simulate_subject="simulated people (those of the beginning)")
     parser.add_argument("--pace", type=float, help="simulated seconds a real second (as at the beginning)")
     add_flag(parser, "--end", "seal the session as it is, and do not go on")
 

@@ -13,9 +13,8 @@ from typing import get_args
 from daq_app.cli.options import (
     add_body_arguments,
     add_flag,
-    add_height,
     add_number,
-    add_simulated_people,
+    add_shared,
     body_of,
     own_sentence,
 )
@@ -46,12 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="of the stimulus order (a new one, recorded, unless given)")
     parser.add_argument("--phases", nargs="+", choices=get_args(Phase), help="of the visit (the protocol's own)")
     add_body_arguments(parser)
-    add_flag(parser, "--headless", "no window: answers at the terminal, or simulated")
-    add_simulated_people(parser, "simulated people")
+    height = "of the stimulus's face above the sensor's origin"
+    add_shared(parser, "headless", simulate_subject="simulated people", height=height)
     parser.add_argument(
         "--pace", type=float, default=1.0, help="simulated seconds a real second, simulated people only (1)"
     )
-    add_height(parser, "of the stimulus's face above the sensor's origin")
     parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
     words = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
     add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", words)

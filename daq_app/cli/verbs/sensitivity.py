@@ -28,7 +28,7 @@ from daq_app.batch.sensitivity import (
     usual_design,
 )
 from daq_app.batch.sign_map import Answer
-from daq_app.cli.options import add_kinematics, add_quantity, add_seed, add_workers
+from daq_app.cli.options import add_seed, add_shared
 from daq_app.console import DONE, Console, WrongValue, table
 from daq_app.wording import number
 from sessions.prediction import QUANTITIES
@@ -54,12 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"({OF_FINGERS})",
     )
     add_seed(parser, "of the samples (0)", largest=math.inf)
-    add_quantity(parser, "whose signs are shown")
-    add_kinematics(parser, "strain of every finger but the one change that takes the other")
     parser.add_argument(
         "--keep", type=Path, metavar="FILE", help="answers of many fingers, written as they come: another run goes on"
     )
-    add_workers(parser)
+    meaning = "strain of every finger but the one change that takes the other"
+    add_shared(parser, "workers", "scheduler", quantity="whose signs are shown", kinematics=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -20,13 +20,9 @@ from daq_app.batch.pool import Shelf, visits
 from daq_app.cli.options import (
     LARGEST_SEED,
     add_analysis,
-    add_kinematics,
     add_number,
-    add_paths,
-    add_quantity,
     add_seed,
-    add_tau,
-    add_workers,
+    add_shared,
     area_law,
     calibration_error,
     numbers_by_key,
@@ -166,16 +162,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--synthetic", int, (0, LARGEST_SEED), meaning, metavar="SEED")
     meaning = "page, table and results (FOLDER/pooled); with --synthetic the study too"
     parser.add_argument("--out", type=Path, metavar="DIR", help=meaning)
-    add_workers(parser)
-    add_kinematics(parser, "as for 'daq-app predict'; finite strain takes ten times as long")
-    add_paths(
+    add_shared(
         parser,
-        "also along every other reasonable choice of the analysis: a second or two more a session; with 'finite' at "
-        "finite strain too, up to a minute more",
-        "none",
+        "workers",
+        "scheduler",
+        kinematics="as for 'daq-app predict'; finite strain takes ten times as long",
+        paths="also along every other reasonable choice of the analysis: a second or two more a session; with "
+        "'finite' at finite strain too, up to a minute more",
+        tau="as for 'daq-app predict'",
+        quantity="to hold against scores and rivals",
     )
-    add_tau(parser, "as for 'daq-app predict'")
-    add_quantity(parser, "to hold against scores and rivals")
     parser.add_argument(
         "--intervals",
         action=argparse.BooleanOptionalAction,
