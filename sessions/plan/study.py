@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
+from zlib import crc32
 
 import msgspec
 
@@ -191,16 +192,18 @@ def check_code(what: str, code: str) -> None:
 STUDY_FILE = "study.sqlite"
 KEY_FILE = "sealed-key.json"
 VERSION = 1
+HEAD = ("version", "protocol", "seed", "key_sha256")  # what the check sum of the head is of, in this order
 PATIENCE = 10.0  # waiting for another program that is enrolling [s]
 
 TABLES = (
-    "CREATE TABLE head (name TEXT PRIMARY KEY, value TEXT NOT NULL)",  # protocol (its TOML text), seed, key_sha256
+    # protocol (its TOML text), seed, key_sha256; crc32 is that of the other values
+    "CREATE TABLE head (name TEXT PRIMARY KEY, value TEXT NOT NULL)",
     """CREATE TABLE events (
         number INTEGER PRIMARY KEY, -- from 1 without gaps
         utc TEXT NOT NULL,
         kind TEXT NOT NULL,         -- created, enrolled, withdrawn, labels_told, unblinded
         subject TEXT NOT NULL,      -- code; empty where it is about no subject
-        data TEXT NOT NULL          -- JSON object
+        data TEXT NOT NULL          -- JSON object; crc32 in it is that of all else, absent in older files
     )""",
 )
 
@@ -227,16 +230,13 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
     except FileExistsError:
         again = f"{folder} is a study already, and its protocol is fixed: enrol without --protocol"
         raise StudyError(again) from None
-    head = {
-        "version": str(VERSION),
-        "protocol": protocol_text,
-        "seed": str(seed),
-        "key_sha256": "" if key is None else key.sha256,
-    }
+    values = (str(VERSION), protocol_text, str(seed), "" if key is None else key.sha256)
+    head: dict[str, str] = dict(zip(HEAD, values, strict=True))
     try:
         with _changing(folder) as connection:
             for table in TABLES:
                 connection.execute(table)
+            head["crc32"] = str(_check_sum(*head.values()))
             connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
             if key is not None:  # before the study counts as made: without its key it would be lost
                 document = {
@@ -330,8 +330,22 @@ def _add_event(folder: Path, subject: str, choose: Callable[[Study], tuple[str, 
 def _tell(connection: sqlite3.Connection, kind: str, subject: str, data: Mapping[str, Any]) -> None:
     (last,) = connection.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()
     utc = datetime.now(UTC).isoformat(timespec="seconds")
+    data = {**data, "crc32": _check_sum(last + 1, utc, kind, subject, json.dumps(data))}
     text = json.dumps(data, ensure_ascii=False, allow_nan=False)
     connection.execute("INSERT INTO events VALUES (?, ?, ?, ?, ?)", (last + 1, utc, kind, subject, text))
+
+
+def _check_sum(*values: object) -> int:
+    return crc32("\n".join(map(str, values)).encode())
+
+
+def _event(number: int, utc: str, kind: str, subject: str, text: str) -> StudyEvent:
+    """Return an event as it was stored. Raises ValueError where it is damaged."""
+    data = json_object(text)
+    if data.pop("crc32", None) not in (None, _check_sum(number, utc, kind, subject, json.dumps(data))):
+        raise ValueError(f"event {number} is not what it was")
+    row = (number, utc, kind, subject, data)
+    return StudyEvent(*msgspec.convert(row, tuple[int, str, str, str, dict[str, Any]]))
 
 
 def _study(connection: sqlite3.Connection, folder: Path) -> Study:
@@ -340,16 +354,16 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
     if head.get("version") != str(VERSION):
         raise StudyError(f"{path} is of version {head.get('version')}; this program reads {VERSION}")
     events = connection.execute("SELECT number, utc, kind, subject, data FROM events ORDER BY number").fetchall()
+    check_sum = head.pop("crc32", None)  # none in older files
     try:
+        if check_sum not in (None, str(_check_sum(*(head[name] for name in HEAD)))):
+            raise ValueError("its head is not what it was")
         study = Study(
             name=folder.resolve().name,
             protocol=from_toml(str(head["protocol"]), Protocol, f"{path}: the protocol"),
             seed=int(head["seed"]),
             key_sha256=head["key_sha256"] or None,
-            events=tuple(
-                StudyEvent(*msgspec.convert((*row, json_object(data)), tuple[int, str, str, str, dict[str, Any]]))
-                for *row, data in events
-            ),
+            events=tuple(_event(*row) for row in events),
         )
         _ = study.members, study.unblinded  # whatever their events lack is found here, and not where they are used
     except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:

@@ -120,6 +120,30 @@ def test_an_enrolment_that_was_cut_short_is_undone_and_the_study_goes_on(folder,
     assert enrol(killed, "P02", Body()).slot == 1
 
 
+@pytest.mark.parametrize(
+    ("stored", "flipped"),
+    [(b"strokes_allowed", b"strokes_allowee"), (b"6.5", b"6.7"), (b"P01", b"Q01"), (b"+00:00", b"+01:00")],
+)
+def test_a_bit_that_flips_in_what_was_stored_is_named(folder, stored, flipped):
+    enrol(folder, "P01", Body(Finger(6.5)))
+    content = (folder / "study.sqlite").read_bytes()
+    assert stored in content
+    (folder / "study.sqlite").write_bytes(content.replace(stored, flipped))
+    with pytest.raises(StudyError, match=r"is damaged .*restore it from a copy"):
+        open_study(folder)
+
+
+def test_a_study_of_before_there_were_check_sums_is_opened_and_gets_them_with_its_next_event(folder):
+    enrol(folder, "P01", Body())
+    with closing(sqlite3.connect(folder / "study.sqlite")) as connection, connection:
+        connection.execute("DELETE FROM head WHERE name = 'crc32'")
+        connection.execute("UPDATE events SET data = json_remove(data, '$.crc32')")
+    assert enrol(folder, "P02", Body()).slot == 1
+    with closing(sqlite3.connect(folder / "study.sqlite")) as connection:
+        texts = [text for (text,) in connection.execute("SELECT data FROM events ORDER BY number")]
+    assert ["crc32" in text for text in texts] == [False, False, True]
+
+
 def test_of_two_programs_that_make_one_study_at_once_one_is_refused_and_takes_nothing_away(tmp_path, monkeypatch):
     new_key = study._new_key
 
