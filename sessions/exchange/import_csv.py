@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.calibration import Calibration
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
@@ -149,8 +149,6 @@ def _common_unit(what: str, headed: set[str | None], stated: str | None, factors
         raise ColumnsUnknown(f"the header has the {what} in {unit}, but --units says {stated}: give one of the two up")
     return unit
 
-
-Array = NDArray[np.float64]
 
 ORIGINAL_FILE = "original.csv"
 RATE_TOLERANCE = 0.01  # a stated rate may differ so much from the one the file's times hold [-]

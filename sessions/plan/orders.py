@@ -15,8 +15,8 @@ from functools import cache
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.plan.plan import SessionPlan, Stimulus, Trial
 
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"  # no vowels: no label spells a word
@@ -123,8 +123,6 @@ def opaque_codes(count: int, seed: int) -> tuple[str, ...]:
 def _digest(text: str) -> bytes:
     return hashlib.sha256(text.encode()).digest()
 
-
-Array = NDArray[np.float64]
 
 _PSES, _SPREADS = 41, 15  # of the grid: steps of a fortieth of the indices' range, and of a third of a spread
 _LAPSES = (0.0, 0.05)

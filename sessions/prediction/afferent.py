@@ -11,12 +11,10 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.prediction.stored import Ends, SessionPrediction, TrialPrediction
 from solver.quantities import NAMES, QUANTITIES, SED, Quantity
-
-Array = NDArray[np.float64]
 
 STEP = 1e-3  # [s]
 ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"

@@ -11,15 +11,13 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.special import ndtri
 
+from drivers.arrays import Array
 from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, at_depths
 from solver import Scene
-
-Array = NDArray[np.float64]
 
 POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom

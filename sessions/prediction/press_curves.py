@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.prediction.finger_fit import LoadingCurve
 from sessions.prediction.relaxation_fit import HoldCurve
 from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings, Stroke
 from sessions.strokes.analysis import analyse_blocks
-
-Array = NDArray[np.float64]
 
 LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
 STANDS = 0.01  # a stage stands while it is so near its greatest travel, as a share of that [-] ...

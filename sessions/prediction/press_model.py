@@ -10,15 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from drivers.arrays import Array, Indices
 from sessions.prediction.scenes import settled_predictions
 from solver import Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
 from solver.progress import Progress, report_part
 from solver.response.nearby import stiffness_shares
-
-Array = NDArray[np.float64]
 
 LAYERS = ("epidermis", "dermis", "fat")  # the bone is rigid
 # Orthonormal contrasts of three log stiffnesses: skin's two layers, and both against the fat.
@@ -200,7 +198,7 @@ def _design(rings: Sequence[int]) -> Array:
     return np.array(points)
 
 
-def _orders(degree: int) -> NDArray[np.int64]:
+def _orders(degree: int) -> Indices:
     """Return the orders (c, 2) of the Chebyshev products up to a total degree."""
     return np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)])
 

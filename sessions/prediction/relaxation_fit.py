@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from sessions.prediction.finger_fit import QUANTILES, FingerFit, Interval, LoadingCurve, fit
 from sessions.prediction.press_model import LAYERS, FitError, PressModel
 from solver import Relaxation, Scene
-
-Array = NDArray[np.float64]
 
 BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they hang together for about that [s]
 TRIED = 60  # of each number at once, between bounds that are drawn closer ...
@@ -182,7 +180,7 @@ def _fading(time: Array, elastic: Array, times: Array) -> Array:
     return out
 
 
-def _means(block: NDArray[np.int64], values: Array) -> Array:
+def _means(block: Indices, values: Array) -> Array:
     """Return the means (b, ...) of values (n, ...) over blocks numbered (n,) in order."""
     firsts = np.flatnonzero(np.diff(block, prepend=-1))
     counts = np.diff(np.append(firsts, len(block)))

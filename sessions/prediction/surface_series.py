@@ -8,15 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from solver import Friction, Loading, Scene, SceneError, Solve
 from solver.quantities import NAMES
 from solver.response.receptor_row import rough_responses
 from solver.scene.published import SLIPPERINESS, STICKINESS, Surface, scene
 from solver.scene.published import scene as published
-
-Array = NDArray[np.float64]
 
 SERIES: Mapping[str, tuple[Surface, ...]] = {"stickiness": STICKINESS, "slipperiness": SLIPPERINESS}
 SED = NAMES.index("sed")

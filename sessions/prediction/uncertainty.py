@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from sessions.prediction.options import PredictionOptions, tau_scale
 from sessions.prediction.scenes import (
     Progress,
@@ -44,8 +44,6 @@ from sessions.strokes.bootstrap import FrictionDraws, friction_draws
 from solver import Prediction, Scene
 from solver.response.nearby import Nearby
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Drawn = FrictionDraws | str  # what the friction of a trial may have been, or why that is not known
 
 SAMPLES = 60  # draws that are solved where derivatives do not suffice

@@ -7,8 +7,8 @@ import zlib
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from drivers.readings import ReadingBlock
 from sessions.recording.head import compact_json
 from sessions.recording.log import LoggedEvent
@@ -117,7 +117,7 @@ def block_from_blobs(columns: tuple[bytes, ...]) -> ReadingBlock:
 
     Raises ValueError when the columns differ in length.
     """
-    arrays: dict[str, NDArray[np.int64] | NDArray[np.float64]] = {
+    arrays: dict[str, Indices | Array] = {
         name: np.frombuffer(column, kind) for (name, kind), column in zip(COLUMNS.items(), columns, strict=True)
     }
     return ReadingBlock(**{**arrays, "raw": arrays["raw"].reshape(-1, 6)})  # pyright: ignore[reportArgumentType]  columns differ in type

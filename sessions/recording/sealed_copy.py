@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Indices
 from sessions.recording.hdf5_file import new_hdf5
 from sessions.recording.head import calibration_hash
 from sessions.recording.log import OUTCOMES
@@ -247,7 +248,7 @@ def _same(stored: NDArray[Any], expected: NDArray[Any]) -> bool:
     return stored.shape == expected.shape and stored.astype(expected.dtype).tobytes() == expected.tobytes()
 
 
-def _int64(values: Sequence[int]) -> NDArray[np.int64]:
+def _int64(values: Sequence[int]) -> Indices:
     return np.array(values, "<i8")
 
 

@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from drivers.arrays import Array
 from sessions.prediction import Fields, History, Response, Skin
 from sessions.prediction.stored import Ends, TrialNumbers
 from sessions.statistics.correlations import Relation
@@ -19,7 +17,6 @@ from sessions.strokes import Stroke
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 
 

@@ -8,8 +8,8 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.scenes import doubt_of
@@ -21,8 +21,6 @@ from sessions.strokes.analysis import Analysis
 from sessions.strokes.bootstrap import NUMBERS
 from sessions.strokes.forces import in_face_frame
 from sessions.strokes.stroke import AreaLaw, Flaw, Stroke
-
-Array = NDArray[np.float64]
 
 MOST_INSTANTS = 600  # of a stroke's course that a picture can show
 GAP = 5.0  # usual steps in time [-]; a longer one may show that readings are missing
@@ -112,7 +110,7 @@ def _trace(stroke: Stroke) -> Trace | None:
     return Trace(begin, *(column[kept] for column in columns))
 
 
-def _extremes(values: Array) -> NDArray[np.int64]:
+def _extremes(values: Array) -> Indices:
     """Return positions of the least and the greatest value of each stretch of time, rising, both ends among them.
 
     >>> _extremes(np.array([1.0, 5.0, 2.0])).tolist()

@@ -7,8 +7,8 @@ before any contact, and ends no earlier than `after_lift` seconds after the last
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
@@ -17,7 +17,6 @@ from sessions.strokes.contacts import ContactDetector, Onset, is_quiet
 from sessions.strokes.forces import normal_force
 from sessions.strokes.settings import DetectorSettings
 
-Array = NDArray[np.float64]
 Noticed = Zeroed | ContactOnset | FingerLifted | Settled
 
 

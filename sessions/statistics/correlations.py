@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtrit
+
+from drivers.arrays import Array
 
 CONFIDENCE = 0.95
 TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the ends of an interval
@@ -109,7 +111,7 @@ def _rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
     return float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
 
 
-def _ranks(values: Sequence[float]) -> NDArray[np.float64]:
+def _ranks(values: Sequence[float]) -> Array:
     """Return the ranks from 1 on, the same for values equal but for round-off: the middle of those they share.
 
     >>> _ranks([3.0, 1.0, 3.0])
@@ -195,7 +197,7 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
     return Contrast(n, difference, low, high, z, math.erfc(abs(z) / math.sqrt(2.0)))
 
 
-def partial_correlation(xy: ArrayLike, xz: ArrayLike, yz: ArrayLike) -> NDArray[np.float64]:
+def partial_correlation(xy: ArrayLike, xz: ArrayLike, yz: ArrayLike) -> Array:
     """Return correlations of x and y given z, from their three correlations; nan where z determines one of them."""
     xy, xz, yz = (np.asarray(r, np.float64) for r in (xy, xz, yz))
     left = (1 - xz * xz) * (1 - yz * yz)

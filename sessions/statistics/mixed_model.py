@@ -10,15 +10,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy import linalg, optimize, special
 
+from drivers.arrays import Array
 from sessions.statistics.correlations import CONFIDENCE, t_quantile
 from sessions.statistics.scores import sd_interval
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 _STARTS = (0.3, 3.0)  # spreads relative to what is left: the search starts from each pair, and the best end is kept
 _WIDEST = 1e3  # such a spread: scores have three figures, and a step of the search may not go beyond

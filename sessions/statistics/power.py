@@ -11,13 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
 from sessions.statistics.scores import SCALE
 from sessions.statistics.within_subjects import repeated_correlation
 
-Array = NDArray[np.float64]
 ALPHA = 0.05  # of the study's confirmatory test, two-sided
 _MIDDLE = sum(SCALE) / 2.0
 FRICTION = (0.24, 0.67)  # least and greatest µ of the published surfaces

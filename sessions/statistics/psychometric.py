@@ -21,13 +21,11 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize, special
 
+from drivers.arrays import Array
 from sessions.statistics.correlations import CONFIDENCE
 from sessions.statistics.scores import IntervalEstimate
-
-Array = NDArray[np.float64]
 
 QUARTILE = float(special.ndtri(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
 LEAST_LEVELS = 3  # of x: two fit any PSE and JND, and tell nothing of lapses

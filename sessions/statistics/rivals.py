@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from drivers.arrays import Array
 from sessions.prediction import BY_NAME, SED
 from sessions.statistics.correlations import (
     TAILS,
@@ -19,7 +20,7 @@ from sessions.statistics.correlations import (
     required_cases,
     spearman,
 )
-from sessions.statistics.mixed_model import Array, akaike_weights, crossed_deviance
+from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
 from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 

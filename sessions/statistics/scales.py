@@ -23,16 +23,15 @@ from itertools import combinations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse import csgraph
 
+from drivers.arrays import Array, Indices
 from sessions.statistics.correlations import TAILS
 from sessions.statistics.mixed_model import Term, mixed_model
 from sessions.statistics.psychometric import QUARTILE, binomial_deviance
 from sessions.statistics.scores import IntervalEstimate, by_key
 
-Array = NDArray[np.float64]
 Model = Literal["Bradley–Terry", "Thurstone V"]
 MODELS: tuple[Model, ...] = ("Bradley–Terry", "Thurstone V")
 
@@ -348,7 +347,7 @@ class _AnswerTable(NamedTuple):
     counts: Array  # (s, k) repeats
     within: Array  # (s,) sum of squares of repeats about their means
 
-    def values(self, who: NDArray[np.int64]) -> Array:
+    def values(self, who: Indices) -> Array:
         """Return means over the subjects `who` (b, s) by √2 s: (b, k); nan where nothing scatters about them."""
         cells, counts = self.cells[who], self.counts[who]
         means = cells.mean(axis=1)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from drivers.arrays import Array
 from sessions.statistics.correlations import CONFIDENCE, t_quantile
 
-Array = NDArray[np.float64]
 Table = Mapping[str, Mapping[int, float]]  # subject -> stimulus' index -> score, as `scores.score_matrix` gives it
 
 

@@ -5,8 +5,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
@@ -29,8 +27,6 @@ from sessions.toml_file import SettingsError, from_table
 if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader
     from sessions.recording.reader import Recording
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Blocks = Iterable[tuple[Trial | None, ReadingBlock]]  # readings of trials, or of a recording without any (None)
 
 

@@ -10,13 +10,12 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
 from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.stroke import Interval, Rule, Stroke, StrokeCurve
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 _OF_SESSION = 2**32 - 1  # in the seed, where a stroke has its number
@@ -329,7 +328,7 @@ class _Repeats:
         draws = onset_draws((curve.time, curve.unfiltered), onset, noise, wrong, self._settings, self._draw)
         return {} if draws is None else {"onset": draws}
 
-    def _sample(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:
+    def _sample(self, count: int) -> tuple[Indices, Array, Array]:
         """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""
         repeats = self._settings.repeats
         trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))

@@ -11,12 +11,10 @@ from statistics import fmean, median
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.strokes.forces import peaks
 from sessions.strokes.settings import AnalysisSettings, DetectorSettings
-
-Array = NDArray[np.float64]
 
 NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over the median absolute step between neighbours
 

@@ -8,13 +8,11 @@ speed, at which it is detected, that decides.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.strokes.contacts import onset_threshold
 from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.stick import ClimbReadings, thin
-
-Array = NDArray[np.float64]
 
 
 def onset_draws(

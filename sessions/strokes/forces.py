@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.plan.plan import Frame
-
-Array = NDArray[np.float64]
 
 
 def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:

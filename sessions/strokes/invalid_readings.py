@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices, Mask
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.strokes.contacts import NORMAL_STEP
 from sessions.strokes.settings import SignalSettings
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def spikes(raw: Array, settings: SignalSettings) -> Mask:
@@ -39,7 +36,7 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
     return marked
 
 
-def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> NDArray[np.int64]:
+def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> Indices:
     """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
     there, back = steps[:-width], steps[width:]
     places = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
@@ -126,7 +123,7 @@ def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: Signal
     return constant
 
 
-def _usual(lengths: NDArray[np.int64]) -> float:
+def _usual(lengths: Indices) -> float:
     """Return the length of run that nine tenths of all readings do not exceed; without readings none is unusual."""
     if not len(lengths):
         return np.inf

@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Mask
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
 from sessions.strokes import invalid_readings as invalid
@@ -17,8 +17,6 @@ from sessions.strokes.stroke import Flaw, FlawName, significant
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 

@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices, Mask
 from sessions.strokes.settings import AnalysisSettings, SteadySettings
 from sessions.strokes.span import Span, Track, mean_vector
 from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName, significant
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Places = NDArray[np.int64]
 
 _QUARTERS = 4
 _ROUNDING = 1e-9  # instants are known to the last bit, or rounded by people [s]
@@ -48,7 +44,7 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
     return _trim(ratio, slice(int(first[best]), int(last[best])), settings)
 
 
-def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Places, Places, Array, Mask]:
+def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Indices, Indices, Array, Mask]:
     """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
     edges = np.unique(np.linspace(0, len(ratio), rule.steady_edges).round().astype(int))
     finite = np.isfinite(ratio)
@@ -73,7 +69,7 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Pla
     return first, last, variance, steady
 
 
-def _least(length: Places, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
+def _least(length: Indices, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
     """Return which steady stretch of about the `shortest` length varies least; of the longest, where none is as long.
 
     Lengths within a step of the `grid` are alike.

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices, Mask
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame
@@ -13,8 +13,6 @@ from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, 
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.signal_quality import SignalQuality, segments
 from sessions.strokes.stroke import FlawName, StrokeCurve
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +37,7 @@ class QuietWindows:
 
     time: Array  # (n,) of all readings [s]
     wrench: Array  # (n, 6) of all readings, face frame, not zeroed [N, N mm]
-    bounds: NDArray[np.int64]  # (k, 2) first and past-last reading
+    bounds: Indices  # (k, 2) first and past-last reading
 
     def before(self, instant: float, longest: float) -> Zero | None:
         """Return the zero of the last quiet windows that end by `instant` [s], over at most `longest` [s]."""
@@ -51,7 +49,7 @@ class QuietWindows:
         started = self.bounds[self.time[self.bounds[:, 0]] > instant]
         return self._over(started, longest) if len(started) else None
 
-    def _over(self, windows: NDArray[np.int64], longest: float) -> Zero:
+    def _over(self, windows: Indices, longest: float) -> Zero:
         start, stop = windows[0]
         for first, last in windows[1:]:
             low, high = min(start, first), max(stop, last)
@@ -87,7 +85,7 @@ def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSet
     return QuietWindows(time, wrench, np.column_stack([firsts, firsts + length]).astype(np.int64))
 
 
-def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array, Array]:
+def _spread(axes: Array, starts: Indices, length: int) -> tuple[Array, Array]:
     """Return the standard deviations (k, m) of axes (n, m) in windows from `starts` (k,), and their noise (k, m).
 
     Noise is estimated from the median step, which slow movement hardly changes.
@@ -95,9 +93,6 @@ def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array,
     windows = np.lib.stride_tricks.sliding_window_view(axes, length, axis=0)[starts]  # (k, m, length)
     noise = NORMAL_STEP * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
     return windows.std(axis=2, ddof=1), noise
-
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Array, Mask
 from sessions.strokes.settings import AnalysisSettings, ClimbSettings
-
-Array = NDArray[np.float64]
 
 
 class Climb(NamedTuple):
@@ -210,7 +209,7 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
     return StickSlip(float((len(drops) - 1) / (time[drops[-1]] - time[drops[0]])), climb)
 
 
-def _beginnings(marked: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _beginnings(marked: Mask) -> NDArray[np.intp]:
     return np.flatnonzero(marked & ~np.concatenate([[False], marked[:-1]]))
 
 

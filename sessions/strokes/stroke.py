@@ -11,12 +11,9 @@ from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import Annotated, Any, Literal, NamedTuple, get_origin, get_type_hints
 
-import numpy as np
-from numpy.typing import NDArray
-
+from drivers.arrays import Array
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 
-Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 

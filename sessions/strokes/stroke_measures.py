@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import StrokeDecisions
@@ -33,8 +33,6 @@ from sessions.strokes.stroke import (
     Stroke,
     significant,
 )
-
-Array = NDArray[np.float64]
 
 _SLIDES_BEFORE = "the contact slides before T/N stops climbing"
 _NO_PEAK = "no static peak stands out"

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Mask
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
@@ -35,8 +35,6 @@ ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recordi
 ZERO_STATED = "as recorded, stated to be true"
 RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Pair = tuple[float, float]
 
 

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from sessions.report.contents import Array, Course, PredictionFinding, StrokeFinding, Trace
+from drivers.arrays import Array
+from sessions.report.contents import Course, PredictionFinding, StrokeFinding, Trace
 from sessions.report.figures.style import (
     GREEN,
     GREY,

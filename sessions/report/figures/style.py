@@ -20,7 +20,7 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from scipy.optimize import isotonic_regression
 
-from sessions.report.contents import Array
+from drivers.arrays import Array
 from sessions.report.wording import identifier
 
 SKY = "#56B4E9"  # normal force
