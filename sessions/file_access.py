@@ -231,6 +231,19 @@ def json_value(text: str | bytes) -> object:
         raise ValueError("lists or objects are nested too deep") from error
 
 
+def leaves(document: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield what a document holds that holds no more names, each under all names on the way to it.
+
+    >>> list(leaves({"a": {"b": 1, "c": {"d": [2]}}}))
+    [('a.b', 1), ('a.c.d', [2])]
+    """
+    for name, value in document.items():
+        if isinstance(value, Mapping):
+            yield from leaves(cast("Mapping[str, Any]", value), f"{within}{name}.")
+        else:
+            yield f"{within}{name}", value
+
+
 def _no_number(name: str) -> NoReturn:
     raise ValueError(f"{name} is no number that this program stores")
 

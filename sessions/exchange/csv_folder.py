@@ -50,7 +50,8 @@ def find(path: Path) -> Path | None:
 def read(path: Path) -> ExportedSession:
     """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
     head = head_of(json_object(read_within_limit(path / DESCRIPTION_FILE)))
-    events = tuple(logged_event(row, "kind") for row in _rows_of(path / EVENTS))
+    rows_read = csv.DictReader(io.StringIO(read_within_limit(path / EVENTS).decode(), newline=""))
+    events = tuple(logged_event({name: plain(cell) for name, cell in row.items()}, "kind") for row in rows_read)
     return ExportedSession("csv", path, head, events, lambda: _read_readings(path / READINGS), side_files(path))
 
 
@@ -83,11 +84,6 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
     with path.open(encoding="utf-8", newline="") as file:
         header = next(file, "")
         yield from read_rows(file, header.strip().split(","), ",")
-
-
-def _rows_of(path: Path) -> list[dict[str, str]]:
-    text = io.StringIO(read_within_limit(path).decode(), newline="")
-    return [{name: plain(cell) for name, cell in row.items()} for row in csv.DictReader(text)]
 
 
 def _readme(recording: Recording, contents: Sequence[tuple[str, str, Sequence[Column]]]) -> str:

@@ -11,16 +11,17 @@ answers, strokes, friction and predictions are tables.
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, event_columns, tables
+from sessions.file_access import leaves
 from sessions.recording import Recording
 from sessions.recording.hdf5_file import new_hdf5
 from sessions.recording.head import compact_json
@@ -168,20 +169,12 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
 
 def _events(recording: Recording, first_ns: int) -> Table:
     events = recording.events
-    texts = tuple("; ".join(f"{name}: {value}" for name, value in _flat(event.data)) for event in events)
+    texts = tuple("; ".join(f"{name}: {value}" for name, value in leaves(event.data)) for event in events)
     _, time, kind, _, readings, _ = event_columns(events)
     seconds = Column("timestamp", "", "s from the start", tuple((e.time_ns - first_ns) * 1e-9 for e in events))
     trial = Column("trial", "", "number of the trial; 0 for none", tuple(e.trial or 0 for e in events))
     data = Column("data", "", "what else is known, for people; exact in the notes", texts)
     return Table("events", "Everything that happened, in order.", (seconds, time, kind, trial, readings, data))
-
-
-def _flat(data: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, object]]:
-    for name, value in data.items():
-        if isinstance(value, Mapping):
-            yield from _flat(cast("Mapping[str, Any]", value), f"{within}{name}.")
-        else:
-            yield f"{within}{name}", value
 
 
 def _dynamic(table: Table, mark: str) -> object:

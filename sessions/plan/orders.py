@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, product
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from sessions.plan.plan import SessionPlan, Stimulus, Trial
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"  # no vowels: no label spells a word
 DRAWS = 10_000  # of an order that is to meet constraints
 
-Item = int | str
+Item = TypeVar("Item", int, str)
 
 
 def shuffle(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
@@ -81,7 +82,7 @@ def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item
         for i, j in combinations(range(count), 2)
         for a, b in [(circle[i], circle[j]) if 2 * (j - i) <= count else (circle[j], circle[i])]
     }
-    return tuple(orders[str(key)] for key in shuffle(tuple(orders), seed, name))
+    return tuple(orders[key] for key in shuffle(tuple(orders), seed, name))
 
 
 def pairs_with(
@@ -173,17 +174,13 @@ def _chances(indices: tuple[int, ...]) -> Array:
     reach = float(max(indices) - min(indices))
     step = reach / (len(indices) - 1)
     pses = np.linspace(float(min(indices)), float(max(indices)), _PSES)
-    spreads = np.geomspace(step / 5.0, reach, _SPREADS)
+    spreads, root = np.geomspace(step / 5.0, reach, _SPREADS), math.sqrt(2.0)
     return np.array(
         [
-            [lapse / 2.0 + (1.0 - lapse) * _normal(sense * (i - pse) / spread) for i in indices]
+            [lapse / 2.0 + (1.0 - lapse) / 2.0 * math.erfc(sense * (pse - i) / spread / root) for i in indices]
             for pse, spread, sense, lapse in product(pses, spreads, (1.0, -1.0), _LAPSES)
         ]
     ).clip(1e-6, 1.0 - 1e-6)
-
-
-def _normal(z: float) -> float:
-    return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
 def _expected_entropy(weight: Array, chance: Array) -> Array:

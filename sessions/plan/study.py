@@ -163,7 +163,7 @@ class Study:
         if self.rows is None:
             return slot + 1
         cycles, within = divmod(slot, self.rows)
-        return int(shuffle(range(self.rows), self.seed, f"rows/{cycles}")[within]) + 1
+        return shuffle(range(self.rows), self.seed, f"rows/{cycles}")[within] + 1
 
     def session_seed(self, slot: int) -> int:
         """Return the seed of what else chance decides for a slot: the same for all visits of a subject."""

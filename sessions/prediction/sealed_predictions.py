@@ -35,7 +35,7 @@ def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
     sha256 = digest(numbers)
     document = {
         "sealed_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "blinded": _closed(recording),
+        "blinded": recording.plan.key_sha256 is not None and load_derived(recording.folder, UNBLINDING) is None,
         "sha256": sha256,
         "numbers": numbers,
         "options": prediction["options"],
@@ -74,11 +74,6 @@ def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]
     same = _same(numbers, now)
     shown = "the predictions shown are those" if same else "the predictions shown here are others, made since"
     return f"Predictions were {when} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {shown}."
-
-
-def _closed(recording: Recording) -> bool:
-    """Say whether the session's key is still sealed."""
-    return recording.plan.key_sha256 is not None and load_derived(recording.folder, UNBLINDING) is None
 
 
 def _how_blind(recording: Recording, *, blinded: bool) -> str:

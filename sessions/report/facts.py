@@ -4,9 +4,10 @@ import hashlib
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import asdict, fields, replace
 from typing import Any
 
+from sessions.file_access import leaves
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Block, Origin
 from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings, usual_settings
@@ -254,18 +255,14 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         for name, words in settings.items()
     ]
     if info is not None:
-        facts.append(Fact("analysis", "; ".join(_describe_settings(analysis.settings, AnalysisSettings()))))
+        facts.append(Fact("analysis", "; ".join(_describe_settings(analysis.settings))))
     return tuple(fact for fact in facts if fact.value)
 
 
-def _describe_settings(chosen: Any, usual: Any, prefix: str = "") -> list[str]:  # noqa: ANN401 - any settings dataclass
+def _describe_settings(settings: AnalysisSettings) -> list[str]:
     """Return every setting with its value; those that differ from the usual ones are marked."""
-    words: list[str] = []
-    for field in fields(chosen):
-        value, default = getattr(chosen, field.name), getattr(usual, field.name)
-        if is_dataclass(value):
-            words += _describe_settings(value, default, f"{prefix}{field.name}.")
-        else:
-            shown = f"{value:g}" if isinstance(value, float) else str(value)
-            words.append(f"{prefix}{field.name} {shown}{'' if value == default else ' (set)'}")
-    return words
+    usual = dict(leaves(asdict(AnalysisSettings())))
+    return [
+        f"{name} {f'{value:g}' if isinstance(value, float) else value}{'' if value == usual[name] else ' (set)'}"
+        for name, value in leaves(asdict(settings))
+    ]

@@ -209,10 +209,6 @@ class Findings:
         for number in withheld:
             self.reasons.setdefault(number, str(name))
 
-    def numbers_or_none(self, names: tuple[str, ...]) -> Mapping[str, Any]:
-        """Return the numbers under these names, None for those that are missing or forbidden."""
-        return {name: None if name in self.reasons else self.numbers.get(name) for name in names}
-
 
 HERTZ = 2.0 / 3.0
 PLANNED_AT = 2.0  # normal force at which an area that grows is the planned one, where nobody said another [N]

@@ -74,7 +74,7 @@ def measure_stroke(
             _judge_way(findings, track, window)
         _apply_decisions(findings, track, decided)
         _judge_drift(findings, zero, track.settings.zero)
-    numbers = dict(findings.numbers_or_none(EVERYTHING))
+    numbers = {name: None if name in findings.reasons else findings.numbers.get(name) for name in EVERYTHING}
     if trial is not None and numbers["direction"] not in (None, trial.direction):
         way = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
         sentence = f"The finger moved the other way than the trial asks ({way})."

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_strokes import (
     CALIBRATION,
-    COUNTS,
     HEIGHT,
     INFO,
     PLAIN,
@@ -224,12 +223,6 @@ def test_a_trial_of_which_no_reading_can_be_used_has_no_stroke_and_says_so():
     assert analysis.strokes == ()
     assert {str(flaw.name) for flaw in analysis.flaws} == {"saturated", "no_stroke"}
     assert "Only 0 of 800 readings can be used" in analysis.flaws[-1].sentence
-
-
-def test_counts_need_an_unloaded_stretch_to_show_even_a_contact():
-    raw = felt(made(T, SWAYING, HALF, ALONG))[INSIDE] / np.diag(COUNTS.matrix)
-    case = Case(block(T[INSIDE], raw), extra={"info": replace(INFO, calibration=COUNTS)})
-    assert found(case, trial()).strokes == ()
 
 
 @pytest.mark.parametrize(("share", "fires"), [(0.10, False), (0.3, True)])

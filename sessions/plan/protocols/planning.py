@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 
-from sessions.plan.orders import Item, draw, next_comparison, pairs, pairs_with, shuffle, williams
+from sessions.plan.orders import draw, next_comparison, pairs, pairs_with, shuffle, williams
 from sessions.plan.plan import (
     DISTAL_TO_PROXIMAL,
     PROXIMAL_TO_DISTAL,
@@ -210,7 +210,7 @@ class _Blocks:
             if self.protocol.scale.answer == "choice":
                 by_code = self._by_code(outline)
                 drawn_pairs = self._pairs(outline, tuple(by_code), repetition, name)
-                orders.append(tuple(by_code[str(code)] for pair in drawn_pairs for code in pair))
+                orders.append(tuple(by_code[code] for pair in drawn_pairs for code in pair))
             elif self.row is not None:
                 orders.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
             else:
@@ -233,7 +233,7 @@ class _Blocks:
 
     def _pairs(
         self, outline: BlockOutline, codes: Sequence[str], repetition: int, name: str
-    ) -> tuple[tuple[Item, Item], ...]:
+    ) -> tuple[tuple[str, str], ...]:
         """Return the pairs of one repetition: every two, or each with the standard where there is one."""
         if outline.standard is None:
             return pairs(codes, self.seed, name)
@@ -248,18 +248,18 @@ class _Blocks:
             tuple(by_code),
             self.seed,
             name,
-            lambda codes: self.protocol.order.meets([by_code[str(code)] for code in codes], begun_with),
+            lambda codes: self.protocol.order.meets([by_code[code] for code in codes], begun_with),
         )
         if order is None:
             raise SettingsError(f"no order of {outline.name} was found that meets the constraints; use another seed")
-        return tuple(by_code[str(code)] for code in order)
+        return tuple(by_code[code] for code in order)
 
     def _row_of_design(self, outline: BlockOutline, row: int) -> tuple[int, ...]:
         """Return a row of the Williams design, whose letters chance deals to the codes for the whole study."""
         by_code = self._by_code(outline)
         letters = shuffle(tuple(by_code), self.design_seed, f"{outline.name}/letters")
         rows = williams(len(letters))
-        return tuple(by_code[str(letters[letter])] for letter in rows[row % len(rows)])
+        return tuple(by_code[letters[letter]] for letter in rows[row % len(rows)])
 
     def _by_code(self, outline: BlockOutline) -> dict[str, int]:
         return {self.labels[outline.descriptor, index]: index for index in outline.indices}

@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from sessions.plan.orders import Item, draw, opaque_codes
+from sessions.plan.orders import draw, opaque_codes
 from sessions.plan.plan import Frame, Phase, Rests, Visibility
 from sessions.plan.protocols.languages import (
     ENGLISH,
@@ -277,11 +277,8 @@ class Protocol:
         if self.order.first_differs and block.repetitions > len(set(block.indices) - set(self.order.not_first)):
             what = "more repetitions than stimuli that may be first, and first_differs asks for another each time"
             raise NotAllowed(f"{key}.repetitions", block.repetitions, what)
-        if self.order.constrained and draw(block.indices, 0, block.name, self._meets) is None:
+        if self.order.constrained and draw(block.indices, 0, block.name, self.order.meets) is None:
             raise NotAllowed(f"{key}.indices", list(block.indices), "no order of these meets what [order] asks for")
-
-    def _meets(self, order: Sequence[Item]) -> bool:
-        return self.order.meets([int(item) for item in order])
 
 
 def check_phases(protocol: Protocol, phases: Sequence[Phase]) -> None:

@@ -22,7 +22,11 @@ def models_table(study: StudyFindings) -> Table | None:
     """Return the mixed models of scores on the model's response and on index, with how far subjects differ."""
     quantity = BY_NAME[study.response]
     groups = [
-        (f"{one.descriptor}: score on {what}, {_fit_text(model)}", _terms(model, quantity))
+        (
+            f"{one.descriptor}: score on {what}, {model.n} scores of {plural(model.subjects, 'subject')}"
+            f"{', singular fit' if model.singular else ''}",
+            _terms(model, quantity),
+        )
         for one in study.descriptors
         for what, model in _models(one, study)
         if not isinstance(model, str)
@@ -70,11 +74,6 @@ def missing_scores(study: StudyFindings) -> list[str]:
         sentences += [] if one.within else [f"No intervals within subjects: {within}; {have}."]
         sentences += [] if one.differences else [f"No differences of surfaces of {one.descriptor}: {pairs}."]
     return sentences
-
-
-def _fit_text(model: MixedModel) -> str:
-    singular = ", singular fit" if model.singular else ""
-    return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
 
 
 def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
