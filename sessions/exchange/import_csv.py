@@ -382,9 +382,7 @@ def _origin(stated: object) -> Origin:
 
 
 def _defaults(frame: Frame) -> tuple[str, ...]:
-    sentences: list[str] = []
-    if frame.normal_origin == "default":
-        sentences.append(f"the normal force is taken along {frame.normal} (default; --normal states another)")
-    if frame.height_origin == "default":
-        sentences.append(f"the face's height is taken as {frame.height:g} mm (default; --height states another)")
-    return tuple(sentences)
+    normal = f"the normal force is taken along {frame.normal} (default; --normal states another)"
+    height = f"the face's height is taken as {frame.height:g} mm (default; --height states another)"
+    stated = ((frame.normal_origin, normal), (frame.height_origin, height))
+    return tuple(sentence for origin, sentence in stated if origin == "default")

@@ -23,9 +23,9 @@ from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, event_columns, tables
 from sessions.file_access import leaves
 from sessions.recording import Recording
-from sessions.recording.hdf5_file import new_hdf5
 from sessions.recording.head import compact_json
 from sessions.recording.manifest import description
+from sessions.recording.sealed_copy import new_hdf5
 
 if TYPE_CHECKING:
     from pynwb import NWBFile

@@ -7,9 +7,11 @@
 # pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false, reportIndexIssue=false
 # h5py brings no types; every array is given its type where it leaves this file.
 
+import io
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -20,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.arrays import Indices
-from sessions.recording.hdf5_file import new_hdf5
 from sessions.recording.head import calibration_hash
 from sessions.recording.log import OUTCOMES
 from sessions.recording.reader import Recording
@@ -29,6 +30,61 @@ from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FI
 CHUNK_BYTES = 32_768  # as a chunk of the readings' columns has
 EVENT_DATA = "events/data"  # a data set of texts, of which an answer's may be thousands of times another's
 END = "_end"  # of the name of the data set that holds where each text ends
+
+
+class _Disk(io.RawIOBase):
+    """Takes what HDF5 writes, and keeps the first failure: told of it, the library leaves a file it cannot close."""
+
+    def __init__(self, path: Path) -> None:
+        """Make the file."""
+        self.failure: OSError | None = None
+        self._file = path.open("x+b", buffering=0)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        """Go to a place in the file."""
+        return self._file.seek(offset, whence)
+
+    def readinto(self, buffer: Any, /) -> int | None:  # noqa: ANN401  whatever has a buffer
+        """Read from there."""
+        return self._file.readinto(buffer)
+
+    def write(self, data: Any, /) -> int:  # noqa: ANN401
+        """Write there, and say that all was written."""
+        rest = memoryview(data).cast("B")
+        count = len(rest)
+        try:
+            while self.failure is None and rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return count
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Give the file this size."""
+        try:
+            return self._file.truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return size or 0
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+        super().close()
+
+
+@contextmanager
+def new_hdf5(path: Path, **more: Any) -> Generator[h5py.File]:  # noqa: ANN401  what h5py.File takes
+    """Lend a new HDF5 file. Raises OSError once it is closed where the disk did not take all."""
+    with _Disk(path) as disk:
+        try:
+            with h5py.File(disk, "w", **more) as file:
+                yield file
+        except Exception:  # of whatever kind, when what was not written is read again
+            if disk.failure is None:
+                raise
+        if disk.failure is not None:
+            raise disk.failure
 
 
 def write_texts(file: h5py.File, name: str, column: Iterable[str]) -> tuple[h5py.Dataset, h5py.Dataset]:

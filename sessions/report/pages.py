@@ -192,24 +192,20 @@ _RESPONSES: Mapping[str, tuple[str, str]] = {
     for one in QUANTITIES
     if one is not SED
 }
-_OWN: Mapping[str, str] = {
-    SIMULATED: "yes where transducer or subject were simulated",
-    "session": "folder of the session",
-    "subject": "code of the subject",
-    "excluded": "why the trial is left out of every number of the study; empty where it counts",
-}
 
 
-def _heading(name: str) -> str:
-    return heading(name, {**_MEANING, **_RESPONSES}[name][0])
+def _columns(study: StudyFindings) -> Mapping[str, tuple[str, str]]:
+    """Return unit and meaning of each column of `trials_csv`, by its name."""
+    simulated = {SIMULATED: ("", "yes where transducer or subject were simulated")} if study.simulated else {}
+    own = {"session": ("", "folder of the session"), "subject": ("", "code of the subject")}
+    excluded = {"excluded": ("", "why the trial is left out of every number of the study; empty where it counts")}
+    return {**simulated, **own, **_MEANING, **_RESPONSES, **excluded}
 
 
 def columns_csv(study: StudyFindings) -> str:
     """Return a row for each column of `trials_csv`: its name, its unit and its meaning."""
-    first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
-    rows = [["column", "unit", "meaning"], *([name, "", _OWN[name]] for name in first)]
-    rows += [[_heading(name), *meaning] for name, meaning in {**_MEANING, **_RESPONSES}.items()]
-    return _csv([*rows, ["excluded", "", _OWN["excluded"]]])
+    rows = ([heading(name, unit), unit, meaning] for name, (unit, meaning) in _columns(study).items())
+    return _csv([["column", "unit", "meaning"], *rows])
 
 
 def paths_csv(study: StudyFindings) -> str:
@@ -243,18 +239,15 @@ def trials_csv(study: StudyFindings) -> str:
 
     R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
     """
-    names = list(_MEANING)  # paths have a table of their own
-    heads = [_heading(name) for name in (*names, *_RESPONSES)]
-    mark = [SIMULATED] if study.simulated else []
-    rows: list[list[object]] = [[*mark, "session", "subject", *heads, "excluded"]]
+    rows: list[list[object]] = [[heading(name, unit) for name, (unit, _) in _columns(study).items()]]
     copies = dict(study.copies)
     for visit in study.visits:
         for row in visit.rows:
             decision = exclusion_of(study.excluded, visit.subject, row.descriptor)
             why = "" if decision is None else decision.why
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
-            cells = ["yes" if visit.simulated else "no"] if mark else []
-            own = (" ".join(row.flaws) if name == "flaws" else getattr(row, name) for name in names)
+            cells = ["yes" if visit.simulated else "no"] if study.simulated else []
+            own = (" ".join(row.flaws) if name == "flaws" else getattr(row, name) for name in _MEANING)
             rows.append([*cells, visit.session, visit.subject, *own, *map(row.responses.get, _RESPONSES), why])
     return _csv(rows)
 
