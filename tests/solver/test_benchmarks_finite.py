@@ -7,12 +7,14 @@ import pytest
 
 from solver.body.finite import FiniteBody
 from solver.constitutive import LAWS, stress
+from solver.contact import FrictionLaw
 from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import block, quality
+from solver.verification.published import contacts
 from solver.verification.published.bodies import distort
-from solver.verification.published.finite_contacts import ELEMENT, light_finite
-from solver.verification.published.problems import CAPPED, FINITE_PARTS
+from solver.verification.published.contacts import ELEMENT
+from solver.verification.published.problems import CAPPED, PARTS
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.laws import energy
@@ -88,22 +90,27 @@ def test_without_friction_the_energy_that_is_stored_is_the_work_of_the_press():
 
 
 def test_a_light_contact_is_that_of_hertz():
-    light = light_finite()
-    assert light.found_width() == pytest.approx(light.half_width, rel=0.003)
-    assert light.found_peak() == pytest.approx(light.peak, rel=0.003)
+    light = contacts.light("finite")
+    assert light.half_width < 1.2  # up to there elements are fine
+    assert light.width(light.press) == pytest.approx(light.half_width, rel=0.003)
+    assert light.at_middle(light.press.normal) == pytest.approx(light.peak, rel=0.003)
 
 
 @pytest.mark.parametrize(("k", "force"), CAPPED)
 def test_a_bound_on_it_carries_the_elementary_integral(k, force):
-    drag, width = light_finite().slide_at_bound(0.3, k)
-    assert drag == pytest.approx(force, rel=0.005)
-    assert width == pytest.approx(np.sqrt(1 - k**2), rel=0.005, abs=ELEMENT if k == 1.0 else 0.0)
+    light = contacts.light("finite")
+    law = FrictionLaw(0.3, k * 0.3 * light.peak)
+    state = light.slip(law)
+    assert -state.tangential.sum() / (0.3 * state.normal.sum()) == pytest.approx(force, rel=0.005)
+    assert light.capped_width(state, law) == pytest.approx(
+        np.sqrt(1 - k**2), rel=0.005, abs=ELEMENT["finite"] if k == 1.0 else 0.0
+    )
 
 
-@pytest.mark.parametrize("part", FINITE_PARTS)
+@pytest.mark.parametrize("part", PARTS["finite"])
 def test_its_partial_slip_is_that_of_cattaneo_and_mindlin(part):
-    drag, width, traction = light_finite().shear(0.3, part)
-    half = np.sqrt(1 - drag)
-    assert drag == pytest.approx(part, abs=0.05)
-    assert width == pytest.approx(half, rel=0.02)
-    assert traction == pytest.approx(1 - half, rel=0.02)
+    light = contacts.light("finite")
+    state, half = light.shear(0.3, part), np.sqrt(1 - part)
+    assert -state.tangential.sum() == pytest.approx(part * 0.3 * light.load, rel=1e-6)
+    assert light.stick_width(state, 0.3) == pytest.approx(half, rel=0.02)
+    assert -light.at_middle(state.tangential) / (0.3 * light.peak) == pytest.approx(1 - half, rel=0.005)

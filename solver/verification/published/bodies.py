@@ -1,4 +1,4 @@
-"""Bodies of the published problems: patches of quadrilaterals joined to one mesh, and the stress inside."""
+"""Bodies of the published problems, as quadrilaterals in one mesh, with the stress inside and zones of their skin."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from solver.arrays import Array, Indices
 from solver.body import Probes
 from solver.body.linear import LinearBody
-from solver.contact import OPEN, SLIP
+from solver.contact import OPEN, SLIP, last_edge
 from solver.equilibrium import Newton
 from solver.mesh import Q2P1, Mesh, grid_mesh, local_coordinates, with_middles
 
@@ -189,3 +189,27 @@ def stress_at(body: LinearBody, displacement: Array, element: Indices, local: Ar
 def touching_within(newton: Newton, half_width: float) -> Indices:
     """Return initial states: nodes with |x| below `half_width` slip, the others are open."""
     return np.where(np.abs(newton.skin_x) < half_width, SLIP, OPEN)
+
+
+def half_width(x: Array, force: Array, inside: NDArray[np.bool_]) -> float:
+    """Return the half-width of the zone of nodes `inside` (k,), at whose ends a `force` (k,) falls like a pressure.
+
+    Returns nan where the zone is too short.
+    """
+    high, low = last_edge(x, force, inside), last_edge(-x[::-1], force[::-1], inside[::-1])
+    return float("nan") if high is None or low is None else (high + low) / 2.0
+
+
+def half_above(x: Array, value: Array) -> float:
+    """Return the half-width of the zone of `value` (k,) above 0, interpolated between nodes; 0 without such a zone.
+
+    >>> half_above(np.array([-2.0, -1.0, 0.0, 1.0, 2.0]), np.array([-1.0, -0.5, 0.5, -1.5, -2.0]))
+    0.375
+    """
+    above = np.flatnonzero(value > 0.0)
+    if not len(above):
+        return 0.0
+    first, last = int(above[0]), int(above[-1])
+    low = np.interp(0.0, value[first - 1 : first + 1], x[first - 1 : first + 1])
+    high = np.interp(0.0, value[last : last + 2][::-1], x[last : last + 2][::-1])
+    return float(high - low) / 2.0
