@@ -17,7 +17,7 @@ from typing import cast
 from solver.response.solution import solve
 from solver.scene.tables import Solve
 from solver.verification.methods import Kinematics
-from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
+from solver.verification.request import LeftOut, Request, clock, median_time, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
 # Part of a solve by folder of the solver, or by file or compiled loop where that differs from the folder's.
@@ -53,9 +53,8 @@ class Cost:
     parts: dict[str, float]  # shares of `took_s`
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Cost | LeftOut]:
+def measure(request: Request) -> Iterator[Cost | LeftOut]:
     """Return an iterator over rows, one for each kinematics and tolerance."""
-    del measurements
     works: list[tuple[Kinematics, float]] = [
         (kind, tolerance) for tolerance in request.pick((0.01, 0.003), (0.01,)) for kind in KINEMATICS
     ]

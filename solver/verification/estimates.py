@@ -17,7 +17,7 @@ from solver.scene.tables import Solve
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES, random_scene
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
+from solver.verification.request import LeftOut, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, NUMBERS, cases, known_truths, mean_and_doubt
 
 TOLERANCES = (0.01, 0.003, 0.001)
@@ -75,18 +75,16 @@ class GuaranteedCost:
     worst_error: float | None  # None where the truth of a surface is not certain to a third of the tolerance
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
+def measure(request: Request) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
     """Yield the published surfaces at each tolerance, then random scenes until the time is up."""
     for kinematics in KINEMATICS:
-        yield from _estimate_published(request, measurements, kinematics)
+        yield from _estimate_published(request, kinematics)
     for kinematics in KINEMATICS:
         yield from _random(request, kinematics)
 
 
-def _estimate_published(
-    request: Request, measurements: Measurements, kinematics: Kinematics
-) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
-    truths = known_truths(measurements, kinematics)
+def _estimate_published(request: Request, kinematics: Kinematics) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
+    truths = known_truths(request, kinematics)
     chosen = [scene for scene in cases(kinematics) if scene.title in truths]
     if not chosen:
         return iter([LeftOut(f"No truth is known at {kinematics} strain.")])

@@ -7,7 +7,7 @@ from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import march
 from solver.scene import Scene
 from solver.verification.methods import MESHED, Kinematics
-from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
+from solver.verification.request import LeftOut, Request, clock, median_time, rows_within
 from solver.verification.truth import JUDGED, KINEMATICS, cases
 
 PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and its distance [mm]
@@ -26,9 +26,8 @@ class March:
     difference: float  # of the SED, relative
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[March | LeftOut]:
+def measure(request: Request) -> Iterator[March | LeftOut]:
     """Return an iterator over rows, one for each kinematics and surface."""
-    del measurements
     names = ("slipperiness 100", "stickiness 0") if request.quick else JUDGED
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in names]
     return rows_within(request, scenes, "courses of 200 substeps", lambda scene: [_march(scene)])

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from solver.verification.request import Measurements, Request
+from solver.verification.request import Request
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,8 @@ class Machine:
     versions: dict[str, str]
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Machine]:
+def measure(request: Request) -> Iterator[Machine]:
     """Yield one row."""
-    del measurements
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     threads = os.environ.get("OPENBLAS_NUM_THREADS", "not limited")
     yield Machine(

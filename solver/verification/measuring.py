@@ -1,8 +1,9 @@
 """Run the subjects one after another within the time there is; an early end keeps the rows so far."""
 
 import datetime
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from itertools import chain
 from math import nan
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,37 +13,64 @@ import msgspec
 from solver.failures import SolveFailure
 from solver.response.solution import solve
 from solver.response.stepper import stepper
-from solver.verification.costs import Cost
-from solver.verification.estimates import Estimate, GuaranteedCost
-from solver.verification.growth import Growth
-from solver.verification.hard_cases import HardCase
-from solver.verification.histories import March
-from solver.verification.machine import Machine
-from solver.verification.orders import Order
-from solver.verification.processes import Cold, Memory
-from solver.verification.published.problems import Problem
-from solver.verification.request import Host, LeftOut, Measurements, Request
-from solver.verification.speed import Speed
-from solver.verification.subjects import SUBJECTS, Subject
-from solver.verification.targets import Target
-from solver.verification.truth import Truth, cases
-from solver.verification.warm import Warm
+from solver.verification import (
+    costs,
+    estimates,
+    growth,
+    hard_cases,
+    histories,
+    machine,
+    orders,
+    processes,
+    speed,
+    targets,
+    truth,
+    warm,
+)
+from solver.verification.published import problems
+from solver.verification.request import Host, LeftOut, Request
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 FULL_S, QUICK_S = 140.0, 12.5  # time for the subjects; a running item is finished, and drawing takes more
-# row classes by their names in the JSON file
-KINDS = {
-    kind.__name__: kind
-    for kind in (
-        Machine, Truth, Speed, Estimate, GuaranteedCost, Cost, Warm, March, Cold, Memory, Problem, Order, Growth,
-        HardCase, Target,
-    )
-}  # fmt: skip
 ALWAYS = ("machine", "targets")  # run even after a stop, since they take no time
 Progress = Callable[[float, str], None]
 R = TypeVar("R")
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """The measurement of one file."""
+
+    name: str  # key in the JSON file
+    doing: str  # shown while it runs
+    share: float  # share of the time; unused time is left to later subjects
+    quick_share: float
+    measure: "Callable[[Request], Iterator[DataclassInstance]]"
+    kinds: "tuple[type[DataclassInstance], ...]"  # of its rows
+
+
+# In order: a later subject may use the rows of an earlier one.
+SUBJECTS = (
+    Subject("machine", "machine", 0.0, 0.0, machine.measure, (machine.Machine,)),
+    Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure, (truth.Truth,)),
+    Subject("speed", "time against true error", 38.0, 3.5, speed.measure, (speed.Speed,)),
+    Subject(
+        "estimates", "estimates against true errors", 25.0, 1.8,
+        estimates.measure, (estimates.Estimate, estimates.GuaranteedCost),
+    ),
+    Subject("costs", "cost breakdown", 6.0, 0.6, costs.measure, (costs.Cost,)),
+    Subject("warm", "the warm stepper", 10.0, 1.5, warm.measure, (warm.Warm,)),
+    Subject("histories", "courses against direct states", 8.0, 0.3, histories.measure, (histories.March,)),
+    Subject("processes", "cold starts and memory", 15.0, 2.5, processes.measure, (processes.Cold, processes.Memory)),
+    Subject("problems", "published problems", 10.0, 1.6, problems.measure, (problems.Problem,)),
+    Subject("orders", "orders of convergence", 20.0, 1.3, orders.measure, (orders.Order,)),
+    Subject("growth", "growth with the unknowns", 12.0, 1.2, growth.measure, (growth.Growth,)),
+    Subject("hard_cases", "hard cases", 35.0, 2.0, hard_cases.measure, (hard_cases.HardCase,)),
+    Subject("targets", "targets of speed", 0.0, 0.0, targets.measure, (targets.Target,)),
+)  # fmt: skip
+KINDS = {kind.__name__: kind for subject in SUBJECTS for kind in subject.kinds}  # by their names in the JSON file
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +91,8 @@ class RunResults:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for a JSON file; nan becomes null."""
         rows = {
-            name: [{"kind": type(row).__name__, **asdict(row)} for row in measurements]
-            for name, measurements in self.rows.items()
+            name: [{"kind": type(row).__name__, **asdict(row)} for row in subject_rows]
+            for name, subject_rows in self.rows.items()
         }
         whole = {
             "begun": self.begun, "quick": self.quick, "stopped": self.stopped, "took_s": self.took_s,
@@ -102,7 +130,6 @@ def measure(
     warm_up(progress)  # before the clock starts: the first run on a machine compiles, later ones load
     start = clock()
     end = start + (seconds or (QUICK_S if quick else FULL_S))
-    measurements = Measurements()
     rows: dict[str, tuple[DataclassInstance, ...]] = {}
     took: dict[str, float] = {}
     left_out: list[str] = []
@@ -113,16 +140,15 @@ def measure(
             continue
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
         now = clock()
-        request = Request(quick, now + max(end - now, 0.0) * part, clock, host)
+        request = Request(quick, now + max(end - now, 0.0) * part, clock, host, tuple(chain(*rows.values())))
         subject_rows: list[DataclassInstance] = []
         try:
-            for row in subject.measure(request, measurements):
+            for row in subject.measure(request):
                 progress(min((clock() - start) / (end - start), 0.99), subject.doing)
                 if isinstance(row, LeftOut):
                     left_out.append(row.reason)
                 else:
                     subject_rows.append(row)
-                    measurements.rows.append(row)
         except KeyboardInterrupt:
             stopped = True
             left_out.append(f"Stopped during: {subject.doing}.")
@@ -136,7 +162,7 @@ def warm_up(progress: Progress) -> None:
     """Solve once in each kinematics and take one step, so that all compiled loops are loaded."""
     progress(0.0, "loading compiled loops")
     for kinematics in ("small", "finite"):
-        scene = cases(kinematics)[-1]
+        scene = truth.cases(kinematics)[-1]
         request = replace(scene, solve=replace(scene.solve, tolerance=0.1))
         solve(request)
         if kinematics == "small":

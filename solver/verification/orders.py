@@ -14,7 +14,7 @@ from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.verification.published import contacts, locking
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
+from solver.verification.request import LeftOut, Request, clock, rows_within
 
 Errors = Sequence[float]
 Size = TypeVar("Size", int, float)
@@ -45,9 +45,8 @@ def slope(sizes: Errors, errors: Errors) -> float:
     return round(float(np.polyfit(np.log(sizes), np.log(errors), 1)[0]), 12)
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Order | LeftOut]:
+def measure(request: Request) -> Iterator[Order | LeftOut]:
     """Return an iterator over rows, one for each quantity, until the time is up."""
-    del measurements
     works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, press_orders]
     return rows_within(request, works, "problems whose order is observed", lambda work: work(request.quick))
 

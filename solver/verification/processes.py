@@ -11,7 +11,7 @@ from statistics import median
 from time import perf_counter
 
 from solver.verification.methods import Kinematics
-from solver.verification.request import LeftOut, Measurements, Request
+from solver.verification.request import LeftOut, Request
 from solver.verification.truth import KINEMATICS
 
 SCENE = """[friction]
@@ -67,9 +67,8 @@ class Memory:
     solve_mb: float  # peak above idle
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Cold | Memory | LeftOut]:
+def measure(request: Request) -> Iterator[Cold | Memory | LeftOut]:
     """Yield cold starts and the memory of a solve in each kinematics."""
-    del measurements
     with tempfile.TemporaryDirectory() as folder:
         for what, command in _commands(Path(folder), request.host.python):
             if request.seconds_left <= 0.0 and not what.startswith("daq-app"):

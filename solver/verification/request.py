@@ -1,8 +1,8 @@
-"""The request to a subject, the measurements that it may use, and the clock."""
+"""The request to a subject, with the rows that it may use, and the clock."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from time import get_clock_info, perf_counter, thread_time
@@ -36,12 +36,16 @@ class Host:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Limits of a measurement. No work starts after the instant `until` of the clock `now`."""
+    """Limits of a measurement, and the rows of all subjects before it.
+
+    No work starts after the instant `until` of the clock `now`.
+    """
 
     quick: bool
     until: float
     now: Callable[[], float] = perf_counter
     host: Host = Host()
+    rows: Sequence[DataclassInstance] = ()
 
     @property
     def seconds_left(self) -> float:
@@ -51,13 +55,6 @@ class Request:
     def pick(self, full: Iterable[Kind], quick: Iterable[Kind]) -> list[Kind]:
         """Return the items of a full or a quick run."""
         return list(quick if self.quick else full)
-
-
-@dataclass(slots=True)
-class Measurements:
-    """All rows of all subjects so far."""
-
-    rows: list[DataclassInstance] = field(default_factory=list["DataclassInstance"])
 
     def of(self, kind: type[Kind]) -> list[Kind]:
         """Return the rows of one class, in order."""

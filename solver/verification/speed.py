@@ -10,7 +10,7 @@ from solver.failures import SolveFailure
 from solver.response.finite_answers import alike
 from solver.scene import Scene
 from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
-from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
+from solver.verification.request import LeftOut, Request, clock, median_time, rows_within
 from solver.verification.truth import JUDGED, Truth, cases, known_truths
 
 MESHES: dict[
@@ -50,18 +50,18 @@ class Speed:
         return max(self.errors[name][0] + doubts.get(name, 0.0) for name in JUDGED)
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Speed | LeftOut]:
+def measure(request: Request) -> Iterator[Speed | LeftOut]:
     """Yield a row for each kinematics and mesh, coarse meshes first."""
     pairs: list[tuple[float, Kinematics]] = [
         (fineness, kind) for kind, all_of in (QUICK if request.quick else MESHES).items() for fineness in all_of
     ]
-    if not all(known_truths(measurements, kind) for kind in MESHED):
+    if not all(known_truths(request, kind) for kind in MESHED):
         yield LeftOut("Speeds need the truth of both kinematics, which is not known.")
         return
     patience = LITTLE if request.quick else 1.0
     yield from rows_within(
         request, sorted(pairs), "meshes whose speed is measured",
-        lambda pair: [_row(pair[1], pair[0], known_truths(measurements, pair[1]), patience)],
+        lambda pair: [_row(pair[1], pair[0], known_truths(request, pair[1]), patience)],
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from solver.verification.growth import Growth, between, exponent
 from solver.verification.histories import March
 from solver.verification.methods import Kinematics
 from solver.verification.processes import Cold, Memory
-from solver.verification.request import Measurements, Request
+from solver.verification.request import Request
 from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.truth import JUDGED, KINEMATICS, cases, known_truths
 from solver.verification.warm import SURFACES, Warm
@@ -52,7 +52,7 @@ class Target:
         return f"reach met{where}" if self.measured <= self.reach else "missed"
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Target]:
+def measure(request: Request) -> Iterator[Target]:
     """Yield every row, from the rows of the other subjects."""
     meshes = QUICK if request.quick else MESHES
     further = "finite strain, each further surface"
@@ -65,19 +65,19 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Target]:
         ("finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s),
     )
     for row in at_errors:
-        yield _at_error(measurements, meshes, *row)
-    yield _warm(measurements, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
-    yield _warm(measurements, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
-    yield _march(measurements)
-    yield _cold(measurements)
-    yield from map(_guarantee, measurements.of(GuaranteedCost))
-    for row in measurements.of(Memory):
+        yield _at_error(request, meshes, *row)
+    yield _warm(request, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
+    yield _warm(request, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
+    yield _march(request)
+    yield _cold(request)
+    yield from map(_guarantee, request.of(GuaranteedCost))
+    for row in request.of(Memory):
         yield Target(
             f"memory of a solve, {row.kinematics} strain, above idle", percent(row.tolerance), "MB", 100.0, None,
             row.solve_mb, None, f"{row.dofs} unknowns, estimate {percent(row.error_estimate)}",
         )  # fmt: skip
     for kinematics in ("small", "finite"):
-        rows = [row for row in measurements.of(Growth) if row.kinematics == kinematics]
+        rows = [row for row in request.of(Growth) if row.kinematics == kinematics]
         power = exponent(rows)
         how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns; {_between(rows)}"
         yield Target(
@@ -86,7 +86,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Target]:
 
 
 def _at_error(
-    measurements: Measurements,
+    request: Request,
     meshes: dict[Kinematics, tuple[float, ...]],
     work: str,
     kinematics: Kinematics,
@@ -95,8 +95,8 @@ def _at_error(
     aim: float,
     time: Callable[[Speed], float | None],
 ) -> Target:
-    rows = [row for row in measurements.of(Speed) if row.kinematics == kinematics]
-    doubts = {name: truth.doubt[0] for name, truth in known_truths(measurements, kinematics).items()}
+    rows = [row for row in request.of(Speed) if row.kinematics == kinematics]
+    doubts = {name: truth.doubt[0] for name, truth in known_truths(request, kinematics).items()}
     known = [r for r in rows if r.judged_error is not None]
     accurate = [(took, r) for r in known if r.largest_error(doubts) <= error and (took := time(r)) is not None]
     if not accurate:
@@ -115,8 +115,8 @@ def _error(row: Speed, doubts: Mapping[str, float]) -> str:
     return f"{percent(row.largest_error({}))}, {percent(row.largest_error(doubts))} at most"
 
 
-def _warm(measurements: Measurements, work: str, kinematics: str, reach: float, aim: float) -> Target:
-    rows = [row for row in measurements.of(Warm) if row.kinematics == kinematics]
+def _warm(request: Request, work: str, kinematics: str, reach: float, aim: float) -> Target:
+    rows = [row for row in request.of(Warm) if row.kinematics == kinematics]
     at = f"{percent(PEAK)} of peak"
     if not rows:
         return Target(work, at, "ms", reach, aim, None, None, "")
@@ -127,8 +127,8 @@ def _warm(measurements: Measurements, work: str, kinematics: str, reach: float, 
     return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
 
 
-def _march(measurements: Measurements) -> Target:
-    work, rows = "a course of 200 substeps, by the direct solve", measurements.of(March)
+def _march(request: Request) -> Target:
+    work, rows = "a course of 200 substeps, by the direct solve", request.of(March)
     if not rows:
         return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
     off = max(abs(row.difference) for row in rows)
@@ -139,9 +139,9 @@ def _march(measurements: Measurements) -> Target:
     return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how, part=part)
 
 
-def _cold(measurements: Measurements) -> Target:
+def _cold(request: Request) -> Target:
     work = "`daq-app solve` as a cold process, compiled code cached"
-    rows = [row for row in measurements.of(Cold) if row.what.startswith("daq-app")]
+    rows = [row for row in request.of(Cold) if row.what.startswith("daq-app")]
     if not rows:
         return Target(work, "", "ms", 1000.0, 400.0, None, None, "")
     how = ", ".join(f"{row.what.removeprefix('daq-app solve, ')} {1e3 * row.took_s:.0f} ms" for row in rows)

@@ -17,7 +17,7 @@ from solver.scene import Scene
 from solver.scene.published import scenes
 from solver.scene.tables import Solve
 from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
-from solver.verification.request import LeftOut, Measurements, Request, clock
+from solver.verification.request import LeftOut, Request, clock
 
 KINEMATICS = tuple(MESHED)
 NUMBERS = ("SED of the ending", "normal force", "drag")
@@ -52,9 +52,8 @@ def cases(kinematics: Kinematics) -> list[Scene]:
     return [replace(scene, solve=Solve(kinematics)) for scene in scenes()]
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Truth | LeftOut]:
+def measure(request: Request) -> Iterator[Truth | LeftOut]:
     """Yield the truth of every case; a quick run has coarser meshes, and the judged cases only."""
-    del measurements
     for kinematics in KINEMATICS:
         chosen = [s for s in cases(kinematics) if s.title in JUDGED or not request.quick]
         yield from _truths(request, kinematics, chosen)
@@ -110,6 +109,6 @@ def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[T
     return refused, todo
 
 
-def known_truths(measurements: Measurements, kinematics: Kinematics) -> dict[str, Truth]:
+def known_truths(request: Request, kinematics: Kinematics) -> dict[str, Truth]:
     """Return the truths of the cases that have one, by case name."""
-    return {t.case: t for t in measurements.of(Truth) if t.kinematics == kinematics and t.numbers}
+    return {t.case: t for t in request.of(Truth) if t.kinematics == kinematics and t.numbers}

@@ -18,7 +18,7 @@ from solver.scene import Scene
 from solver.scene.tables import Friction
 from solver.verification.histories import press_and_slide
 from solver.verification.methods import MESHED, Kinematics
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
+from solver.verification.request import LeftOut, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
 PASSES, QUICK_PASSES = 5, 3
@@ -44,9 +44,8 @@ class Warm:
     setup_s: float
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Warm | LeftOut]:
+def measure(request: Request) -> Iterator[Warm | LeftOut]:
     """Return an iterator over rows, one for each kinematics and surface."""
-    del measurements
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (QUICK[kind] if request.quick else SURFACES)]
     unbounded = [replace(scene, friction=Friction(scene.friction.mu)) for scene in scenes]
     passes = QUICK_PASSES if request.quick else PASSES

@@ -24,21 +24,25 @@ from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth, exponent
 from solver.verification.hard_cases import HardCase
 from solver.verification.machine import Machine
-from solver.verification.measuring import RunResults, measure, restore
+from solver.verification.measuring import RunResults, Subject, measure, restore
 from solver.verification.methods import FiniteMethod
 from solver.verification.orders import Order
 from solver.verification.processes import Cold
 from solver.verification.published.problems import Problem
 from solver.verification.random_scenes import random_scene
-from solver.verification.request import Host, LeftOut, Measurements, Request, median_time, rows_within
+from solver.verification.request import Host, LeftOut, Request, median_time, rows_within
 from solver.verification.speed import MESHES, QUICK, Speed
-from solver.verification.subjects import Subject
 from solver.verification.truth import JUDGED, SHIFTED, SHIFTED_QUICK, Truth, cases
 from solver.verification.warm import Warm
 
 HOST = Host({}, tuple(interpreter()))
 FOREVER = Request(quick=True, until=perf_counter() + 1e6, host=HOST)
 OVER = Request(quick=True, until=perf_counter() - 1.0, host=HOST)
+
+
+def knowing(*rows, request=FOREVER):
+    """Return a request whose subject may use these rows."""
+    return replace(request, rows=rows)
 
 
 def speed(kinematics, dofs, error, first, floor=1e-3, failed=()):
@@ -84,8 +88,8 @@ ROWS = {
 
 @pytest.fixture(scope="module")
 def example():
-    found = Measurements([row for rows in ROWS.values() for row in rows])
-    rows = {**ROWS, "targets": tuple(targets.measure(FOREVER, found))}
+    found = knowing(*(row for rows in ROWS.values() for row in rows))
+    rows = {**ROWS, "targets": tuple(targets.measure(found))}
     took = dict.fromkeys(rows, 1.0)
     return RunResults("2026-11-21T20:00:00+00:00", False, False, took, rows, ("Growth was not followed further.",))
 
@@ -140,7 +144,7 @@ def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
 
 
 def test_an_aim_met_by_a_part_of_what_was_asked_says_by_which_part(example):
-    small = [r for r in targets.measure(FOREVER, Measurements([speed("small", 900, 0.005, 3e-4)])) if r.reach == 5.0]
+    small = [r for r in targets.measure(knowing(speed("small", 900, 0.005, 3e-4))) if r.reach == 5.0]
     assert [row.verdict for row in small] == ["aim met by 6 of them"]
     assert verdict(example, "warm stepper, finite strain, p99 of a reading").verdict == "aim met by 1 of 4 surfaces"
 
@@ -216,8 +220,8 @@ def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_told(example):
 
 
 def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over_before_them():
-    coarse = Measurements([speed("finite", 900, 0.02, 4e-3)])
-    rows = [row for row in targets.measure(FOREVER, coarse) if row.work.startswith("finite strain, one")]
+    coarse = knowing(speed("finite", 900, 0.02, 4e-3))
+    rows = [row for row in targets.measure(coarse) if row.work.startswith("finite strain, one")]
     assert {row.verdict for row in rows} == {"not measured"}
     assert all("2 %" in row.how for row in rows)
 
@@ -225,7 +229,7 @@ def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over
 def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
     lame = speed("finite", 900, 1e-6, 1e-3, failed=("slipperiness 55",))
     assert lame.judged_error is None
-    rows = {r.work: r for r in targets.measure(FOREVER, Measurements([lame]))}
+    rows = {r.work: r for r in targets.measure(knowing(lame))}
     assert rows["finite strain, one surface from undeformed"].measured is None
 
 
@@ -240,8 +244,8 @@ def test_the_truth_is_of_meshes_that_are_finer_than_all_whose_error_is_held_agai
 def test_an_error_that_the_truth_is_too_uncertain_to_tell_is_neither_met_nor_missed():
     truths = [Truth("finite", name, (5e-3, 0.1, 0.06), (4e-4, 0.0, 0.0), (9,) * 3, 1.0, "") for name in JUDGED]
     meshes = [speed("finite", 900 + n, 5e-4, 1e-2) for n in range(len(QUICK["finite"]))]
-    found = Measurements([*truths, *meshes])
-    rows = {r.at_error: r for r in targets.measure(FOREVER, found) if r.work == "finite strain, one surface"}
+    found = knowing(*truths, *meshes)
+    rows = {r.at_error: r for r in targets.measure(found) if r.work == "finite strain, one surface"}
     assert rows["0.15 %"].verdict == "aim met"
     assert rows["0.06 %"].verdict == "not measured"
     assert "0.05 %, 0.09 % at most" in rows["0.06 %"].how
@@ -252,7 +256,7 @@ def test_a_guaranteed_tolerance_has_no_true_error_where_the_truth_of_one_surface
     doubts = ((0.0,) * 3, (0.1,) * 3)
     truths = [Truth("small", one.title, (5e-3, 0.1, 0.06), doubts[n], (9,) * 3, 1.0, "") for n, one in enumerate(small)]
     monkeypatch.setattr(estimates, "TOLERANCES", (0.1,))
-    rows = [list(estimates.measure(OVER, Measurements(truths[:count]))) for count in (1, 2)]
+    rows = [list(estimates.measure(knowing(*truths[:count], request=OVER))) for count in (1, 2)]
     worst = [row.worst_error for part in rows for row in part if isinstance(row, GuaranteedCost)]
     assert worst[0] is not None
     assert worst[1] is None
@@ -267,7 +271,7 @@ def test_a_mesh_without_the_truth_of_one_of_the_surfaces_meets_nothing():
 def test_a_cold_start_at_one_kinematics_says_that_it_is_only_one():
     (row,) = [
         row
-        for row in targets.measure(FOREVER, Measurements([Cold("daq-app solve, small strain", 5, 0.3, 0.3)]))
+        for row in targets.measure(knowing(Cold("daq-app solve, small strain", 5, 0.3, 0.3)))
         if row.work.startswith("`daq-app solve`")
     ]
     assert row.verdict == "aim met by 1 of 2 processes"
@@ -275,7 +279,7 @@ def test_a_cold_start_at_one_kinematics_says_that_it_is_only_one():
 
 def test_a_cold_start_for_which_time_is_over_is_named(monkeypatch):
     monkeypatch.setattr(processes, "_run", lambda _: (1.0, 1.0))
-    rows = list(processes.measure(OVER, Measurements()))
+    rows = list(processes.measure(OVER))
     assert [row.what for row in rows if isinstance(row, Cold)] == [
         f"daq-app solve, {kinematics} strain" for kinematics in ("small", "finite")
     ]
@@ -290,13 +294,13 @@ def test_a_published_surface_without_an_answer_is_named_and_not_counted(monkeypa
         "solve_many",
         lambda scenes: [NotConverged("It folds.") if n else solve(one) for n, one in enumerate(scenes)],
     )
-    rows = list(estimates.measure(OVER, Measurements(truths)))
+    rows = list(estimates.measure(knowing(*truths, request=OVER)))
     assert [row.surfaces for row in rows if isinstance(row, GuaranteedCost)] == [1]
     assert LeftOut(f"{small[1].title} at small strain has no answer at 1 %: It folds.") in rows
 
 
 def test_what_was_not_measured_is_said_to_be_so_and_not_missed():
-    rows = list(targets.measure(FOREVER, Measurements()))
+    rows = list(targets.measure(FOREVER))
     assert {row.verdict for row in rows} == {"not measured"}
 
 
@@ -357,7 +361,7 @@ def subject(name, *rows):
                 raise row
             yield row
 
-    return Subject(name, f"the {name}", 1.0, 1.0, measure)
+    return Subject(name, f"the {name}", 1.0, 1.0, measure, ())
 
 
 def quiet(*_):

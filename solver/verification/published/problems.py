@@ -10,7 +10,7 @@ import numpy as np
 from solver.contact import FrictionLaw
 from solver.verification.methods import Kinematics
 from solver.verification.published import contacts, locking
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
+from solver.verification.request import LeftOut, Request, clock, rows_within
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +73,8 @@ WHERE: dict[Kinematics, str] = {"small": "", "finite": " at finite strain"}
 SECOND_MOMENT = "half-width a, from <x^2> of the pressure [mm]"
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Problem | LeftOut]:
+def measure(request: Request) -> Iterator[Problem | LeftOut]:
     """Return an iterator over all numbers, until the time is up."""
-    del measurements
     works = [
         thick_cylinders, membranes, hertz, partial_slip, bound_on_hertz, cylinder, below,
         light_finite, partial(bound_on_hertz, "finite"), partial(partial_slip, "finite"),
