@@ -16,7 +16,7 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.verification.published import contacts, locking
 from solver.verification.request import LeftOut, Request, clock, rows_within
 
-Errors = Sequence[float]
+Errors = Sequence[float]  # or sizes, or times
 Size = TypeVar("Size", int, float)
 Value = TypeVar("Value")
 

@@ -5,13 +5,14 @@ on slipperiness 0 to 100 and stickiness 0 stays below that wherever the truth ma
 factorisation and solve of the same system, timed in the same run.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from statistics import median
 
 from solver.prediction import percent
 from solver.verification.estimates import GuaranteedCost
-from solver.verification.growth import Growth, between, exponent
+from solver.verification.growth import Growth, exponent, large
 from solver.verification.histories import March
 from solver.verification.methods import Kinematics
 from solver.verification.processes import Cold, Memory
@@ -33,9 +34,9 @@ class Target:
     unit: str
     reach: float | None
     aim: float | None
-    measured: float | None  # None: not measured, or no mesh met the error
-    floors: float | None  # `measured` by the floor
-    how: str  # method, mesh and error
+    measured: float | None = None  # None: not measured, or no mesh met the error
+    floors: float | None = None  # `measured` by the floor
+    how: str = ""  # method, mesh and error
     tried: bool = True  # whether all candidates were measured before the time was up
     part: str = ""  # the measured part, where it is not all that was required
 
@@ -54,7 +55,6 @@ class Target:
 
 def measure(request: Request) -> Iterator[Target]:
     """Yield every row, from the rows of the other subjects."""
-    meshes = QUICK if request.quick else MESHES
     further = "finite strain, each further surface"
     at_errors: tuple[tuple[str, Kinematics, float, float, float, Callable[[Speed], float | None]], ...] = (
         ("small strain, all ten surfaces, from scratch", "small", 0.01, 5.0, 2.0, lambda s: s.all_s),
@@ -64,36 +64,29 @@ def measure(request: Request) -> Iterator[Target]:
         ("finite strain, one surface", "finite", 0.0015, 150.0, 80.0, lambda s: s.first_s),
         ("finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s),
     )
-    for row in at_errors:
-        yield _at_error(request, meshes, *row)
-    yield _warm(request, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
-    yield _warm(request, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
-    yield _march(request)
-    yield _cold(request)
+    for work, kinematics, error, reach, aim, time in at_errors:
+        yield _at_error(request, Target(work, percent(error), "ms", reach, aim), kinematics, error, time)
+    for kinematics, reach, aim in (("finite", 1.5, 1.0), ("small", 0.3, 0.1)):
+        work = f"warm stepper, {kinematics} strain, p99 of a reading"
+        rows = [row for row in request.of(Warm) if row.kinematics == kinematics]
+        yield _warm(rows, Target(work, f"{percent(PEAK)} of peak", "ms", reach, aim))
+    yield _march(
+        request.of(March), Target("a course of 200 substeps, by the direct solve", "1e-10", "times", 60.0, 30.0)
+    )
+    cold = Target("`daq-app solve` as a cold process, compiled code cached", "", "ms", 1000.0, 400.0)
+    yield _cold([row for row in request.of(Cold) if row.what.startswith("daq-app")], cold)
     yield from map(_guarantee, request.of(GuaranteedCost))
     for row in request.of(Memory):
-        yield Target(
-            f"memory of a solve, {row.kinematics} strain, above idle", percent(row.tolerance), "MB", 100.0, None,
-            row.solve_mb, None, f"{row.dofs} unknowns, estimate {percent(row.error_estimate)}",
-        )  # fmt: skip
-    for kinematics in ("small", "finite"):
+        work, how = f"memory of a solve, {row.kinematics} strain, above idle", f"{row.dofs} unknowns, estimate "
+        how += percent(row.error_estimate)
+        yield Target(work, percent(row.tolerance), "MB", 100.0, None, row.solve_mb, how=how)
+    for kinematics in KINEMATICS:
         rows = [row for row in request.of(Growth) if row.kinematics == kinematics]
-        power = exponent(rows)
-        how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns; {_between(rows)}"
-        yield Target(
-            f"growth of the floor with unknowns, {kinematics} strain", "", "power", 1.5, None, power, None, how
-        )
+        yield _growth(rows, Target(f"growth of the floor with unknowns, {kinematics} strain", "", "power", 1.5, None))
 
 
 def _at_error(
-    request: Request,
-    meshes: dict[Kinematics, tuple[float, ...]],
-    work: str,
-    kinematics: Kinematics,
-    error: float,
-    reach: float,
-    aim: float,
-    time: Callable[[Speed], float | None],
+    request: Request, target: Target, kinematics: Kinematics, error: float, time: Callable[[Speed], float | None]
 ) -> Target:
     rows = [row for row in request.of(Speed) if row.kinematics == kinematics]
     doubts = {name: truth.doubt[0] for name, truth in known_truths(request, kinematics).items()}
@@ -102,12 +95,13 @@ def _at_error(
     if not accurate:
         best = min(known, key=lambda r: r.largest_error({}), default=None)
         how = "" if best is None else f"no mesh that was tried is below: the best is at {_error(best, doubts)}"
-        tried = len(rows) >= len(meshes[kinematics]) and (best is None or best.largest_error({}) > error)
-        return Target(work, percent(error), "ms", reach, aim, None, None, how, tried)
+        meshes = (QUICK if request.quick else MESHES)[kinematics]
+        tried = len(rows) >= len(meshes) and (best is None or best.largest_error({}) > error)
+        return replace(target, how=how, tried=tried)
     took, best = min(accurate, key=lambda pair: pair[0])
     how = f"{best.dofs} unknowns, error {_error(best, doubts)}"
     part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
-    return Target(work, percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
+    return replace(target, measured=1e3 * took, floors=took / best.floor_s, how=how, part=part)
 
 
 def _error(row: Speed, doubts: Mapping[str, float]) -> str:
@@ -115,50 +109,48 @@ def _error(row: Speed, doubts: Mapping[str, float]) -> str:
     return f"{percent(row.largest_error({}))}, {percent(row.largest_error(doubts))} at most"
 
 
-def _warm(request: Request, work: str, kinematics: str, reach: float, aim: float) -> Target:
-    rows = [row for row in request.of(Warm) if row.kinematics == kinematics]
-    at = f"{percent(PEAK)} of peak"
+def _warm(rows: Sequence[Warm], target: Target) -> Target:
     if not rows:
-        return Target(work, at, "ms", reach, aim, None, None, "")
+        return target
     worst = max(row.worst_error for row in rows)
     how = f"error {percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
     slowest = 1e3 * max(row.p99_s for row in rows)
     part = _part(len(rows), len(SURFACES), "surfaces")
-    return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
+    return replace(target, measured=slowest if worst <= PEAK else None, how=how, part=part)
 
 
-def _march(request: Request) -> Target:
-    work, rows = "a course of 200 substeps, by the direct solve", request.of(March)
+def _march(rows: Sequence[March], target: Target) -> Target:
     if not rows:
-        return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
+        return target
     off = max(abs(row.difference) for row in rows)
     small = sum(row.kinematics == "small" for row in rows)
     how = f"largest difference {off:.0e}; courses: {small} at small strain, {len(rows) - small} at finite strain"
     times = max(row.marched_s / row.direct_s for row in rows)
     part = _part(len(rows), 2 * len(JUDGED), "courses")
-    return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how, part=part)
+    return replace(target, measured=times if off <= AGREED else None, how=how, part=part)
 
 
-def _cold(request: Request) -> Target:
-    work = "`daq-app solve` as a cold process, compiled code cached"
-    rows = [row for row in request.of(Cold) if row.what.startswith("daq-app")]
+def _cold(rows: Sequence[Cold], target: Target) -> Target:
     if not rows:
-        return Target(work, "", "ms", 1000.0, 400.0, None, None, "")
+        return target
     how = ", ".join(f"{row.what.removeprefix('daq-app solve, ')} {1e3 * row.took_s:.0f} ms" for row in rows)
     part = _part(len(rows), len(KINEMATICS), "processes")
-    return Target(work, "", "ms", 1000.0, 400.0, 1e3 * max(row.took_s for row in rows), None, how, part=part)
+    return replace(target, measured=1e3 * max(row.took_s for row in rows), how=how, part=part)
 
 
 def _guarantee(row: GuaranteedCost) -> Target:
     error = "" if row.worst_error is None else f", true error {percent(row.worst_error)}"
     how = f"{row.dofs} unknowns, estimate {percent(row.worst_estimate)}{error}"
     work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"
-    return Target(work, percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
+    return Target(work, percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, how=how)
 
 
-def _between(rows: list[Growth]) -> str:
-    powers = between(rows)
-    return f"from mesh to mesh {min(powers):.2f} to {max(powers):.2f}"
+def _growth(rows: Sequence[Growth], target: Target) -> Target:
+    if (power := exponent(rows)) is None:
+        return target
+    powers = [exponent(pair) or 0.0 for pair in pairwise(large(rows))]
+    how = f"up to {max(row.dofs for row in rows):,} unknowns; from mesh to mesh {min(powers):.2f} to {max(powers):.2f}"
+    return replace(target, measured=power, how=how)
 
 
 def _part(measured: int, total: int, what: str) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.failures import SolveFailure
-from solver.response.solution import solve_many
+from solver.response.solution import solve
 from solver.scene import Scene
 from solver.scene.published import scenes
 from solver.scene.tables import Solve
@@ -66,47 +66,30 @@ def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
-    refused, todo = _split_refusals(kinematics, chosen)
-    yield from refused
     start = clock()
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
     meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
-    shared = (clock() - start) / max(len(todo), 1)
-    for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
+    shared = (clock() - start) / len(chosen)
+    for number, scene in enumerate(sorted(chosen, key=lambda scene: scene.title not in JUDGED)):
         if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # other subjects need these
-            yield LeftOut(
-                f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
-            )
+            left = len(chosen) - number
+            yield LeftOut(f"Time was over before the truth of {left} cases at {kinematics} strain was known.")
             return
         yield _truth(scene, meshes, shared)
 
 
 def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], shared: float) -> Truth:
+    """Return the truth of a case; the judged ones have one, and of others the solver is asked first."""
     start, kinematics = clock(), scene.solve.kinematics
     try:
+        if scene.title not in JUDGED:
+            solve(replace(scene, solve=Solve(kinematics, tolerance=0.02)))
         solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
     except SolveFailure as failure:
-        return Truth(kinematics, scene.title, (), (), (), clock() - start, f"On an overkill mesh: {failure}")
+        return Truth(kinematics, scene.title, (), (), (), clock() - start, str(failure))
     mean, doubt = mean_and_doubt(solves)
     elapsed_s, dofs = clock() - start + shared, tuple(mesh.dofs for mesh in meshes)
     return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, elapsed_s, "")
-
-
-def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
-    """Return the cases that the solver refuses, each with its sentence, and the other cases."""
-    refused: list[Truth] = []
-    todo: list[Scene] = []
-    for scene in chosen:
-        if scene.title in JUDGED:  # an answer exists; a refusal would show on the fine meshes
-            todo.append(scene)
-            continue
-        start = clock()
-        (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=0.02))])
-        if isinstance(answer, SolveFailure):
-            refused.append(Truth(kinematics, scene.title, (), (), (), clock() - start, str(answer)))
-        else:
-            todo.append(scene)
-    return refused, todo
 
 
 def known_truths(request: Request, kinematics: Kinematics) -> dict[str, Truth]:

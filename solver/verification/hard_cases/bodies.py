@@ -1,10 +1,11 @@
 """The hard cases other than scenes: bodies, load paths and bad meshes, in one of the two kinematics."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke, NeoHooke
@@ -15,12 +16,12 @@ from solver.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
 from solver.prediction import percent
 from solver.scene.published import STICKINESS, scene
-from solver.verification.hard_cases.meshes import slabs, two_parts
 from solver.verification.hard_cases.outcome import Outcome, agree, power
 from solver.verification.methods import Kinematics
 from solver.verification.published.bodies import distort
 
 DEPTH = 1.5  # [mm]
+STIFF_LAYERS = 2  # of elements
 TISSUES = ((0.136, 0.48), (0.08, 0.48), (0.034, 0.48))  # Young's modulus [MPa] and Poisson's ratio
 Finger = LinearFinger | FiniteFinger
 
@@ -179,3 +180,28 @@ def aspect(bodies: Bodies) -> Outcome:
     off = abs(forces[1] / forces[0] - 1)
     summary = f"N {forces[1]:.4g}, {percent(off)} from squarer elements'"
     return Outcome(True, tuple(forces), "" if off < 0.005 else f"off by {off:.1g}", summary)
+
+
+def two_parts() -> tuple[Mesh, Mesh]:
+    """Return a soft block (region 0) below a plate (region 1), and the block alone, held where the plate begins."""
+    x, soft = np.linspace(-4, 4, 17), np.linspace(0, 2, 9)
+    lines: Array = np.concatenate([soft, np.array([2.5, 3.0])])
+    whole = block(x, lines, radius=8.0)
+    layers = len(soft) + 1
+    region = np.zeros(len(whole.elements), np.int64)
+    region.reshape(-1, layers)[:, :STIFF_LAYERS] = 1  # elements of a column are numbered from its top down
+    column = 2 * layers + 1
+    kept = np.arange(len(whole.nodes)).reshape(-1, column)[:, 2 * STIFF_LAYERS :]
+    number = np.full(len(whole.nodes), -1)
+    number[kept.ravel()] = np.arange(kept.size)
+    elements = number[whole.elements[region == 0]]
+    alone = Mesh(whole.nodes[kept.ravel()], elements, region[region == 0], number[whole.skin], number[kept[:, 0]])
+    return replace(whole, region=region), alone
+
+
+def slabs() -> tuple[Mesh, Mesh]:
+    """Return one block twice, its lowest elements nearly square, and fifty times longer than high."""
+    x: Array = np.linspace(-5, 5, 41)
+    fine: Array = np.linspace(0, 1, 26)
+    flat: Array = np.concatenate([np.linspace(0, 0.015, 4), fine[1:]])
+    return block(x, np.linspace(0, 1, 9), radius=40.0), block(x, flat, radius=40.0)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from solver.arrays import Array
+from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
-from solver.mesh import Q2P1
+from solver.mesh import Q2P1, Mesh
 from solver.verification.published.bodies import distort, membrane, ring, stress_at
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
@@ -25,15 +25,15 @@ def widening(nu: float) -> float:
 def hole_displacement(nu: float, radial: int, around: int) -> float:
     """Return the computed displacement of the hole, mean over corner nodes [mm]."""
     mesh, hole = ring(INNER, OUTER, radial, around)
-    at = mesh.nodes[hole]
-    loads = edge_load(mesh, hole, at / INNER)
+    _, displacement, _ = _widen(mesh, hole, nu)
+    return float(np.sum(displacement[hole] * mesh.nodes[hole], axis=1)[:-1:2].mean() / INNER)
+
+
+def _widen(mesh: Mesh, hole: Indices, nu: float) -> tuple[LinearBody, Array, Array]:
+    """Return the body, its displacements and its loads (nodes, 2) under the inner pressure."""
+    loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
     body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
-    displacement = _free(body)[hole]
-    return float(np.sum(displacement * at, axis=1)[:-1:2].mean() / INNER)
-
-
-def _free(body: LinearBody) -> Array:
-    return body.displacement(body.condensed.free_displacement())
+    return body, body.displacement(body.condensed.free_displacement()), loads
 
 
 def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
@@ -44,9 +44,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     """
     mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
     mesh = distort(mesh, 0.2, 5)
-    loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
-    body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
-    displacement = _free(body)
+    body, displacement, loads = _widen(mesh, hole, nu)
     x, y = mesh.nodes.T
     growth = (1 + nu) / YOUNG * ((1 - 2 * nu) * _SHARE + _SHARE * OUTER**2 / (x * x + y * y))
     exact = growth[:, None] * mesh.nodes
