@@ -131,7 +131,13 @@ def json_text(document: Mapping[str, Any]) -> str:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new."""
+    """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new.
+
+    What is no file, such as /dev/null or a pipe, is written to and stays.
+    """
+    if path.exists() and not path.is_file():
+        path.write_bytes(content)
+        return
     new = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with open_new(new) as file:

@@ -92,6 +92,20 @@ def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, tmp_path
     assert "was unblinded before" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "name", ["P01_scores/session.sqlite", "P01_scores/session.h5", "study.sqlite", "sealed-key.json"]
+)
+def test_labels_are_never_written_over_what_a_session_or_a_study_holds(study, tmp_path, capsys, name):
+    friction = shutil.copytree(study, tmp_path / "friction")
+    before = (friction / name).read_bytes()
+    assert run(["enrol", str(friction), "--subject", "P07", "--labels", str(friction / name)]) == 1
+    assert "it is left alone: choose another file" in capsys.readouterr().err
+    assert (friction / name).read_bytes() == before
+    _, shown = said(capsys, "enrol", friction, "--labels", friction / "labels.txt")
+    assert [row["subject"] for row in shown["subjects"]] == ["P01", "P02"]
+    assert (friction / "labels.txt").read_text().startswith("For whoever puts the labels on.")
+
+
 def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
     folder = tmp_path / "study"
     assert run(["enrol", str(folder), "--protocol", "paired-comparison"]) == 0

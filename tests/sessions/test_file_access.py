@@ -108,3 +108,21 @@ def test_a_file_written_whole_leaves_the_permissions_of_new_files(tmp_path):
     write_whole(tmp_path / "a", b"x")
     (tmp_path / "b").write_bytes(b"x")
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+@pytest.mark.skipif(os.name != "posix", reason="there are no pipes among files on this system")
+def test_a_pipe_or_a_device_is_written_to_and_stays(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(pipe, b"K1")
+    assert os.read(reader, 100) == b"K1"
+    os.close(reader)
+    assert pipe.is_fifo()
+
+
+@pytest.mark.parametrize("place", ["", ".."])
+def test_a_folder_is_never_written_over(tmp_path, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OSError, match="directory"):
+        write_whole(Path(place), b"K1")

@@ -25,6 +25,7 @@ from sessions.plan.study import (
     study_key,
     withdraw,
 )
+from sessions.recording.derived import check_replaceable
 from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"
@@ -47,6 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     folder: Path = options.study
     _refuse_mixtures(options)
+    if options.labels is not None:
+        check_replaceable(options.labels)
     body = body_of(options)
     if options.protocol is not None:
         file = protocol_file(options.protocol)

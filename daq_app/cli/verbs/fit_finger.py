@@ -27,6 +27,7 @@ from sessions.prediction.press_curves import PressCurves, deepest, press_curves
 from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
 from sessions.prediction.relaxation_fit import RelaxationFit, relaxing_fit
 from sessions.recording import Recording
+from sessions.recording.derived import check_replaceable
 from sessions.strokes import AnalysisSettings
 from sessions.toml_file import toml_text
 from solver import Scene
@@ -57,6 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     if options.scene is not None and not options.scene.parent.is_dir():
         raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
+    if options.scene is not None:
+        check_replaceable(options.scene)
     recording, _, unreadable = open_visit(options.session, options.subject, console)
     settings = stored_settings(recording)
     gain_error = calibration_error(options)
