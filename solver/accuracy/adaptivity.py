@@ -128,8 +128,8 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
     `numbers` (COUNT,) are the scene's on the mesh of the answer.
     """
     nested, finger, state = on_nested
-    tolerance = scene.solve.tolerance
-    missed = tolerance is not None and errors(scene, numbers, nested, steps).sed > tolerance
+    target = scene.solve.target
+    missed = target is not None and errors(scene, numbers, nested, steps).sed > target
     if not missed and scene.solve.contrast_tolerance is None:
         return nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
@@ -160,6 +160,8 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
         halves = np.full(counts.sum(), 2)
         return lines.divide(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST_UNKNOWNS else None
     most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, MOST_PARTS)
+    if parts[most == 1.0].sum() > 1.0:  # gaps too small to be divided miss the tolerance alone
+        return None
     per_line = parts * np.repeat(counts, counts)
     least = GROWTH * _unknowns(np.ones(len(parts)), counts)
     chosen = None
@@ -199,7 +201,7 @@ def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumStat
         return None
     ends = [end(scene, finger, 1.0) if settled is None or scene.viscoelastic else settled]
     usual, *fewer = finger.all_numbers(ends + [end(scene, finger, part) for part in PARTS.tolist()])
-    return Steps.of(usual, np.array(fewer), scene.solve.tolerance)
+    return Steps.of(usual, np.array(fewer), scene.solve.target)
 
 
 def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
@@ -207,7 +209,7 @@ def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
 
     The end of its press decides. Raises as `choose_steps`.
     """
-    if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.frictionless:
+    if scene.solve.course == "steady" or scene.friction.frictionless:
         return 1
     steps = choose_steps(scene.press_only(), finger)
     return 1 if steps is None else steps.times

@@ -30,7 +30,7 @@ from solver.equilibrium.finger import Finger, settled_moduli
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
 from solver.scene import Scene
-from solver.scene.tables import TISSUES
+from solver.scene.tables import TISSUES, USUAL_TOLERANCE
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
 # Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
@@ -50,7 +50,6 @@ def half_width(change: Array, edges: Array, part: Array | float = FROM_EDGES) ->
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
 MOST_STEPS = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
-USUAL_TOLERANCE = 0.003  # tolerance that steps are chosen for where none is asked for, as the default meshes' errors
 STEPS_SHARE = 0.3  # part of a tolerance that the error of the steps may take: the mesh, which costs more, has the rest
 
 

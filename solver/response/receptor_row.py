@@ -79,7 +79,7 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     errors = half_width(finer - values.ravel(), edges)
     if in_steps:
         usual, *fewer = row_numbers(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
-        errors += Steps.of(usual, np.array(fewer), scene.solve.tolerance).bound
+        errors += Steps.of(usual, np.array(fewer), scene.solve.target).bound
     return errors.reshape(values.shape)
 
 

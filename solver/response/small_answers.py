@@ -140,9 +140,8 @@ class SmallMeshing(Meshing):
         if directly_refinable:  # other states lose their round-off only where audits show it
             state, displacement = remove_round_off(scene, finger, state, displacement)
         checks = audits.audits(finger, state, displacement)
-        if not relaxing and audits.imbalance(checks) > SMALL_IMBALANCE:
-            state, displacement = remove_round_off(scene, finger, state, displacement)
-            checks = audits.audits(finger, state, displacement)
+        if not relaxing:
+            state, displacement, checks = _balanced(scene, finger, state, displacement, checks)
         solved = SceneSolution(scene, state, displacement, checks, steps, way)
         complete_audits(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
@@ -162,6 +161,23 @@ class SmallMeshing(Meshing):
             prediction(one, finger, numbers[number], rows[:, number], nested[number], estimate_s)
             for number, one in enumerate(solved)
         ]
+
+
+def _balanced(
+    scene: Scene, finger: LinearFinger, state: EquilibriumState, displacement: Array, checks: dict[str, float]
+) -> tuple[EquilibriumState, Array, dict[str, float]]:
+    """Return a state, its displacement (nodes, 2) and its audits after as many steps of refinement as help.
+
+    A step that does not halve the imbalance is the last, and is not taken (Higham 2002, Accuracy and Stability of
+    Numerical Algorithms, chapter 12).
+    """
+    while (imbalance := audits.imbalance(checks)) > SMALL_IMBALANCE:
+        finer = remove_round_off(scene, finger, state, displacement)
+        checks_of_finer = audits.audits(finger, *finer)
+        if audits.imbalance(checks_of_finer) > imbalance / 2.0:
+            break
+        (state, displacement), checks = finer, checks_of_finer
+    return state, displacement, checks
 
 
 def nested_numbers_of_all(

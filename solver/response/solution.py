@@ -31,8 +31,8 @@ ERROR_UNKNOWN = (
     "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
 )
 NOT_NESTED = NotConverged("The nested mesh has no such state.")
-DEFAULT_FINENESS = {"small": 8.0, "finite": 6.0}  # without a tolerance: error estimates of 0.1 % and 0.4 %
-FIRST_FINENESS = 4.0  # with a tolerance: from 3 and from 5 ten surfaces take as long to 1 %
+FIRST_FINENESS = 4.0  # from 3 and from 5 ten surfaces take as long to 1 %
+LIMIT_FINENESS = 6.0  # of a mesh on which a scene without a state on the first is solved once more
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
 ASSUMED_ERROR = 4.0  # by the tolerance, where nothing is known of the error
 MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
@@ -148,26 +148,10 @@ def _solve_group(
     """Return the answers of scenes that share meshes."""
     kind = scenes[0].solve.kinematics
     meshing = MESHINGS[kind](scenes, progress)
-    has_course = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
-    if has_course and (any(map(_has_tolerance, scenes)) or compared_sets(scenes)):
+    if kind == "small" and any(scene.solve.course == "history" for scene in scenes):
         return _march(scenes, meshing, watch)
     refinement = _refine(scenes, meshing, watch, rough)
     return [_add_warnings(answer, more) for answer, more in zip(refinement.answers, refinement.warnings, strict=True)]
-
-
-def _has_tolerance(scene: Scene) -> bool:
-    return scene.solve.tolerance is not None or scene.solve.contrast_tolerance is not None
-
-
-def _first_finenesses(scenes: Sequence[Scene], contrast_sets: Sequence[Sequence[int]]) -> list[float]:
-    """Return the fineness of the mesh on which each scene is solved first; scenes that are compared share it."""
-    default = DEFAULT_FINENESS[scenes[0].solve.kinematics]
-    out = [FIRST_FINENESS if _has_tolerance(scene) else default for scene in scenes]
-    for together in contrast_sets:
-        finest = max(out[i] for i in together)
-        for i in together:
-            out[i] = finest
-    return out
 
 
 def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
@@ -178,7 +162,7 @@ def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[A
     ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
     refinement = _refine(ends, meshing, None, None)
     settled = [answer for answer in refinement.answers if isinstance(answer, Prediction)]
-    mesh: float | Lines = DEFAULT_FINENESS["small"]
+    mesh: float | Lines = LIMIT_FINENESS
     if settled:
         mesh = max(settled, key=lambda answer: answer.dofs).geometry.sizing.fineness
     answers_of_courses: dict[int, Answer] = {}
@@ -204,12 +188,11 @@ def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: R
 
     Scenes that share a mesh share the finer one. Where that has no state, `_coarser_counts` decides which answer stays.
     """
-    contrast_sets, kind = compared_sets(scenes), scenes[0].solve.kinematics
+    contrast_sets = compared_sets(scenes)
     answers: dict[int, Answer] = {}
     best: dict[int, Answer] = {}  # of each scene the answer with the smallest estimate
     failures: dict[int, SolveFailure] = {}  # on finer meshes, of scenes whose coarser answers count
-    first = _first_finenesses(scenes, contrast_sets)
-    work: dict[float | Lines, list[int]] = {**_positions(first)}
+    work: dict[float | Lines, list[int]] = {FIRST_FINENESS: list(range(len(scenes)))}
     meshes: dict[int, float | Lines] = {}  # the last of each scene
     while True:
         for mesh, todo in work.items():
@@ -233,15 +216,15 @@ def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: R
             for together in contrast_sets
         ]
         reductions = _error_reductions(scenes, errors, refinable, contrasts)
-        work = _finer({i: answers[i] for i in sorted(reductions)}, reductions, DEFAULT_FINENESS[kind])
+        work = _finer({i: answers[i] for i in sorted(reductions)}, reductions)
         if not work:
             break
         for answer in answers.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
     answers |= {i: best[i] for i, miss in enumerate(errors) if miss > 1.0}
-    if kind == "finite":  # where a fine mesh may lose its way
-        failures |= _fall_back(scenes, answers, first, meshing)
+    if scenes[0].solve.kinematics == "finite":  # where a fine mesh may lose its way
+        failures |= _fall_back(scenes, answers, meshing)
     contrast_of = {i: off for together, off in zip(contrast_sets, contrasts, strict=True) for i in together}
     errors = _errors(answers, failures, meshes)
     warnings = [_sentences(contrast_of.get(i), errors[i], answers[i], failures.get(i)) for i in range(len(scenes))]
@@ -267,20 +250,18 @@ def _error_reductions(
     return out
 
 
-def _finer(
-    answers: Mapping[int, Answer], reductions: Mapping[int, float], default: float
-) -> dict[float | Lines, list[int]]:
+def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> dict[float | Lines, list[int]]:
     """Return the scenes to be solved again by the finer mesh that each needs; none where no mesh may be finer.
 
     The errors of these `answers` have to fall by `reductions`. Scenes that share a mesh share the finer one. A scene
-    without a state is solved once more at the `default` fineness.
+    without a state is solved once more at `LIMIT_FINENESS`.
     """
     members: dict[FingerMesh | None, list[int]] = {}
     for i, answer in answers.items():
         members.setdefault(answer.geometry if isinstance(answer, Prediction) else None, []).append(i)
     out: dict[float | Lines, list[int]] = {}
     for mesh, together in members.items():
-        finer: float | Lines | None = default
+        finer: float | Lines | None = LIMIT_FINENESS
         if mesh is not None:
             nested = [(reductions[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
             parts = [miss * one.shares for miss, one in nested if one is not None and one.shares is not None]
@@ -291,21 +272,19 @@ def _finer(
     return out
 
 
-def _fall_back(
-    scenes: list[Scene], answers: dict[int, Answer], first: Sequence[float], meshing: Meshing
-) -> dict[int, SolveFailure]:
-    """Solve scenes without a state at their `first` fineness on a coarser mesh; return the failures that this replaces.
+def _fall_back(scenes: list[Scene], answers: dict[int, Answer], meshing: Meshing) -> dict[int, SolveFailure]:
+    """Solve scenes without a state on a coarser mesh than the first; return the failures that this replaces.
 
     Under steep friction a single mesh may have no state by chance, and a slightly finer one is tried at last.
     """
     replaced: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         if isinstance(failure := answers[i], SolveFailure) and _is_doubtful(scene, failure):
-            answer = meshing.answers([scene], first[i] / FINENESS_RATIO)[0]
+            answer = meshing.answers([scene], FIRST_FINENESS / FINENESS_RATIO)[0]
             if _coarser_counts(answer, failure):
                 answers[i], replaced[i] = answer, failure
         if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
-            answers[i] = meshing.answers([scene], first[i] * FINENESS_RATIO)[0]
+            answers[i] = meshing.answers([scene], FIRST_FINENESS * FINENESS_RATIO)[0]
     return replaced
 
 
@@ -352,7 +331,7 @@ def _sentences(
             warnings.append(NEAR_LIMIT.format(failure.limit_mu, 100.0 * LIMIT_ACCURACY))
     if isinstance(answer, Prediction) and answer.nested is None:
         warnings.append(ERROR_UNKNOWN)
-    elif error > 1.0:
+    elif error > 1.0 and isinstance(answer, Prediction) and answer.scene.solve.tolerance is not None:
         warnings.append(TOLERANCE_MISSED)
     if isinstance(answer, Prediction) and (doubt := stiffness_warning(answer.scene)):
         warnings.append(doubt)
@@ -391,5 +370,5 @@ def _error_by_tolerance(answer: Answer, *, limits_known: bool) -> float:
         return 0.0
     if answer.nested is None:
         return ASSUMED_ERROR
-    tolerance = answer.scene.solve.tolerance
-    return 0.0 if tolerance is None else answer.error_estimate / tolerance
+    target = answer.scene.solve.target
+    return 0.0 if target is None else answer.error_estimate / target

@@ -338,6 +338,9 @@ class Receptor(Table):
             raise SceneError("receptor.ending", self.ending, "it must be two lengths between 0.001 and 20 mm")
 
 
+USUAL_TOLERANCE = 0.003  # a tenth of the range of SED of the published slippery surfaces, the least of any series [-]
+
+
 @dataclass(frozen=True, slots=True)
 class Solve(Table):
     """How to solve the scene.
@@ -348,9 +351,15 @@ class Solve(Table):
 
     kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
     course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
-    tolerance: float | None = None  # required relative error of the ending-averaged SED [-]; None: the solver's own
+    tolerance: float | None = None  # required relative error of the ending-averaged SED [-]; None: 0.3 %
     evidence: Literal["quick", "estimated", "measured"] = "estimated"  # of the size of omitted effects
     contrast_tolerance: float | None = None  # required error of differences of SED between surfaces, by their range [-]
+
+    @property
+    def target(self) -> float | None:
+        """Relative error of the ending-averaged SED to which the mesh is refined; None where only contrasts count."""
+        usual = USUAL_TOLERANCE if self.contrast_tolerance is None else None
+        return usual if self.tolerance is None else self.tolerance
 
     def __post_init__(self) -> None:
         """Check the options. Raises SceneError."""

@@ -33,7 +33,7 @@ class Estimate:
     kinematics: Kinematics
     case: str
     number: str
-    tolerance: float  # of the SED; 0 where none was requested
+    tolerance: float  # of the SED
     dofs: int
     estimate: float  # relative
     error: float  # relative

@@ -61,7 +61,7 @@ def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_bel
 def test_an_ending_that_is_hardly_more_than_a_point_is_as_true_as_any_and_its_estimate_lies_above(depth, ending, truth):
     asked = Solve(evidence="quick")
     found = solve(Scene(friction=Friction(0.6), loading=Loading(1.0), receptor=Receptor(depth, ending), solve=asked))
-    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate <= 0.002
+    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate <= 0.003
 
 
 def test_a_drag_that_cannot_be_is_exactly_none():
@@ -186,7 +186,7 @@ def test_estimates_lie_above_the_errors_of_scenes_that_nothing_was_chosen_on_and
 
 def test_skin_so_stiff_that_one_node_touches_is_estimated_by_contact_that_grows_not_by_contact_lost():
     skin = Materials(Material(640.0, 0.48), Material(4.0, 0.48), Material(0.034, 0.48))
-    scene = Scene(materials=skin, friction=Friction(0.3), loading=Loading(0.6, "+x"))
+    scene = Scene(materials=skin, friction=Friction(0.3), loading=Loading(0.6, "+x"), solve=Solve(tolerance=0.5))
     found = solve(scene)
     assert sum(state != "open" for state in found.skin.state) == 1
     truth = fine_numbers([scene])[:, 0, 0]

@@ -80,8 +80,8 @@ def test_a_survey_of_answers_holds_every_estimate_of_the_program_against_fine_me
     row = answers.solve("axis", 0, "small")
     (answer,) = solve_many([random_scene("axis", 0, "small")])
     assert not isinstance(answer, SolveFailure)
-    assert row.estimates[0].estimate == answer.error_estimate
-    assert len(row.estimates) == 9
+    assert row.estimates[3].estimate == answer.error_estimate  # the second answer, at the usual tolerance
+    assert len(row.estimates) == 6
     assert all(one.above for one in row.estimates)
 
 

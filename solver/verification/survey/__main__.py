@@ -1,6 +1,6 @@
 """Compare error estimates with true errors on many random scenes: `python -m solver.verification.survey`.
 
-Each scene is solved without a tolerance, at 1 % and at 0.3 %. One takes 1 to 60 s. `--keep FILE` appends new rows to
+Each scene is solved at 1 % and at 0.3 %. One takes 1 to 60 s. `--keep FILE` appends new rows to
 FILE and reads the rows that it holds already.
 """
 
@@ -17,7 +17,7 @@ from solver.verification.survey.answers import SURFACES, Row, report, solve, tab
 
 Key = tuple[str, int, Kinematics]
 CAPTION = (
-    "Scenes from number {first} on, of each set; three answers each. Above: share of estimates at or above the true "
+    "Scenes from number {first} on, of each set; two answers each. Above: share of estimates at or above the true "
     "error. Near: below ten times the larger of true error and 0.02 %. Missed unsaid: tolerances said to be met that "
     "are not, without a warning. Ratio: median of estimate by error. Corrected: median of its error by the answer's. "
     "Counted where the truth can tell."

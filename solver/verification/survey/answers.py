@@ -1,4 +1,4 @@
-"""Answers as users request them, without a tolerance, at 1 % and at 0.3 %, against fine meshes."""
+"""Answers as users request them, at 1 % and at 0.3 %, against fine meshes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ class Row:
     family: str
     number: int
     kinematics: Kinematics
-    estimates: tuple[Estimate, ...] = ()  # of the answers; tolerance 0 where none was requested
+    estimates: tuple[Estimate, ...] = ()  # of the answers
     refusals: tuple[str, ...] = ()  # of the answers, or of the truth
 
 
@@ -48,16 +48,16 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
         refusals += [str(answer) for answer in answers if isinstance(answer, SolveFailure)]
         good = [answer for answer in answers if isinstance(answer, Prediction)]
         if together and len(good) == len(scenes):
-            estimates.append(_difference(good, BY_TOLERANCE * (tolerance or 0.0), truth))
+            estimates.append(_difference(good, BY_TOLERANCE * tolerance, truth))
         elif good:
-            estimates += compare(good[0], tolerance or 0.0, *mean_and_doubt(truth[:, 0]))
+            estimates += compare(good[0], tolerance, *mean_and_doubt(truth[:, 0]))
     return Row(family, number, kinematics, tuple(estimates), tuple(dict.fromkeys(refusals)))
 
 
-def _with_tolerance(scene: Scene, tolerance: float | None, *, together: bool) -> Scene:
+def _with_tolerance(scene: Scene, tolerance: float, *, together: bool) -> Scene:
     solve = replace(scene.solve, evidence="estimated")
     if together:
-        return replace(scene, solve=replace(solve, contrast_tolerance=tolerance and BY_TOLERANCE * tolerance))
+        return replace(scene, solve=replace(solve, contrast_tolerance=BY_TOLERANCE * tolerance))
     return replace(scene, solve=replace(solve, tolerance=tolerance))
 
 

@@ -8,7 +8,7 @@ from scipy.stats import spearmanr
 from solver.verification.estimates import Estimate
 from solver.verification.truth import NUMBERS
 
-TOLERANCES = (None, 0.01, 0.003)  # tolerances of answers
+TOLERANCES = (0.01, 0.003)  # of answers; the second is the usual one
 EXACT = 1e-12  # error below which a number follows from the input alone, and is not judged [-]
 HEADER = (
     "set", "strain", "answers", "SED above", "force above", "drag above", "near", "missed unsaid", "ratio", "rank",
@@ -25,7 +25,7 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     decided = [row for row in rows if row.above is not None and row.error > EXACT]
     by_number = [[row for row in decided if row.number == number] for number in NUMBERS]
     sed = by_number[0]
-    within = [row for row in sed if row.met is not None and row.tolerance and row.estimate <= row.tolerance]
+    within = [row for row in sed if row.met is not None and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
     ratios = [row.estimate / row.error for row in sed]
     halves = [row.corrected / row.error for row in true if row.corrected is not None]
