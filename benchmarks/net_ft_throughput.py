@@ -48,13 +48,10 @@ def main() -> None:
     parser.add_argument("--draw", action="store_true", help="let another process draw what is read")
     options = parser.parse_args()
     print(f"load of this computer: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    print(f"{'':>8} {'received':>10} {'of them':>8} {'':>9} {'lag [ms]':>13} {'age [ms]':>13} {'CPU':>7} {'drawn':>8}")
-    print(
-        f"{'rate Hz':>8} {'a second':>10} {'lost':>8} {'malformed':>9} {'p50':>6} {'p99':>6} {'p50':>6} {'p99':>6} "
-        f"{'% core':>7} {'a second':>8}"
-    )
+    print("           received  of them                lag [ms]      age [ms]     CPU    drawn")
+    print(" rate Hz   a second     lost malformed    p50    p99    p50    p99  % core a second")
+    ready = bool(options.beyond)
     for rate in options.beyond or options.rates:
-        ready = rate in options.beyond
         print(row(rate, options.seconds, options.every * 1e-3, drawing=options.draw, ready=ready), flush=True)
     print(f"load of this computer: {os.getloadavg()[0]:.1f}")
 

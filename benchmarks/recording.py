@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
@@ -148,7 +149,8 @@ def listen(recorder: Recorder, seconds: int) -> None:
     ages: list[float] = []
     lags: list[float] = []
     readings = left_out = 0
-    worked, began = processor_time(recorder.pid), time.perf_counter()
+    process = psutil.Process(recorder.pid)
+    worked, began = sum(process.cpu_times()[:2]), time.perf_counter()
     while time.perf_counter() - began < seconds:
         for report in recorder.poll(0.005):
             if isinstance(report, m.Live):
@@ -157,7 +159,7 @@ def listen(recorder: Recorder, seconds: int) -> None:
             elif isinstance(report, Status):
                 lags.append(report.lag_ms)
     passed = time.perf_counter() - began
-    share = (processor_time(recorder.pid) - worked) / passed
+    share = (sum(process.cpu_times()[:2]) - worked) / passed
     ages.sort()
     late = ages[len(ages) * 99 // 100]
     print(f"  {readings / passed:.0f} readings a second in {len(ages) / passed:.0f} messages, {left_out} left out")
@@ -174,12 +176,6 @@ def until(recorder: Recorder, kind: type[m.Report]) -> None:
                 return
             if isinstance(report, m.Failed):
                 raise RuntimeError(report.sentence)
-
-
-def processor_time(pid: int) -> float:
-    """Return the processor time a process has used [s]; Linux tells it in hundredths."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / 100.0
 
 
 if __name__ == "__main__":

@@ -14,9 +14,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
+import psutil
 
 BEAT = 5  # of a timer of the event loop [ms]
 FIRST_PAINT = """
@@ -174,15 +174,12 @@ class _Observations:
 
 
 def _processor() -> dict[str, float]:
-    """Return the processor time of the window's process and of those it started [s]; Linux alone knows the latter."""
+    """Return the processor time of the window's process and of those it started [s]."""
     seconds = {"window": sum(os.times()[:2])}
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            parts = status.read_text().rsplit(")", 1)[1].split()
-            if int(parts[1]) == os.getpid():
-                command = (status.parent / "cmdline").read_text()
-                name = "recorder" if "daq_app.recorder" in command else f"helper {status.parent.name}"
-                seconds[name] = (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
+    for process in psutil.Process().children():
+        with contextlib.suppress(psutil.Error):
+            name = "recorder" if "daq_app.recorder" in process.cmdline() else f"helper {process.pid}"
+            seconds[name] = sum(process.cpu_times()[:2])
     return seconds
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import looks
 import numpy as np
 
 from sessions.prediction.surface_series import SERIES
@@ -76,18 +77,18 @@ def _tables(rows_of: Mapping[str, list[dict[str, float]]]) -> str:
         lines += [
             f"{name.capitalize()}, {way}. SED in kPa; at finite strain on a coarse mesh, good to a few percent.",
             "",
-            "| index | \u00b5 | SED, small strain | the other way | SED, finite strain | the other way |",
-            "| --- | --- | --- | --- | --- | --- |",
         ]
-        for row in rows:
-            cells = [
+        head = ("index", "\u00b5", "SED, small strain", "the other way", "SED, finite strain", "the other way")
+        cells = [
+            (
                 f"{row['index']:.0f}",
                 f"{row['mu']:.2f}",
                 f"{row['sed']:.3f} \u00b1 {row['error']:.3f}",
                 *(_or_none(row[key]) for key in ("back", "finite", "finite back")),
-            ]
-            lines.append(f"| {' | '.join(cells)} |")
-        lines.append("")
+            )
+            for row in rows
+        ]
+        lines += looks.table(head, cells)
     return "\n".join(lines) + "\n"
 
 

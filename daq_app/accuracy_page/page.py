@@ -9,12 +9,10 @@ from pathlib import Path
 from statistics import median
 from typing import TypeVar
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, select_autoescape
-
 from daq_app.accuracy_page.figures import plates
 from daq_app.wording import number
 from sessions.report.figures.style import Plate
-from sessions.report.pages import embed, swap_in
+from sessions.report.pages import embed, swap_in, template
 from solver.prediction import percent
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate
@@ -289,15 +287,8 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 def page(measured: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, listed = plates(measured) if figures is None else figures, tables(measured)
-    environment = Environment(
-        loader=ChoiceLoader([PackageLoader("daq_app.accuracy_page", "."), PackageLoader("sessions.report", ".")]),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
     there = [section for section in SECTIONS if any(part in figures or part in listed for part in section[2])]
-    return environment.get_template("accuracy.html.jinja").render(
+    return template("accuracy.html.jinja", "daq_app.accuracy_page").render(
         found=measured,
         figures=figures,
         tables=listed,

@@ -11,7 +11,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
 from sessions.exchange.csv_text import write_rows
@@ -34,10 +34,10 @@ from sessions.statistics.visit import TrialRow, exclusion_of
 from sessions.strokes.stroke import meanings
 
 
-def template(name: str) -> Template:
-    """Return the template in a file of this folder."""
+def template(name: str, package: str = "sessions.report") -> Template:
+    """Return the template in a file of this folder, or of another `package`."""
     environment = Environment(
-        loader=PackageLoader("sessions.report", "."),
+        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader("sessions.report", ".")]),
         autoescape=select_autoescape(default=True, default_for_string=True),
         trim_blocks=True,
         lstrip_blocks=True,

@@ -7,14 +7,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.continuation.finite_states import settled_state as finite_settled
-from solver.continuation.small_states import settled_state
-from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.mesh.mesher import Sizing
 from solver.scene import Scene
-from solver.scene.published import SLIPPERINESS, STICKINESS, scene
+from solver.verification.methods import MESHED, Kinematics
 from solver.verification.published import contacts, locking
 from solver.verification.request import LeftOut, Request, clock, rows_within
+from solver.verification.truth import KINEMATICS, cases
 
 Errors = Sequence[float]  # or sizes, or times
 Size = TypeVar("Size", int, float)
@@ -47,7 +44,8 @@ def slope(sizes: Errors, errors: Errors) -> float:
 
 def measure(request: Request) -> Iterator[Order | LeftOut]:
     """Return an iterator over rows, one for each quantity, until the time is up."""
-    works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, press_orders]
+    on_fingers = (partial(fingers, kinematics=kinematics) for kinematics in KINEMATICS)
+    works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, *on_fingers, press_orders]
     return rows_within(request, works, "problems whose order is observed", lambda work: work(request.quick))
 
 
@@ -91,42 +89,27 @@ def press_orders(quick: bool) -> Iterator[Order]:
     yield _row("half-plane under a round body", "force", "small", sizes, errors, [t / len(near) for t in took], 1.7)
 
 
-def small_finger(quick: bool) -> Iterator[Order]:
-    """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
-
-    def sed(case: Scene, fineness: float, shift: bool) -> float:
-        finger = LinearFinger.of(case, Sizing(fineness, 2.0, shift))
-        return float(finger.numbers([settled_state(case, finger)])[0, 0])
-
+def fingers(quick: bool, kinematics: Kinematics) -> Iterator[Order]:
+    """Yield the SED of the finger's ending over shifted meshes of nearly one size: order 2, less at finite strain."""
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
-    for surface in (STICKINESS[0], STICKINESS[4]):
-        case = scene(surface)
-        yield _finger(case.title, "small", partial(sed, case), overkill, finenesses, 1.8)
+    for case in cases(kinematics):
+        if kinematics == "small" and case.title in ("stickiness 0", "stickiness 100"):
+            yield _finger(case, overkill, finenesses, 1.8)
+        if kinematics == "finite" and case.title == "slipperiness 100":
+            yield _finger(case, overkill, finenesses[:-1], 1.3)
 
 
-def finite_finger(quick: bool) -> Iterator[Order]:
-    """Yield the SED of the finger's ending at finite strain, in the same way."""
-    case = scene(SLIPPERINESS[4])
-
-    def sed(fineness: float, shift: bool) -> float:
-        finger = FiniteFinger.of(case, Sizing(fineness, case.loading.depth, shift, margin=3.0))
-        return finger.sed_ending(finite_settled(finger, case).u)
-
-    finenesses = (3.0, 4.0, 5.0) if quick else (3.0, 4.0, 5.0, 7.0)
-    yield _finger(case.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)
-
-
-def _finger(
-    title: str, kinematics: str, sed: Callable[[float, bool], float], overkill: float, meshes: Errors, least: float
-) -> Order:
-    true = float(np.mean([sed(overkill, shift) for shift in (False, True)]))
+def _finger(case: Scene, overkill: float, meshes: Errors, least: float) -> Order:
+    true = float(np.mean([_sed(case, overkill, shift) for shift in (False, True)]))
     near = [(part, shift) for part in (0.92, 1.0, 1.08) for shift in (False, True)]
-    errors, took = _each(
-        meshes, lambda fineness: _rms([sed(fineness * part, shift) / true - 1 for part, shift in near])
-    )
-    sizes = [meshes[0] / fineness for fineness in meshes]
-    took = [one / len(near) for one in took]
-    return _row(f"finger, {title}", "SED of the ending", kinematics, sizes, errors, took, least)
+    errors, took = _each(meshes, lambda size: _rms([_sed(case, size * part, shift) / true - 1 for part, shift in near]))
+    sizes, took = [meshes[0] / fineness for fineness in meshes], [one / len(near) for one in took]
+    return _row(f"finger, {case.title}", "SED of the ending", case.solve.kinematics, sizes, errors, took, least)
+
+
+def _sed(case: Scene, fineness: float, shift: bool) -> float:
+    mesh = MESHED[case.solve.kinematics](case, fineness, shift)
+    return float(mesh.numbers(mesh.solve(case))[0])
 
 
 def _each(meshes: Sequence[Size], error: Callable[[Size], Value]) -> tuple[list[Value], list[float]]:

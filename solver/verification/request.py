@@ -61,16 +61,22 @@ class Request:
         return [row for row in self.rows if isinstance(row, kind)]
 
 
+def repetitions(count: int, most_s: float) -> Iterator[int]:
+    """Yield the numbers up to `count` for `most_s` seconds of `clock`, the first at least."""
+    start = clock()
+    for number in range(count):
+        yield number
+        if clock() - start > most_s:
+            return
+
+
 def median_time(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> float:
     """Return the median time of `work()` [s] over up to `repeats` runs; slow work runs less often, at least once."""
     spans: list[float] = []
-    start_s = clock()
-    for _ in range(repeats):
+    for _ in repetitions(repeats, most_s):
         start = clock()
         work()
         spans.append(clock() - start)
-        if clock() - start_s > most_s:
-            break
     return median(spans)
 
 

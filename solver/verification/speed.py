@@ -10,7 +10,7 @@ from solver.failures import SolveFailure
 from solver.response.finite_answers import alike
 from solver.scene import Scene
 from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
-from solver.verification.request import LeftOut, Request, clock, median_time, rows_within
+from solver.verification.request import LeftOut, Request, clock, median_time, repetitions, rows_within
 from solver.verification.truth import JUDGED, Truth, cases, known_truths
 
 MESHES: dict[
@@ -103,8 +103,7 @@ def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> 
     """
     spans: list[tuple[float, float]] = []
     floors: list[float] = []
-    began = clock()
-    while len(spans) < 5 and (not spans or clock() - began < most_s):
+    for _ in repetitions(5, most_s):
         mesh = MESHED[kind](scene, fineness, False)
         spans.append((mesh.prepared_s, mesh.setup_s))
         floors.append(mesh.floor())

@@ -32,7 +32,7 @@ def test_the_force_of_a_contact_whose_edge_falls_anywhere_converges_with_order_2
 
 def test_the_finger_s_energy_at_the_ending_converges_with_order_2():
     """The root mean square over shifted meshes of nearly one size, as for any contact whose edge falls anywhere."""
-    rows = list(orders.small_finger(quick=False))
+    rows = list(orders.fingers(quick=False, kinematics="small"))
     assert len(rows) == 2
     assert held(rows)
     assert all(row.errors[-1] < 5e-4 for row in rows)
@@ -40,7 +40,7 @@ def test_the_finger_s_energy_at_the_ending_converges_with_order_2():
 
 @pytest.mark.slow
 def test_at_finite_strain_it_converges_too():
-    (row,) = orders.finite_finger(quick=False)
+    (row,) = orders.fingers(quick=False, kinematics="finite")
     assert held([row])
     assert row.errors[-1] < 2e-3
 
