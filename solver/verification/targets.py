@@ -94,10 +94,12 @@ def _at_error(
     accurate = [(took, r) for r in known if r.largest_error(doubts) <= error and (took := time(r)) is not None]
     if not accurate:
         best = min(known, key=lambda r: r.largest_error({}), default=None)
-        how = "" if best is None else f"no mesh that was tried is below: the best is at {_error(best, doubts)}"
-        meshes = (QUICK if request.quick else MESHES)[kinematics]
-        tried = len(rows) >= len(meshes) and (best is None or best.largest_error({}) > error)
-        return replace(target, how=how, tried=tried)
+        if best is None:
+            return target
+        missed = best.largest_error({}) > error
+        words = "no mesh that was tried is below: the best is at" if missed else "the truth is too uncertain to tell:"
+        tried = missed and len(rows) >= len((QUICK if request.quick else MESHES)[kinematics])
+        return replace(target, how=f"{words} {_error(best, doubts)}", tried=tried)
     took, best = min(accurate, key=lambda pair: pair[0])
     how = f"{best.dofs} unknowns, error {_error(best, doubts)}"
     part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""

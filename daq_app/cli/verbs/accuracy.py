@@ -21,7 +21,7 @@ EXAMPLE = "daq-app accuracy --quick --out accuracy"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--quick", action="store_true", help="20 seconds instead of three minutes, and coarser truths")
+    parser.add_argument("--quick", action="store_true", help="half a minute instead of three, and coarser truths")
     parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="the folder (accuracy)")
     parser.add_argument("--docs", type=Path, metavar="DIR", help="also write the tables into the pages of these docs")
     parser.add_argument(
