@@ -185,11 +185,9 @@ class Bridge(QObject):
 
     def _settle(self, judged: Judged) -> None:
         """Ask for the full solve of a stroke that was looked at."""
-        session, quality = self.state.session, judged.quality
-        if session is None or quality.friction is None or quality.steady is None or quality.normal_force is None:
-            return
-        request = Settle(judged.trial, session.plan, quality.friction, quality.normal_force, quality.steady)
-        self.model.settle(request)
+        session, stroke, friction = self.state.session, judged.quality.stroke, judged.quality.friction
+        if session and friction and stroke and stroke.steady and stroke.normal_force:
+            self.model.settle(Settle(judged.trial, session.plan, friction, stroke.normal_force, stroke.steady))
 
     def _fold(self, message: Message) -> None:
         self.state = fold(self.state, message)

@@ -28,6 +28,7 @@ from daq_app.window.course_state import PICTURE, Mark
 from daq_app.window.live_trace import Columns
 from daq_app.window.view_course import KINDS, CourseView, Inspection, StrokeView, Tile, inspection
 from daq_app.wording import tr
+from sessions.strokes.stroke import Stroke, StrokeCurve
 
 # Grades of the style sheet: of tiles, and of strokes.
 TILE_GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}
@@ -119,21 +120,20 @@ class InspectedTrial(QWidget):
             say(self.cells[name], text)
             self.cells[name].setAccessibleName(spoken(name, text))
         for plot in self._plots:
-            plot.setVisible(shown.picture is not None)
-        if shown.picture is not None:
-            self._show_picture(shown)
+            plot.setVisible(shown.stroke is not None and shown.stroke.curve is not None)
+        if shown.stroke is not None and shown.stroke.curve is not None:
+            self._show_course(shown.stroke, shown.stroke.curve)
 
-    def _show_picture(self, shown: Inspection) -> None:
-        picture = shown.picture
-        assert picture is not None
-        time, onset, lift = picture.time, picture.onset, picture.lift
+    def _show_course(self, stroke: Stroke, curve: StrokeCurve) -> None:
+        time, onset, lift = curve.time, stroke.onset, stroke.lift
+        columns = Columns(time, np.vstack([curve.normal, curve.tangential, curve.ratio, curve.speed]))
         begin, end = (float(time[0]), float(time[-1])) if len(time) else (0.0, 0.0)
         marks = [Mark("onset", onset, onset)] if onset is not None else []
         marks += [Mark("lift", lift, lift)] if lift is not None else []
-        marks += [Mark("steady", *shown.steady)] if shown.steady is not None else []
+        marks += [Mark("steady", *stroke.steady)] if stroke.steady is not None else []
         for plot in self._plots:
             plot.show_axis(max(math.ceil(2.0 * (end - begin)) / 2.0, 0.5))  # whole halves of a second
-            plot.show_columns(Columns(time, np.asarray(picture.values)), end, marks, 0.0)
+            plot.show_columns(columns, end, marks, 0.0)
 
 
 class Middle(QWidget):

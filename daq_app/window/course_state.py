@@ -2,11 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, NamedTuple, cast, get_args
 
-import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
@@ -16,6 +14,7 @@ from sessions.recording import LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
 from sessions.strokes import FrictionParameters
+from sessions.strokes.stroke import Grade, Stroke
 
 Phase = Literal[
     "idle", "resting", "mounting", "taring", "ready", "stroking", "scoring", "settling", "paused", "closing", "ended",
@@ -29,34 +28,40 @@ PICTURE = {"N": (2, "N"), "T": (2, "N"), "mu": (2, ""), "speed": (0, "mm/s")}  #
 MARKS = 40  # that are kept for the plots: more than a minute can hold
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StrokePicture:
-    """The course of a stroke with some time around it, n readings, as it is shown when its trial is inspected."""
+class Remark(NamedTuple):
+    """Something that is wrong with a stroke."""
 
-    time: NDArray[np.float64]  # (n,) [s, device time]
-    values: NDArray[np.float64]  # (4, n) rows of PICTURE: N, T [N], mu [-], speed [mm/s]; nan where it means nothing
-    onset: float | None  # [s, device time]
-    lift: float | None
-    means: tuple[float | None, ...]  # of the rows of PICTURE over the steady window
+    grade: Grade
+    words: str  # few
+    sentence: str  # the same at length
+    advice: str  # what to do about it, one sentence; empty where no further stroke mends it
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
     """What is known of a stroke before it is scored. Provisional: the analysis of the recording is what counts."""
 
-    grade: Literal["good", "doubtful", "refused"]
-    words: tuple[str, ...]  # what is wrong, the worst first; none for a good stroke
-    sentences: tuple[str, ...]  # the same at length
-    steady: tuple[float, float] | None  # [s, device time]
-    mu: float | None  # mean of T/N over the steady window [-]
-    interval: tuple[float, float] | None
-    speed: float | None  # [mm/s]
-    fell: float | None  # by what share N fell from the first to the last quarter of the steady window [-]
+    remarks: tuple[Remark, ...] = ()  # the worst first; none for a good stroke
+    stroke: Stroke | None = None
     friction: FrictionParameters | None = None  # that the model is to get
-    normal_force: float | None = None  # mean over the steady window [N]
-    advice: str = ""  # what to do about the worst, one sentence
-    picture: StrokePicture | None = None
-    redo: bool = False  # another stroke mends the worst
+    fell: float | None = None  # by what share N fell from the first to the last quarter of the steady window [-]
+
+    @property
+    def grade(self) -> Literal["good", "doubtful", "refused"]:
+        """Return that of the worst; a mere note is a doubt here."""
+        if any(remark.grade == "refused" for remark in self.remarks):
+            return "refused"
+        return "doubtful" if self.remarks else "good"
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Return what is wrong in few words, each once."""
+        return tuple(dict.fromkeys(remark.words for remark in self.remarks))
+
+    @property
+    def sentences(self) -> str:
+        """Return what is wrong at length."""
+        return " ".join(remark.sentence for remark in self.remarks)
 
 
 class Judged(Struct, frozen=True):
@@ -343,9 +348,9 @@ def _judge(session: SessionState, trial: int, take: int, quality: Quality) -> Se
     if of is None or of.takes != take:
         return session
     session = replace(session.with_trial(trial, quality=quality), judged=trial)
-    if quality.steady is None or session.over:
+    if quality.stroke is None or quality.stroke.steady is None or session.over:
         return session
-    return _add_mark(session, Mark("steady", *quality.steady))
+    return _add_mark(session, Mark("steady", *quality.stroke.steady))
 
 
 def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mapping[str, Any]) -> Mark:

@@ -10,7 +10,7 @@ import numpy as np
 
 from daq_app.child_process import give_way, process_pool
 from daq_app.recorder import messages as m
-from daq_app.window.course_state import Judged, Quality, StrokePicture
+from daq_app.window.course_state import Judged, Quality, Remark
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.state import AppState, DrawingFailed
 from daq_app.wording import tr, tr_noop
@@ -60,30 +60,18 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
     mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in FLAWS]
     short = {flaw.name: FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), "")) for flaw in mentioned}
-    # grade, few words, at length, and what to do
-    remarks: list[tuple[str, str, str, str]] = [
-        (flaw.grade, short[flaw.name][0], flaw.sentence, short[flaw.name][1]) for flaw in mentioned
-    ]
-    fell = None if stroke is None else _fell(stroke)
+    remarks = [Remark(flaw.grade, short[flaw.name][0], flaw.sentence, short[flaw.name][1]) for flaw in mentioned]
+    if stroke is None:
+        worst, *milder = remarks or [Remark("refused", FLAWS[FlawName.NO_STROKE][0], "", "")]
+        advice = worst.advice or FLAWS[FlawName.NO_STROKE][1]
+        return Quality((worst._replace(grade="refused", advice=advice), *milder))
+    fell = _fell(stroke)
     if fell is not None and fell >= FELL:
         share = 100 * (1 - fell)
         at_length = tr("The normal force ended at {share:.0f} % of what it was: the finger was leaving.", share=share)
-        refusals = sum(grade == "refused" for grade, *_ in remarks)
-        remarks.insert(refusals, ("doubtful", LEAVING, at_length, PRESS_ON))
-    words = list(dict.fromkeys(short for _, short, _, _ in remarks))
-    sentences = [at_length for _, _, at_length, _ in remarks]
-    advice = remarks[0][3] if remarks else ""
-    grades = {flaw.grade for flaw in mentioned}
-    grade = "refused" if "refused" in grades else "doubtful" if words else "good"
-    if stroke is None:
-        known = tuple(words) or FLAWS[FlawName.NO_STROKE][:1]
-        advice = advice or FLAWS[FlawName.NO_STROKE][1]
-        return Quality("refused", known, tuple(sentences), None, None, None, None, None, advice=advice, redo=True)
-    mends = bool(advice) and remarks[0][0] != "note"
-    return Quality(
-        grade, tuple(words), tuple(sentences), stroke.steady, stroke.mu_dynamic, stroke.mu_dynamic_interval,
-        stroke.speed, fell, analysis.friction[0], stroke.normal_force, advice, _picture(stroke), mends,
-    )  # fmt: skip
+        refusals = sum(remark.grade == "refused" for remark in remarks)
+        remarks.insert(refusals, Remark("doubtful", LEAVING, at_length, PRESS_ON))
+    return Quality(tuple(remarks), stroke, analysis.friction[0], fell)
 
 
 def in_newtons(info: TransducerInfo) -> TransducerInfo:
@@ -91,16 +79,6 @@ def in_newtons(info: TransducerInfo) -> TransducerInfo:
     known = info.calibration
     as_wrench = Calibration(known.serial, "N, N mm", np.eye(6), known.rated, known.source)
     return replace(info, calibration=as_wrench)
-
-
-def _picture(stroke: Stroke) -> StrokePicture | None:
-    """Return what is shown of a stroke later; None where nothing of its course is known."""
-    curve = stroke.curve
-    if curve is None:
-        return None
-    values = np.vstack([curve.normal, curve.tangential, curve.ratio, curve.speed])
-    means = (stroke.normal_force, stroke.tangential_force, stroke.mu_dynamic, stroke.speed)
-    return StrokePicture(curve.time, values, stroke.onset, stroke.lift, means)
 
 
 def _fell(stroke: Stroke) -> float | None:

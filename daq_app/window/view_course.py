@@ -5,19 +5,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.recorder import messages as m
-from daq_app.window.course_state import (
-    IN_A_TRIAL,
-    PICTURE,
-    Quality,
-    SessionState,
-    StrokePicture,
-    TrialState,
-    redo_targets,
-)
+from daq_app.window.course_state import IN_A_TRIAL, PICTURE, Quality, SessionState, TrialState, redo_targets
 from daq_app.window.state import BenchState, Message, NewSession
 from daq_app.wording import quantity, tr, tr_noop
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.run import steps
+from sessions.strokes.stroke import Stroke
 
 NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot say
     steps.AskScore: steps.Scored(None),
@@ -34,6 +27,7 @@ KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state witho
     "skipped": ("–", tr_noop("skipped")),
     "coming": ("○", tr_noop("still to come")),
 }
+MEANS = ("normal_force", "tangential_force", "mu_dynamic", "speed")  # of a stroke, in the order of PICTURE
 NO_FORCES = tr_noop("Forces are not shown in this protocol.")
 
 
@@ -65,8 +59,7 @@ class Inspection:
     details: str  # every flaw at length, the worst first
     grade: Literal["none", "good", "doubtful", "refused"] = "none"
     cells: tuple[tuple[str, str], ...] = tuple((name, "–") for name in PICTURE)  # means over the steady window
-    picture: StrokePicture | None = None
-    steady: tuple[float, float] | None = None  # [s, device time]
+    stroke: Stroke | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,20 +294,18 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
         return PlanRow("coming", " ", name)
     shown = session.plan.shown.experimenter
     quality = trial.quality
-    mu = _mu(quality) if quality is not None and "forces" in shown else ""
+    mu = _mu(quality.stroke) if quality is not None and "forces" in shown else ""
     answer = trial.answer if "answer" in shown else ""
     flawed = "!" if quality is not None and quality.words else ""
     return PlanRow("done", "✓", name, "   ".join(filter(None, (mu, answer, flawed))))
 
 
-def _mu(quality: Quality) -> str:
+def _mu(stroke: Stroke | None) -> str:
     """Return the coefficient as its interval: no digit more than is known."""
-    if quality.mu is None:
+    if stroke is None or stroke.mu_dynamic is None:
         return "µ –"
-    if quality.interval is None:
-        return f"µ {quality.mu:.2f}"
-    low, high = quality.interval
-    return f"µ {low:.2f}–{high:.2f}" if f"{low:.2f}" != f"{high:.2f}" else f"µ {quality.mu:.2f}"
+    low, high = stroke.mu_dynamic_interval or (stroke.mu_dynamic, stroke.mu_dynamic)
+    return f"µ {low:.2f}–{high:.2f}" if f"{low:.2f}" != f"{high:.2f}" else f"µ {stroke.mu_dynamic:.2f}"
 
 
 def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
@@ -322,16 +313,18 @@ def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
     if judged is None or judged.quality is None:
         return StrokeView("none", tr("No stroke yet."))
     quality, code = judged.quality, judged.trial.stimulus.code
-    parts, steady, share = [tr("Stroke on {code}", code=code)], quality.steady, 100 * (quality.fell or 0.0)
-    parts += [] if steady is None else [tr("steady {duration:.1f} s", duration=steady[1] - steady[0])]
-    parts += [] if quality.mu is None else [_mu(quality)]
-    parts += [] if quality.speed is None else [quantity(quality.speed, 0, "mm/s")]
+    parts, share = [tr("Stroke on {code}", code=code)], 100 * (quality.fell or 0.0)
+    if (stroke := quality.stroke) is not None:
+        steady = stroke.steady
+        parts += [] if steady is None else [tr("steady {duration:.1f} s", duration=steady[1] - steady[0])]
+        parts += [] if stroke.mu_dynamic is None else [_mu(stroke)]
+        parts += [] if stroke.speed is None else [quantity(stroke.speed, 0, "mm/s")]
     if quality.fell is not None:
         words = tr_noop("N fell {share:.0f} %") if share >= 0 else tr_noop("N rose {share:.0f} %")
         parts.append(tr(words, share=abs(share)))
     parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
     redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
-    return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)
+    return StrokeView(quality.grade, " · ".join(parts), quality.sentences, redo)
 
 
 def tiles(session: SessionState) -> tuple[Tile, ...]:
@@ -356,23 +349,19 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
         return Inspection(number, heading, tr(NO_FORCES), details)
     if quality is None:
         return Inspection(number, heading, _why_none(session, trial), details)
-    picture = quality.picture
-    means = (None,) * len(PICTURE) if picture is None else picture.means
+    means = [None if quality.stroke is None else getattr(quality.stroke, name) for name in MEANS]
     cells = tuple((name, quantity(mean, *form)) for (name, form), mean in zip(PICTURE.items(), means, strict=True))
-    at_length = " ".join((*quality.sentences, details)).strip()
-    return Inspection(number, heading, verdict(quality), at_length, quality.grade, cells, picture, quality.steady)
+    at_length = f"{quality.sentences} {details}".strip()
+    return Inspection(number, heading, verdict(quality), at_length, quality.grade, cells, quality.stroke)
 
 
 def verdict(quality: Quality) -> str:
-    """Return one verdict on a stroke: whether it is to be done again, the worst flaw, then what to do.
-
-    >>> verdict(Quality("refused", ("pressed too lightly",), (), None, None, None, None, None, advice="Press harder."))
-    'Redo: pressed too lightly. Press harder.'
-    """
-    if not quality.words:
+    """Return one verdict on a stroke: whether it is to be done again, the worst flaw, then what to do."""
+    if not quality.remarks:
         return tr("Good")
-    opening = tr("Redo") if quality.grade == "refused" or quality.redo else tr("Doubtful")
-    return f"{opening}: {tr(quality.words[0]).rstrip('.')}. {tr(quality.advice)}".strip()
+    worst = quality.remarks[0]
+    mends = worst.grade == "refused" or (worst.advice and worst.grade == "doubtful")
+    return f"{tr('Redo') if mends else tr('Doubtful')}: {tr(worst.words).rstrip('.')}. {tr(worst.advice)}".strip()
 
 
 def _kind(session: SessionState, trial: TrialState) -> TileKind:

@@ -1,11 +1,11 @@
 """What a recorder tells in the course of a session, for tests of what the window makes of it."""
 
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 
 import numpy as np
 
 from daq_app.recorder import messages as m
-from daq_app.window.course_state import Quality
+from daq_app.window.course_state import Quality, Remark
 from daq_app.window.state import AppState, fold
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
@@ -13,6 +13,7 @@ from sessions.plan.protocols import plan, protocol
 from sessions.recording import Acknowledged, LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
+from sessions.strokes.stroke import Stroke, StrokeCurve
 
 CALIBRATION = Calibration(
     "FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([36.0] * 3 + [500.0] * 3), "typed"
@@ -20,8 +21,19 @@ CALIBRATION = Calibration(
 INFO = TransducerInfo("net-ft://192.168.1.1", "net-ft", "Net F/T", "FT1", False, 7000.0, 7000.0, CALIBRATION)
 PLAN = plan(protocol("sensotact-friction"), "P07", 7)
 FIRST, SECOND = PLAN.trials[:2]
-GOOD = Quality("good", (), (), (2.0, 3.5), 0.44, (0.438, 0.444), 21.0, 0.08)
-BAD = replace(GOOD, grade="refused", words=("no steady window",), steady=None, mu=None)
+KNOWN = {"steady": (2.0, 3.5), "mu_dynamic": 0.44, "mu_dynamic_interval": (0.438, 0.444), "speed": 21.0}
+STROKE = Stroke(**dict.fromkeys(f.name for f in fields(Stroke) if f.default is f.default_factory is MISSING) | KNOWN)
+GOOD = Quality((), STROKE, fell=0.08)
+FLAW = Remark("refused", "no steady window", "", "")
+BAD = Quality((FLAW,), replace(STROKE, steady=None, mu_dynamic=None), fell=0.08)
+
+
+def drawn(time):
+    """Return a stroke whose course is known at n times, with means that are not its own."""
+    one, two = np.ones(time.size), np.ones((time.size, 2))
+    curve = StrokeCurve(time, one, one, one, two, one, two, one, (0.0, 0.0), 1.0)
+    means = {"normal_force": 1.234, "tangential_force": 0.5, "mu_dynamic": 0.41, "speed": 20.6}
+    return replace(STROKE, onset=time[0] + 0.5, lift=time[-1] - 0.5, curve=curve, **means)
 
 
 def after(*messages, state=None):

@@ -9,13 +9,14 @@ from daq_app.qt import preferences, tokens
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.middle import InspectedTrial, TrialStrip
 from daq_app.qt.preferences import DRAWER, DRAWER_SIZES
-from daq_app.window.course_state import Mark, StrokePicture
+from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.state import NewSession
 from daq_app.window.view_course import Inspection, Tile
 from sessions.run import steps
 from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
 from tests.daq_app.qt.written_text import cut_off
+from tests.daq_app.session_messages import drawn
 
 pytestmark = pytest.mark.qt
 
@@ -32,7 +33,7 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     begin(driver, "P30")
     assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
     one_trial(driver, drawn=False)
-    quality = driver.session.of(1).quality
+    stroke = driver.session.of(1).quality.stroke
     first = middle.strip.tiles[0]
     click(first)
     assert middle.trial.isVisible()
@@ -40,10 +41,9 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     assert first.isChecked()
     code = driver.session.trials[0].trial.stimulus.code
     assert middle.trial.heading.text().startswith(f"Trial 1, {code}: done")
-    assert middle.trial.cells["mu"].accessibleName() == f"Friction coefficient {quality.mu:.2f}"
-    time, normal = quality.picture.time, quality.picture.values[0]
-    steady = (time >= quality.steady[0]) & (time <= quality.steady[1])
-    assert np.mean(normal[steady]) == pytest.approx(quality.normal_force, rel=0.02)
+    assert middle.trial.cells["mu"].accessibleName() == f"Friction coefficient {stroke.mu_dynamic:.2f}"
+    steady = (stroke.curve.time >= stroke.steady[0]) & (stroke.curve.time <= stroke.steady[1])
+    assert np.mean(stroke.curve.normal[steady]) == pytest.approx(stroke.normal_force, rel=0.02)
     driver.application.processEvents()
     still, newest = middle.trial.grab().toImage(), window.bridge.feed.trace.newest
     driver.until(lambda: window.bridge.feed.trace.newest > newest + 1.0, "further readings")
@@ -122,14 +122,10 @@ def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application,
     type_size(scale)
     shown = InspectedTrial(lambda: None)
     shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
-    picture = StrokePicture(np.linspace(0.0, 3.0, 50), np.ones((4, 50)), 0.5, 2.5, (1.2, 0.5, 0.41, 20.6))
     cells = (("N", "12.34 N"), ("T", "12.34 N"), ("mu", "0.41"), ("speed", "120 mm/s"))
     words = "Redo: the finger was not lifted between strokes. Lift the finger between strokes."
-    shown.show_trial(
-        Inspection(
-            12, "Trial 12, D86, take 2: done again, score 40", words, words, "refused", cells, picture, (1.0, 2.0)
-        )
-    )
+    heading, stroke = "Trial 12, D86, take 2: done again, score 40", drawn(np.linspace(0.0, 3.0, 50))
+    shown.show_trial(Inspection(12, heading, words, words, "refused", cells, stroke))
     shown.resize(420, round(640 * scale))  # as the middle of a window of 1366 pixels at 200 % is
     shown.show()
     application.processEvents()

@@ -79,7 +79,7 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
     assert driver.state.failed is None
     assert driver.state.drawing is None
     qualities = [trial.quality for trial in driver.session.trials]
-    assert all(quality is not None and quality.mu is not None for quality in qualities)
+    assert all(quality is not None and quality.stroke.mu_dynamic is not None for quality in qualities)
     QTest.keyClick(window, SPACE)
     assert driver.session is None
 

@@ -53,3 +53,13 @@ def test_the_worst_comes_first_and_says_what_to_do(judged):
 def test_what_no_further_stroke_mends_is_doubted_alone(judged):
     assert verdict(judged(2.0, (FlawName.HEIGHT_UNKNOWN, "doubtful"))).startswith("Doubtful: height unknown")
     assert verdict(judged(2.0, (FlawName.LOST_READINGS, "note"))).startswith("Doubtful: readings were lost")
+
+
+@pytest.mark.parametrize("flaws", [[], [Flaw(FlawName.NO_STROKE, "No stroke at length.", "refused")]])
+def test_a_take_without_a_stroke_asks_for_one(monkeypatch, flaws):
+    analysis = SimpleNamespace(strokes=[], flaws=flaws, friction=[])
+    monkeypatch.setattr(stroke_quality, "analyse_blocks", lambda *_: analysis)
+    quality = stroke_quality.stroke_quality(ReadingBlock.__new__(ReadingBlock), PLAN, INFO, PLAN.trials[0])
+    assert verdict(quality) == "Redo: no stroke was found. Stroke once, firmly, and lift."
+    assert quality.grade == "refused"
+    assert quality.stroke is None

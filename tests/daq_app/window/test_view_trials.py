@@ -4,16 +4,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from session_messages import BAD, BEGUN, FIRST, GOOD, PLAN, READY, SCORE, SECOND, TARE, TOUCH, after, logged
+from session_messages import (
+    BAD,
+    BEGUN,
+    FIRST,
+    FLAW,
+    GOOD,
+    PLAN,
+    READY,
+    SCORE,
+    SECOND,
+    TARE,
+    TOUCH,
+    after,
+    drawn,
+    logged,
+)
 
 from daq_app.recorder import messages as m
-from daq_app.window.course_state import Judged, StrokePicture
+from daq_app.window.course_state import Judged, Quality
 from daq_app.window.state import BenchState
 from daq_app.window.view_course import KINDS, course_view, inspection, tiles, verdict
 from sessions.plan.plan import Visibility
 from sessions.run import steps
 
-PICTURE = StrokePicture(np.arange(3.0), np.ones((4, 3)), 0.5, 1.5, (1.234, 0.5, 0.41, 20.6))
+DRAWN = drawn(np.arange(3.0))
 KEPT = (logged("scored", 1, score=40.0), logged("take_kept", 1), steps.AskMount(SECOND))
 
 
@@ -42,20 +57,20 @@ def test_no_two_states_share_a_shape_or_words():
 
 
 def test_an_inspected_trial_says_its_verdict_its_means_and_its_score():
-    judged = replace(GOOD, picture=PICTURE)
+    judged = replace(GOOD, stroke=DRAWN)
     shown = inspection(after(*SCORE, Judged(1, 1, judged), *KEPT).session, 1)
     assert shown.heading == f"Trial 1, {FIRST.stimulus.code}: done, score 40"
     assert shown.verdict == "Good"
     assert shown.cells == (("N", "1.23 N"), ("T", "0.50 N"), ("mu", "0.41"), ("speed", "21 mm/s"))
-    assert shown.picture is PICTURE
-    assert shown.steady == (2.0, 3.5)
+    assert shown.stroke is DRAWN
 
 
 def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
-    flawed = replace(BAD, advice="Slide further, at one speed.")
-    assert verdict(flawed) == "Redo: no steady window. Slide further, at one speed."
-    assert verdict(replace(flawed, grade="doubtful")).startswith("Doubtful: no steady window")
-    assert verdict(replace(flawed, grade="doubtful", redo=True)).startswith("Redo: no steady window. Slide")
+    flawed = FLAW._replace(advice="Slide further, at one speed.")
+    assert verdict(Quality((flawed,))) == "Redo: no steady window. Slide further, at one speed."
+    assert verdict(Quality((FLAW._replace(grade="doubtful"),))) == "Doubtful: no steady window."
+    assert verdict(Quality((flawed._replace(grade="note"),))).startswith("Doubtful: no steady window")
+    assert verdict(Quality((flawed._replace(grade="doubtful"),))).startswith("Redo: no steady window. Slide")
 
 
 @pytest.mark.parametrize(
@@ -69,17 +84,17 @@ def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
 def test_a_trial_without_a_stroke_says_why(messages, number, why):
     shown = inspection(after(*messages).session, number)
     assert shown.verdict.startswith(why)
-    assert shown.picture is None
+    assert shown.stroke is None
     assert {text for _, text in shown.cells} == {"–"}
 
 
 def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
     blind = replace(PLAN, shown=Visibility(experimenter=()))
     begun = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
-    judged = Judged(1, 1, replace(GOOD, picture=PICTURE))
+    judged = Judged(1, 1, replace(GOOD, stroke=DRAWN))
     shown = inspection(after(BEGUN[0], begun, *TARE[2:], judged, *KEPT).session, 1)
     assert shown.verdict == "Forces are not shown in this protocol."
-    assert shown.picture is None
+    assert shown.stroke is None
     assert "score" not in shown.heading
 
 
@@ -89,7 +104,7 @@ def test_a_take_that_was_discarded_keeps_its_reason():
 
 
 def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset():
-    done = (*SCORE, Judged(1, 1, replace(GOOD, picture=PICTURE)), *KEPT)
+    done = (*SCORE, Judged(1, 1, replace(GOOD, stroke=DRAWN)), *KEPT)
     again = (
         logged("redo", 2, reason="mistaken"),
         logged("take_discarded", 1, take=1, reason="mistaken"),
