@@ -272,7 +272,7 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         links.append(Link(words, "window", tr("of stroke {number}, device's clock", number=stroke.number)))
     words, more = tr("raw readings"), tr("counts, sequence and device counter, as they were recorded")
     if state.read is not None and state.read.stroke == stroke.number:
-        words, more = tr("readings: {count}", count=len(state.read.readings)), state.read.readings.place
+        words, more = tr("readings: {count}", count=len(state.read.readings.block)), state.read.readings.place
     return (*links, Link(words, "readings", more))
 
 

@@ -11,12 +11,11 @@ from daq_app.wording import tr, tr_noop
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE, SEALED_FILE
-from sessions.report.contents import StrokeFinding, same_fields
+from sessions.report.contents import StrokeFinding
 from sessions.strokes.decisions import Decision, Decisions
 from sessions.strokes.forces import in_face_frame
 
 Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 AROUND = 1.0  # before and after a stroke of a recording without trials [s]
 MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a replay [s]
@@ -33,20 +32,11 @@ class RawReadings:
     """n readings and where they lie."""
 
     place: str  # file, data set and rows
-    unit: str  # of `raw`
-    sequence: Whole  # (n,)
-    counter: Whole  # (n,)
-    status: Whole  # (n,)
-    received_ns: Whole  # (n,)
-    time: Array  # (n,) [s, device time]
-    raw: Array  # (n, 6)
+    unit: str  # of the raw numbers
+    block: ReadingBlock
     normal: Array  # (n,) unfiltered, `zero` taken off [N]
     tangential: Array  # (n,) likewise [N]
     zero: str  # which zero was taken off, for people
-
-    def __len__(self) -> int:
-        """Return the number of readings."""
-        return len(self.time)
 
 
 class RawFile:
@@ -104,9 +94,8 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
     words = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
-    read, normal, tangential = same_fields(block, RawReadings), -wrench[:, 2], np.hypot(wrench[:, 0], wrench[:, 1])
-    unit = calibration.raw_unit
-    return RawReadings(place=place, unit=unit, zero=words, normal=normal, tangential=tangential, **read)
+    tangential = np.hypot(wrench[:, 0], wrench[:, 1])
+    return RawReadings(place, calibration.raw_unit, block, -wrench[:, 2], tangential, words)
 
 
 class History(Struct, frozen=True):

@@ -96,7 +96,7 @@ class StrokeColumn(QWidget):
         self.readings.table.setFocus()
         if self._read is not None and self._stroke is not None and self._stroke.steady is not None:
             readings = self._read.readings
-            self.readings.go_to(int(readings.time.searchsorted(self._stroke.steady[0])))
+            self.readings.go_to(int(readings.block.time.searchsorted(self._stroke.steady[0])))
 
     def go_to_numbers(self) -> None:
         self.tabs.setCurrentIndex(NUMBERS)
@@ -124,7 +124,7 @@ class StrokeColumn(QWidget):
         readings = None if read is None else read.readings
         self.stroke.show_readings(readings)
         self.readings.show_readings(readings, None if stroke is None else stroke.steady)
-        times: list[float] = [] if readings is None else readings.time.tolist()
+        times: list[float] = [] if readings is None else readings.block.time.tolist()
         with QSignalBlocker(self.player):
             self.player.set_times(times, max(len(times) - 1, 0))
         if times and self._play_next:

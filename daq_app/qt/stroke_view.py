@@ -185,13 +185,13 @@ class StrokeView(QWidget):
 
     def _draw(self, at: int | None) -> None:
         raw = self._raw
-        now = None if at is None or raw is None else float(raw.time[at]) - self._origin
+        now = None if at is None or raw is None else float(raw.block.time[at]) - self._origin
         until = len(self._time) if now is None else int(np.searchsorted(self._time, now, side="right"))
         for curve, column in zip(self._curves, self._columns, strict=True):
             curve.setData(self._time[:until], column[:until])
-        stop = 0 if raw is None else len(raw) if at is None else at + 1
+        stop = 0 if raw is None else len(raw.block) if at is None else at + 1
         for curve, name in zip(self._recorded, ("normal", "tangential"), strict=True):
-            shown = () if raw is None else (raw.time[:stop] - self._origin, getattr(raw, name)[:stop])
+            shown = () if raw is None else (raw.block.time[:stop] - self._origin, getattr(raw, name)[:stop])
             curve.setData(*(shown or ([], [])))
         for line in self._now:
             line.setVisible(now is not None)

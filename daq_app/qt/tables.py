@@ -170,7 +170,7 @@ class _Model(QAbstractTableModel):
         self.endResetModel()
 
     def rowCount(self, parent: Index | None = None) -> int:
-        return 0 if self._readings is None else len(self._readings)
+        return 0 if self._readings is None else len(self._readings.block)
 
     def columnCount(self, parent: Index | None = None) -> int:
         return len(HEAD) + 8
@@ -184,8 +184,8 @@ class _Model(QAbstractTableModel):
         r = self._readings
         if r is None:
             return None
-        at, column = index.row(), index.column()
-        inside = self._steady is not None and self._steady[0] <= r.time[at] <= self._steady[1]
+        at, column, block = index.row(), index.column(), r.block
+        inside = self._steady is not None and self._steady[0] <= block.time[at] <= self._steady[1]
         if role == Qt.ItemDataRole.FontRole:
             return self._bold if inside else None
         if role == Qt.ItemDataRole.TextAlignmentRole:
@@ -196,13 +196,13 @@ class _Model(QAbstractTableModel):
             case 0:
                 return tr("steady") if inside else ""
             case 4:
-                return f"{r.time[at]:.6f}"
+                return f"{block.time[at]:.6f}"
             case 1 | 2 | 3 | 5:
-                return str((r.sequence, r.counter, r.status, r.time, r.received_ns)[column - 1][at])
+                return str((block.sequence, block.counter, block.status, block.time, block.received_ns)[column - 1][at])
             case 12 | 13:
                 return f"{(r.normal, r.tangential)[column - 12][at]:.4f}"
             case _:
-                return f"{r.raw[at, column - 6]:.10g}"
+                return f"{block.raw[at, column - 6]:.10g}"
 
 
 def number_in(text: str) -> float | None:

@@ -304,9 +304,9 @@ def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_wor
     shown = said[-1].read.readings
     with h5py.File(SESSION / "session.h5") as file:
         first, last = map(int, shown.place.split("rows ")[1].split(" to "))
-        np.testing.assert_array_equal(file["readings/raw"][first : last + 1], shown.raw)
-        np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], shown.sequence)
-        np.testing.assert_array_equal(file["readings/counter"][first : last + 1], shown.counter)
+        np.testing.assert_array_equal(file["readings/raw"][first : last + 1], shown.block.raw)
+        np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], shown.block.sequence)
+        np.testing.assert_array_equal(file["readings/counter"][first : last + 1], shown.block.counter)
 
 
 def test_the_zero_of_shown_readings_is_that_of_the_last_moments_before_contact_whatever_the_rate_is_said_to_be():
@@ -315,7 +315,8 @@ def test_the_zero_of_shown_readings_is_that_of_the_last_moments_before_contact_w
     shown = RawFile(recording).around(finding)
     unknown = replace(recording, info=replace(recording.info, rate=float("nan")))
     assert RawFile(unknown).around(finding).zero == shown.zero
-    free = (shown.time < finding.onset) & (shown.time > shown.time[shown.time < finding.onset][-1] - 0.3)
+    time = shown.block.time
+    free = (time < finding.onset) & (time > time[time < finding.onset][-1] - 0.3)
     assert shown.zero == f"mean before contact, readings: {free.sum()}"
     assert shown.normal[free].mean() == pytest.approx(0.0, abs=1e-9)
 

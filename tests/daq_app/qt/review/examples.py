@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 
 from daq_app.analyst.frame import Film, Frame, Instant, Parts
 from daq_app.analyst.stroke import RawReadings
+from drivers.readings import ReadingBlock
 from solver.prediction import Skin
 
 SESSION = Path(__file__).parents[3] / "data" / "sessions" / "version-1" / "sealed"
@@ -55,9 +56,8 @@ def film(**more):
 def raw(stroke, n=50):
     time_s = np.linspace(stroke.onset - 0.1, stroke.lift + 0.1, n)
     whole = np.arange(n)
-    return RawReadings(
-        "here", "counts", whole + 7, whole, whole, whole, time_s, np.ones((n, 6)), time_s, time_s, "zero"
-    )
+    block = ReadingBlock(whole + 7, whole, whole, time_s, whole, np.ones((n, 6)))
+    return RawReadings("here", "counts", block, time_s, time_s, "zero")
 
 
 def drag(application, widget, begin, end, held=Qt.KeyboardModifier.NoModifier):
