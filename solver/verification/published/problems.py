@@ -115,8 +115,8 @@ def hertz() -> Iterator[Problem]:
     for problem, young, nu, radius, load, half_width, peak in HERTZ:
         numbers = contacts.hertz(young, nu, radius, load, half_width, peak)
         source = KONTER if radius == 50.0 else JOHNSON
-        yield _row(problem, source, SECOND_MOMENT, half_width, numbers.half_width, 0.01)
-        yield _row(problem, source, "peak p0 [MPa]", peak, numbers.peak, 0.01)
+        yield _row(problem, source, SECOND_MOMENT, half_width, numbers.half_width, 0.001)
+        yield _row(problem, source, "peak p0 [MPa]", peak, numbers.peak, 0.001)
 
 
 def cylinder() -> Iterator[Problem]:
@@ -144,8 +144,8 @@ def light_finite() -> Iterator[Problem]:
     """Yield half-width and peak of a contact at finite strain, so light that small-strain theory holds."""
     light = contacts.light("finite")
     problem, width = "Hertz at finite strain, a/R 0.001", light.width(light.press) / light.half_width
-    yield _row(problem, JOHNSON, "half-width a, by a", 1.0, width, 0.01)
-    yield _row(problem, JOHNSON, "peak p0, by p0", 1.0, light.at_middle(light.press.normal) / light.peak, 0.01)
+    yield _row(problem, JOHNSON, "half-width a, by a", 1.0, width, 0.003)
+    yield _row(problem, JOHNSON, "peak p0, by p0", 1.0, light.at_middle(light.press.normal) / light.peak, 0.003)
 
 
 def partial_slip(kinematics: Kinematics = "small") -> Iterator[Problem]:
@@ -156,7 +156,7 @@ def partial_slip(kinematics: Kinematics = "small") -> Iterator[Problem]:
         problem, half = f"partial slip{WHERE[kinematics]}, Q/(mu P) {part:g}", math.sqrt(1 - part)
         traction = -light.at_middle(state.tangential) / (mu * light.peak)
         yield _row(problem, MINDLIN, "half stick c/a", half, light.stick_width(state, mu), 0.02)
-        yield _row(problem, MINDLIN, "q(0)/(mu p0)", 1 - half, traction, 0.02)
+        yield _row(problem, MINDLIN, "q(0)/(mu p0)", 1 - half, traction, 0.005)
 
 
 def bound_on_hertz(kinematics: Kinematics = "small") -> Iterator[Problem]:
