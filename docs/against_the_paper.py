@@ -108,6 +108,10 @@ def _claims(rows_of: Mapping[str, list[dict[str, float]]]) -> str:
     ends = max(row["sed"] for row in slippery), max(row["sed"] for row in sticky)
     least = min(row["sed"] for row in slippery)
     lost = sum(not np.isfinite(row["finite"]) for row in sticky)
+    # The sentences below say this: a solver that no longer does makes no page.
+    assert r["stickiness"] > 0.0 > r["slipperiness"]
+    assert bounds["stickiness"] > 0.0 > bounds["slipperiness"]
+    assert max(*same, *large) < 1.0
     lines = [
         "## What the paper claims",
         "",
