@@ -152,7 +152,7 @@ def measure(
         except KeyboardInterrupt:
             stopped = True
             left_out.append(f"Stopped during: {subject.doing}.")
-        except (SolveFailure, ArithmeticError, ValueError) as failure:
+        except (SolveFailure, ArithmeticError, MemoryError, ValueError) as failure:
             left_out.append(f"{subject.doing.capitalize()} broke off: {failure}")
         rows[subject.name], took[subject.name] = tuple(subject_rows), clock() - now
     return RunResults(begun, quick, stopped, took, rows, tuple(left_out))

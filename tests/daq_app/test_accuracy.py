@@ -385,9 +385,10 @@ def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
 
 
 @pytest.mark.usefixtures("unloaded")
-def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
+@pytest.mark.parametrize("kind", [ValueError, MemoryError])
+def test_a_subject_that_breaks_off_loses_nothing_of_the_others(kind):
     first, second = ROWS["growth"][:2]
-    parts = [subject("one", first, ValueError("bad luck")), subject("two", second)]
+    parts = [subject("one", first, kind("bad luck")), subject("two", second)]
     found = measure(True, quiet, HOST, parts, seconds=5.0)
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("The one broke off: bad luck",)
