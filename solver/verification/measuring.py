@@ -51,7 +51,7 @@ class Subject:
     kinds: "tuple[type[DataclassInstance], ...]"  # of its rows
 
 
-# In order: a later subject may use the rows of an earlier one.
+# In order: a later subject may use the rows of an earlier one, and processes take their time whatever is left.
 SUBJECTS = (
     Subject("machine", "machine", 0.0, 0.0, machine.measure, (machine.Machine,)),
     Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure, (truth.Truth,)),
@@ -63,11 +63,11 @@ SUBJECTS = (
     Subject("costs", "cost breakdown", 6.0, 0.6, costs.measure, (costs.Cost,)),
     Subject("warm", "the warm stepper", 10.0, 1.5, warm.measure, (warm.Warm,)),
     Subject("histories", "courses against direct states", 8.0, 0.3, histories.measure, (histories.March,)),
-    Subject("processes", "cold starts and memory", 15.0, 2.5, processes.measure, (processes.Cold, processes.Memory)),
     Subject("problems", "published problems", 10.0, 1.6, problems.measure, (problems.Problem,)),
     Subject("orders", "orders of convergence", 20.0, 1.3, orders.measure, (orders.Order,)),
     Subject("growth", "growth with the unknowns", 12.0, 1.2, growth.measure, (growth.Growth,)),
     Subject("hard_cases", "hard cases", 35.0, 2.0, hard_cases.measure, (hard_cases.HardCase,)),
+    Subject("processes", "cold starts and memory", 15.0, 2.5, processes.measure, (processes.Cold, processes.Memory)),
     Subject("targets", "targets of speed", 0.0, 0.0, targets.measure, (targets.Target,)),
 )  # fmt: skip
 KINDS = {kind.__name__: kind for subject in SUBJECTS for kind in subject.kinds}  # by their names in the JSON file
