@@ -7,9 +7,10 @@ Gelman et al. 2013, Bayesian Data Analysis, sections 3.2 and 14.2). What is left
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
@@ -52,7 +53,8 @@ class LoadingCurve(NamedTuple):
         return LoadingCurve(means[0], means[1], float(displacement[0]), means[2], len(displacement))
 
 
-class Interval(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Interval:
     """A number with the ends of its 95 % interval; None where the data do not bound it within the model's range."""
 
     value: float
@@ -88,18 +90,8 @@ class FingerFit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, without draws."""
-        return {
-            "layers": [
-                {**asdict(one), **{name: getattr(one, name)._asdict() for name in ("stiffness", "profile", "prior")}}
-                for one in self.layers
-            ],
-            "overall": self.overall._asdict(),
-            "touch": list(self.touch),
-            "noise": self.noise,
-            "points": self.points,
-            "widths": self.widths,
-            "deepest": self.deepest,
-        }
+        names = ("layers", "overall", "touch", "noise", "points", "widths", "deepest")
+        return {name: msgspec.to_builtins(getattr(self, name)) for name in names}
 
 
 class _Grid(NamedTuple):
@@ -280,7 +272,7 @@ def _layer(likelihood: Likelihood, grids: Sequence[_Grid], number: int, best: Ar
         else f"The presses cannot tell the stiffness of the {name} from that of the other layers: {share}."
     )
     profile = likelihood.profile(grids, number)
-    low_end, high_end = (None if one is None else published * float(np.exp(one)) for one in profile[1:])
+    low_end, high_end = (None if one is None else published * float(np.exp(one)) for one in (profile.low, profile.high))
     ends = Interval(published * float(np.exp(profile.value)), low_end, high_end)
     prior = Interval(published, published * float(np.exp(-half)), published * float(np.exp(half)))
     return LayerFit(name, Interval(float(best[number]), low, high), ends, prior, ratio, sentence)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from drivers.arrays import Array, Indices
@@ -67,8 +68,7 @@ class RelaxationFit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        part, time = self.part._asdict(), self.time._asdict()
-        return {"part": part, "time": time, "at_once": self.at_once, "sentence": self.sentence}
+        return msgspec.to_builtins(self)
 
     def relaxing(self, scene: Scene) -> Scene:
         """Return a scene whose layers are as stiff at once as found here and relax."""
