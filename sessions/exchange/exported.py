@@ -150,7 +150,7 @@ def read_export(path: Path) -> ExportedSession | None:
         raise ImportRefused(f"{path} is the live file of a session: every verb takes its folder, {path.parent}")
     for module in map(importlib.import_module, FORMATS.values()):
         file = module.find(path) if hasattr(module, "find") else None
-        if file is not None:
+        if file is not None and path.exists():
             try:
                 return module.read(file)
             except _DAMAGED as error:

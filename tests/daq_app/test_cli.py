@@ -101,6 +101,12 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.parametrize("name", ["none.csv", "none.h5"])
+def test_a_file_to_be_imported_that_is_not_there_is_said_to_be_so(tmp_path, capsys, name):
+    assert run(["import", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1
+    assert f"{name} cannot be read (No such file or directory); restore" in capsys.readouterr().err
+
+
 @pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
 @pytest.mark.parametrize("wire", WIRES)
 def test_the_simulated_device_of_a_wire_answers_at_the_address_that_is_printed_until_ctrl_c(wire, capsys, monkeypatch):

@@ -54,6 +54,14 @@ def test_a_session_that_cannot_be_read_is_named_and_the_rest_of_its_study_is_don
     assert (code, {row["stimulus"]["index"] for row in predicted["trials"]}) == (3, {0})
 
 
+def test_a_blinded_session_away_from_its_study_is_unblinded_with_the_study_that_is_named(study, tmp_path, capsys):
+    away = shutil.copytree(study / "P01_scores", tmp_path / "away")
+    assert run(["unblind", str(away), "--by", "E02"]) == 1
+    assert "with --study" in capsys.readouterr().err
+    friction = shutil.copytree(study, tmp_path / "friction")
+    assert run(["unblind", str(away), "--by", "E02", "--study", str(friction)]) == 0
+
+
 def test_a_session_that_cannot_be_written_stays_blinded_and_the_others_are_opened(study, tmp_path, capsys):
     friction = shutil.copytree(study, tmp_path / "friction")
     (friction / "P01_forces" / "unblinding.json").mkdir()

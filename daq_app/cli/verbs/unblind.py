@@ -31,6 +31,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     whole = is_study(path)
     folder = path if whole else options.study or path.resolve().parent
     sessions, unreadable = sessions_of(path) if whole else ((Recording.open(path),), ())
+    if not whole and sessions[0].plan.blinded and not is_study(folder):
+        raise StudyError(f"{folder} is no study: name the folder of the study that {path.name} belongs to with --study")
     key = study_key(folder) if whole or sessions[0].plan.blinded else None
     if key is None:
         raise StudyError(f"{path} is not blinded: there is nothing to open")
