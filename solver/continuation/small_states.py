@@ -221,7 +221,7 @@ def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bo
 
 def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
     """Raise SolveFailure where a given force leads to a meaningless `depth` [mm], as beyond the bone."""
-    room, most = scene.finger.pulp_thickness(), None
+    room, most = scene.finger.bone_depth(), None
     if depth >= room:
         with suppress(ContactLost):
             most = float(full_slip(finger.newton, sliding_load(scene)._replace(depth=room)).force[1])
@@ -363,7 +363,7 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
 
     `most` is the normal force [N/mm] at the depth of the bone, where known.
     """
-    force, room = scene.normal_force, scene.finger.pulp_thickness()
+    force, room = scene.normal_force, scene.finger.bone_depth()
     if force is None or SHALLOW <= depth < room:
         return
     if depth < 0.0:

@@ -46,9 +46,9 @@ class Scene:
         if not along < 0.999 * room:
             allowed = f"along the skin it must end before the cut, and stay below {0.999 * room:.3g} mm"
             raise SceneError("receptor.ending", self.receptor.ending, allowed)
-        room = self.finger.pulp_thickness()
+        room = self.finger.bone_depth()
         if self.loading.indentation is not None and self.loading.indentation >= room:
-            allowed = f"it must stay below the {room:.3g} mm of tissue between first touch and bone"
+            allowed = f"it must stay below the {room:.3g} mm at which the surface meets the bone"
             raise SceneError("loading.indentation", self.loading.indentation, allowed)
         drag, push = self.loading.tangential_force, self.loading.normal_force
         if drag is not None and push is not None and drag > self.friction.mu * push * (1.0 + 1e-12):

@@ -143,6 +143,18 @@ class Finger(Table):
         x, y = self.tip_radius * math.sin(angle), -self.tip_radius * math.cos(angle)
         return math.hypot(x - self.bone_centre[0], y - self.bone_centre[1]) - self.bone_radius
 
+    def bone_depth(self) -> float:
+        """Return how deep the surface is when it meets the bone, along its normal [mm].
+
+        This is less than the pulp's thickness where the bone does not lie right above the point of first touch.
+
+        >>> round(Finger().bone_depth(), 3), round(Finger(bone_centre=(-6.0, 0.75), contact_angle=10.0).bone_depth(), 3)
+        (4.737, 5.28)
+        """
+        angle = math.radians(self.contact_angle)
+        x, y = self.bone_centre
+        return self.tip_radius - x * math.sin(angle) + y * math.cos(angle) - self.bone_radius
+
 
 @dataclass(frozen=True, slots=True)
 class Relaxation(Table):

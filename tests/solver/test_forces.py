@@ -232,7 +232,7 @@ def test_a_finger_pressed_to_its_bone_is_refused_with_the_force_that_its_tissue_
     with pytest.raises(NoSteadyState, match="to its bone") as told:
         solve(given)
     most = float(str(told.value).split("carry up to ")[1].split()[0])
-    room = given.finger.pulp_thickness()
+    room = given.finger.bone_depth()
     deepest = replace(given, loading=Loading(0.999 * room))
     assert solve(deepest).normal_force == pytest.approx(most, rel=0.01)
 

@@ -128,3 +128,22 @@ def test_a_scene_can_be_changed_and_is_checked_again():
     published = scene(STICKINESS[0])
     with pytest.raises(SceneError, match="indentation"):
         replace(published, loading=replace(published.loading, indentation=-1.0))
+
+
+@pytest.mark.parametrize(
+    "finger",
+    [
+        Finger(),
+        Finger(contact_angle=10.0),
+        Finger(bone_centre=(-6.0, 0.75), contact_angle=10.0),
+        Finger(bone_centre=(1.0, -0.4), contact_angle=90.0),
+    ],
+)
+def test_no_scene_is_pressed_so_deep_that_the_surface_would_lie_in_the_bone(finger):
+    angle, around = np.radians(finger.contact_angle), np.radians(np.linspace(-90.0, 90.0, 100_001))
+    arc = np.array(finger.bone_centre)[:, None] + finger.bone_radius * np.array([np.cos(around), np.sin(around)])
+    bone = np.hstack([arc, arc[:, [0, -1]] - np.array([[finger.shaft_length], [0.0]])])  # with its edges' far ends
+    room = finger.tip_radius - float((np.array([np.sin(angle), -np.cos(angle)]) @ bone).max())
+    assert Scene(finger=finger, friction=Friction(0.3), loading=Loading(0.9999 * room)).finger is finger
+    with pytest.raises(SceneError, match="at which the surface meets the bone"):
+        Scene(finger=finger, friction=Friction(0.3), loading=Loading(1.0001 * room))
