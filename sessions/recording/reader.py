@@ -62,7 +62,9 @@ class Recording:
         Raises RecordingError when it holds no recording, one of a later format, or one whose head is damaged.
         """
         path = folder / schema.LIVE_FILE
-        if not path.is_file():
+        with name_failure(RecordingError, f"{path} cannot be read"):  # in a folder that nobody may look into
+            there = path.is_file()
+        if not there:
             what = f"give a session folder{_copy_of(folder)}"
             if folder.is_file() and (folder.parent / schema.LIVE_FILE).is_file():
                 what = f"give the folder that it lies in, {folder.parent}"

@@ -427,3 +427,11 @@ def test_a_quick_run_measures_something_of_every_subject(tmp_path):
     assert not [told for told in found.left_out if "broke off" in told]
     write(found, tmp_path)
     assert {row.kinematics for row in found.of(estimates.Estimate)} == {"small", "finite"}
+
+
+def test_a_folder_that_nothing_can_be_written_into_is_named_before_anything_is_measured(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("os.access", lambda *_: False)
+    assert run(["accuracy", "--quick", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert "cannot be written into" in said[-1]
+    assert len(said) <= 2  # that it loads, and this

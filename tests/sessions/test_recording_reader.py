@@ -1,3 +1,4 @@
+import errno
 import hashlib
 import json
 import shutil
@@ -7,6 +8,7 @@ import zlib
 from contextlib import closing
 from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 
 import pytest
 import recordings
@@ -34,6 +36,15 @@ def crashed(tmp_path):
 
 
 UNENDED = "the session has no end: it was cut short, or is still running"
+
+
+def test_a_folder_that_nobody_may_look_into_is_named_with_what_mends_it(tmp_path, monkeypatch):
+    def refuse(path):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "is_file", refuse)
+    with pytest.raises(RecordingError, match=r"session\.sqlite cannot be read .*permit reading"):
+        Recording.open(tmp_path)
 
 
 # ---- whole recordings

@@ -31,9 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     from daq_app.accuracy_page.page import PAGE, tables, write
+    from sessions.report.pages import make_place
 
     console.progress(0.0, "loading")
-    options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
+    make_place(options.out)  # said before three minutes are spent
     _docs(options, {})
     measured = _measure_or_restore(options, console)
     if measured.stopped:
