@@ -1,6 +1,7 @@
 """Audits of a state and of a load path: residuals and violated constraints, 0 where perfect."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +19,7 @@ MISSED = 1e-5  # largest relative difference from given forces
 UNSOUND = 1e-4  # relative residual from which a state is refused
 DOUBTED = 1e-8  # relative residual from which a warning is given
 PIERCED = 1e-7  # penetration by the indentation from which a warning is given
+State = TypeVar("State")  # with its displacement where that is not part of it
 
 
 def audits(
@@ -87,6 +89,25 @@ def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str,
 def imbalance(checks: Mapping[str, float]) -> float:
     """Return the largest residual of forces and work among `checks`."""
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
+
+
+def balance(
+    state: State,
+    checks: dict[str, float],
+    target: float,
+    correct: Callable[[State, dict[str, float]], tuple[State, dict[str, float]] | None],
+) -> tuple[State, dict[str, float]]:
+    """Return a state and its audits after corrections until its imbalance is below `target`.
+
+    `correct` returns a corrected state with its audits, None where there is none. A correction that does not halve the
+    imbalance is the last, and is not taken (Higham 2002, Accuracy and Stability of Numerical Algorithms, chapter 12).
+    """
+    while (before := imbalance(checks)) > target:
+        corrected = correct(state, checks)
+        if corrected is None or imbalance(corrected[1]) > before / 2.0:
+            break
+        state, checks = corrected
+    return state, checks
 
 
 def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -222,7 +223,6 @@ def solve_nested(
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
-CORRECTIONS = 4  # of a state, at most
 LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
 
 
@@ -278,7 +278,10 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
     within_reach(scene, state.load.depth)
     newton = finger.newton if way is None else way.newton
-    state, checks = _balance(finger, newton, state)
+    # Under a light touch, errors of displacements far below a nanometre leave a large part of the forces unbalanced.
+    checks = _audits(finger, newton, state)
+    correct = partial(_corrected, finger, newton)
+    state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
     solved = SceneSolution(scene, state, state.u, checks, steps, way)
     complete_audits(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
@@ -293,31 +296,21 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     return prediction(solved, finger, numbers, row, nested_numbers, estimate_s)
 
 
-def _balance(
-    finger: FiniteFinger, newton: Newton, state: EquilibriumState
-) -> tuple[EquilibriumState, dict[str, float]]:
-    """Return a state and its audits after further Newton steps that bring unbalanced forces down to round-off.
+def _corrected(
+    finger: FiniteFinger, newton: Newton, state: EquilibriumState, checks: dict[str, float]
+) -> tuple[EquilibriumState, dict[str, float]] | None:
+    """Return a state and its audits after one more Newton step, None where its contact then contradicts itself more.
 
-    `newton` is that of the finger, or of its relaxing tissues. Under a light touch, errors of displacements far below a
-    nanometre leave a large part of the forces on nearly incompressible tissue unbalanced.
+    `newton` is that of the finger, or of its relaxing tissues; `checks` are the audits of `state`.
     """
-    checks = _audits(finger, newton, state)
-    for _ in range(CORRECTIONS):
-        if audits.imbalance(checks) <= FINITE_IMBALANCE:
-            break
-        x = state.place(newton.condensed)[:, 0]
-        if not newton.linearise(state, state.load, x):
-            break
-        corrected, _, _ = newton.apply_step(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
-        corrected = replace(
-            corrected, state=state.state, sense=state.sense
-        )  # a step of nanometres changes no contact state
-        corrected_checks = _audits(finger, newton, corrected)
-        worse = _contradicting(corrected_checks) > max(_contradicting(checks), FINITE_IMBALANCE)
-        if worse or audits.imbalance(corrected_checks) >= audits.imbalance(checks):
-            break
-        state, checks = corrected, corrected_checks
-    return state, checks
+    x = state.place(newton.condensed)[:, 0]
+    if not newton.linearise(state, state.load, x):
+        return None
+    corrected, _, _ = newton.apply_step(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
+    corrected = replace(corrected, state=state.state, sense=state.sense)  # nanometres change no contact state
+    corrected_checks = _audits(finger, newton, corrected)
+    worse = _contradicting(corrected_checks) > max(_contradicting(checks), FINITE_IMBALANCE)
+    return None if worse else (corrected, corrected_checks)
 
 
 def _audits(finger: FiniteFinger, newton: Newton, state: EquilibriumState) -> dict[str, float]:

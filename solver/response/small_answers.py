@@ -136,12 +136,8 @@ class SmallMeshing(Meshing):
         in_tissue(scene, finger, state.load.depth)
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
-        directly_refinable = way is None and scene.normal_force is None and not state.load.path_dependent
-        if directly_refinable:  # other states lose their round-off only where audits show it
-            state, displacement = remove_round_off(scene, finger, state, displacement)
-        checks = audits.audits(finger, state, displacement)
-        if not relaxing:
-            state, displacement, checks = _balanced(scene, finger, state, displacement, checks)
+        marched = way is not None or scene.normal_force is not None or state.load.path_dependent
+        (state, displacement), checks = _audited(scene, finger, (state, displacement), refined=not marched)
         solved = SceneSolution(scene, state, displacement, checks, steps, way)
         complete_audits(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
@@ -163,21 +159,23 @@ class SmallMeshing(Meshing):
         ]
 
 
-def _balanced(
-    scene: Scene, finger: LinearFinger, state: EquilibriumState, displacement: Array, checks: dict[str, float]
-) -> tuple[EquilibriumState, Array, dict[str, float]]:
-    """Return a state, its displacement (nodes, 2) and its audits after as many steps of refinement as help.
+Solution = tuple[EquilibriumState, Array]  # and its displacement (nodes, 2)
 
-    A step that does not halve the imbalance is the last, and is not taken (Higham 2002, Accuracy and Stability of
-    Numerical Algorithms, chapter 12).
+
+def _audited(
+    scene: Scene, finger: LinearFinger, solution: Solution, *, refined: bool
+) -> tuple[Solution, dict[str, float]]:
+    """Return a solution without its round-off, and its audits.
+
+    `refined` ones lose it in any case, others where audits show it. Tissue that relaxes holds forces of its own.
     """
-    while (imbalance := audits.imbalance(checks)) > SMALL_IMBALANCE:
-        finer = remove_round_off(scene, finger, state, displacement)
-        checks_of_finer = audits.audits(finger, *finer)
-        if audits.imbalance(checks_of_finer) > imbalance / 2.0:
-            break
-        (state, displacement), checks = finer, checks_of_finer
-    return state, displacement, checks
+
+    def correct(now: Solution, _: object = None) -> tuple[Solution, dict[str, float]]:
+        corrected = remove_round_off(scene, finger, *now)
+        return corrected, audits.audits(finger, *corrected)
+
+    audited = correct(solution) if refined else (solution, audits.audits(finger, *solution))
+    return audited if scene.viscoelastic else audits.balance(*audited, SMALL_IMBALANCE, correct)
 
 
 def nested_numbers_of_all(
