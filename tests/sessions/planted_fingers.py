@@ -12,7 +12,7 @@ from solver import Friction, Loading, Material, Materials, Scene, Solve, solve_m
 LAYERS = ("epidermis", "dermis", "fat")
 PUBLISHED = np.array([0.136, 0.08, 0.034])  # [MPa], the paper's Table 3
 SPREAD = float(np.log(2.0))  # standard deviation of each log stiffness in the prior
-TAKEN = np.geomspace(0.1, 1.8, 12)  # depths at which a planted finger is solved [mm]
+TAKEN = np.geomspace(0.05, 1.8, 20)  # depths at which a planted finger is solved [mm]
 
 
 def published():
@@ -28,7 +28,7 @@ def law(stiffness, mu=0.0, depths=TAKEN):
             materials=replace(Materials(), **made),
             friction=Friction(mu),
             loading=Loading(float(depth), "none" if mu else "+x"),
-            solve=Solve(evidence="quick"),
+            solve=Solve(tolerance=0.0005, evidence="quick"),
         )
         for depth in depths
     ]

@@ -90,7 +90,7 @@ def test_a_bound_of_nothing_is_no_friction_whatever_its_coefficient(kinematics):
 
 @pytest.mark.parametrize("kinematics", COURSES)
 def test_a_drag_of_the_friction_limit_is_the_settled_slide_and_more_is_refused_in_a_sentence(kinematics):
-    given = replace(published(kinematics), friction=Friction(0.24, 0.004), solve=Solve(kinematics))
+    given = replace(published(kinematics), friction=Friction(0.24, 0.004), solve=Solve(kinematics, tolerance=0.5))
     given = loaded(given, normal_force=0.1)
     sliding = solve(given)
     most = sliding.tangential_force  # below mu N, since part of the skin slips at the bound
