@@ -225,6 +225,7 @@ class AreaLaw:
     def area(self, normal: Array, planned: float) -> Array:
         """Return the contact area (n,) [mm2] under a normal force (n,) [N], > 0; `planned` [mm2].
 
+        >>> import numpy as np
         >>> AreaLaw("power", 0.5, 1.0).area(np.array([1.0, 4.0]), 100.0)
         array([100., 200.])
         """
