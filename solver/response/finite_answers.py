@@ -192,7 +192,7 @@ def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes
     start = perf_counter()
     finger = meshes.finger(scene, sizing)
     if finger is below.finger:
-        return below
+        return replace(below, setup_s=0.0)
     state = finger.transfer(below.state, below.finger)
     return MeshSolution(finger, sizing, state, perf_counter() - start)
 

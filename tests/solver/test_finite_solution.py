@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -170,3 +171,10 @@ def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
     assert (ERROR_UNKNOWN in found.warnings) == (not known)
+
+
+def test_setting_up_a_mesh_counts_once_where_the_first_mesh_is_that_of_the_answer():
+    begin = perf_counter()
+    answer = solve(Scene(friction=Friction(0.3), loading=Loading(1e-5, "+x"), solve=Solve("finite", evidence="quick")))
+    assert answer.wall_s > 0.0
+    assert answer.setup_s + answer.wall_s + answer.estimate_s < perf_counter() - begin
