@@ -24,12 +24,9 @@ from solver.mesh import Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.progress import Progress, check_stop, interruptible, report_progress
-from solver.response.answer import Answer, Meshing, SceneSolution, Watch, complete_audits, prediction
+from solver.response.answer import FIRST_FINENESS, Answer, Meshing, SceneSolution, Watch, complete_audits, prediction
 from solver.scene import Scene
 
-COARSE = (
-    4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again
-)
 OFFSET_FINENESS = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
 NEAR_SLIDE = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
@@ -66,7 +63,9 @@ class Meshes:
 
     def keep(self, fineness: float | Lines) -> None:
         """Drop all meshes but the coarse one and those of this fineness."""
-        self._fingers = {sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (COARSE, fineness)}
+        self._fingers = {
+            sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (FIRST_FINENESS, fineness)
+        }
 
     def finger(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
         """Return the finger on a mesh. Raises SceneError where it cannot be meshed."""
@@ -104,7 +103,9 @@ def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, mesh
     mesh of `fineness` is solved directly. Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
-    sizing = Sizing(COARSE if isinstance(fineness, Lines) else min(COARSE, fineness), depth, margin=MARGIN)
+    sizing = Sizing(
+        FIRST_FINENESS if isinstance(fineness, Lines) else min(FIRST_FINENESS, fineness), depth, margin=MARGIN
+    )
     beyond_limit = False
     try:
         coarse = meshes.coarse(scene, sizing)

@@ -25,7 +25,8 @@ from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.quantities import NAMES
-from solver.response.finite_answers import COARSE, WIDER, Meshes, coarse_solution, solution_on
+from solver.response.answer import FIRST_FINENESS
+from solver.response.finite_answers import WIDER, Meshes, coarse_solution, solution_on
 from solver.scene import Scene
 from solver.scene.tables import Receptor
 
@@ -121,7 +122,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     for _, numbers in groupby(order, lambda n: scenes[n].loading_group if finite else None):
         group = list(numbers)
         depth = max(expected_depth(scenes[number]) for number in group)
-        sizing = Sizing(COARSE, depth, margin=WIDER) if finite else Sizing(FINENESS, depth, margin=WIDE)
+        sizing = Sizing(FIRST_FINENESS, depth, margin=WIDER) if finite else Sizing(FINENESS, depth, margin=WIDE)
         finger = KINDS[scenes[0].solve.kinematics].of(scenes[group[0]], sizing)
         states: dict[int, EquilibriumState] = {}
         near: EquilibriumState | None = None

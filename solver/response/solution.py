@@ -1,8 +1,8 @@
 """Solve scenes to a prediction with an error estimate each, refining the mesh until tolerances are met."""
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from solver.mesh import Lines
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction
 from solver.progress import Progress, interruptible, report_progress
-from solver.response.answer import Answer, Meshing, Watch
+from solver.response.answer import FIRST_FINENESS, Answer, Meshing, Watch
 from solver.response.finite_answers import FiniteMeshing
 from solver.response.small_answers import SmallMeshing
 from solver.scene import Scene
@@ -31,12 +31,10 @@ ERROR_UNKNOWN = (
     "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
 )
 NOT_NESTED = NotConverged("The nested mesh has no such state.")
-FIRST_FINENESS = 4.0  # from 3 and from 5 ten surfaces take as long to 1 %
 LIMIT_FINENESS = 6.0  # of a mesh on which a scene without a state on the first is solved once more
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
 ASSUMED_ERROR = 4.0  # by the tolerance, where nothing is known of the error
 MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
-Key = TypeVar("Key", bound=Hashable)
 Rough = Callable[[Prediction], None]  # called with each answer that is to be refined, to be kept if work stops
 
 
@@ -123,16 +121,12 @@ def _with_earlier_slides(prediction: Prediction, solve: Answers) -> Prediction:
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
-    alike = [(scene.solve.kinematics, scene.finger, scene.materials, scene.receptor) for scene in scenes]
-    return list(_positions(alike).values())
-
-
-def _positions(keys: Sequence[Key]) -> dict[Key, list[int]]:
-    """Return the positions of each key, in the order of their first ones."""
-    out: dict[Key, list[int]] = {}
-    for position, key in enumerate(keys):
-        out.setdefault(key, []).append(position)
-    return out
+    """Return the positions of scenes that share meshes, in the order of their first ones."""
+    out: dict[object, list[int]] = {}
+    for position, scene in enumerate(scenes):
+        alike = (scene.solve.kinematics, scene.finger, scene.materials, scene.receptor)
+        out.setdefault(alike, []).append(position)
+    return list(out.values())
 
 
 def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:

@@ -13,7 +13,8 @@ from solver.equilibrium.load_path import end
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
-from solver.response.finite_answers import COARSE, WIDER, Meshes, coarse_solution, solution_on
+from solver.response.answer import FIRST_FINENESS
+from solver.response.finite_answers import WIDER, Meshes, coarse_solution, solution_on
 from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.methods import Kinematics
@@ -79,7 +80,7 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) ->
 def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -> Iterator[Array]:
     meshes, depth = Meshes(), max(expected_depth(scene) for scene in scenes)
     for scene in scenes:
-        low = coarse_solution(scene, depth, COARSE, meshes)
+        low = coarse_solution(scene, depth, FIRST_FINENESS, meshes)
         sizing = replace(low.sizing, fineness=fineness, shift=shift)
         if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))

@@ -18,7 +18,8 @@ from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settle
 from solver.equilibrium.load_stepping import sliding_load
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.response.finite_answers import COARSE, MARGIN
+from solver.response.answer import FIRST_FINENESS
+from solver.response.finite_answers import MARGIN
 from solver.scene import Scene
 from solver.verification.request import clock
 
@@ -89,7 +90,7 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
         """Mesh the finger of `scene`."""
         start, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=MARGIN)
         self.finger = FiniteFinger.of(scene, sizing)
-        self._coarse = FiniteFinger.of(scene, Sizing(min(COARSE, fineness), scene.loading.depth, margin=MARGIN))
+        self._coarse = FiniteFinger.of(scene, Sizing(min(FIRST_FINENESS, fineness), scene.loading.depth, margin=MARGIN))
         self.setup_s = clock() - start
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:

@@ -17,7 +17,7 @@ from daq_app.accuracy_page.page import Table, filled_pages, page, tables, write
 from daq_app.child_process import interpreter
 from daq_app.cli.main import run
 from solver import NotConverged, solve
-from solver.response.solution import FIRST_FINENESS
+from solver.response.answer import FIRST_FINENESS
 from solver.verification import estimates, processes, targets
 from solver.verification.costs import ENTIRE, PARTS, Cost, shares
 from solver.verification.estimates import Estimate, GuaranteedCost
