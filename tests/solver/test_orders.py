@@ -39,7 +39,7 @@ def test_the_finger_s_energy_at_the_ending_converges_with_order_2():
 
 
 @pytest.mark.slow
-def test_at_finite_strain_it_converges_too():
+def test_at_finite_strain_it_converges_with_order_2_too():
     (row,) = orders.fingers(quick=False, kinematics="finite")
     assert held([row])
     assert row.errors[-1] < 2e-3
