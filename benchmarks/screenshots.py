@@ -133,14 +133,14 @@ def main() -> None:
     """Take pictures in every setting, each in a process of its own: a scaling cannot be changed while Qt runs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--setting", help="one setting alone, such as 1366x768-1.5-dark-de_DE")
+    parser.add_argument("--setting", action="append", help="this setting alone, or these: 1366x768-1.5-dark-de_DE")
     parser.add_argument("--session", type=Path, help="a session folder: then Review's places with it too")
     parser.add_argument("--take", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.take:
-        _take(options.setting, options.out, options.session)
+        _take(options.setting[0], options.out, options.session)
         return
-    for setting in [options.setting] if options.setting else _settings():
+    for setting in options.setting or _settings():
         scale = setting.split("-")[1]
         environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_SCALE_FACTOR": scale}
         command = [sys.executable, "-m", "benchmarks.screenshots", "--take", "--setting", setting]
