@@ -64,9 +64,7 @@ def is_private(folder: Path) -> bool:
     return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
-os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, at import, and so the next
-# Messages of errors that typing raises and drops would be coloured, which takes 6 % of the time to compile.
-os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, at import
 _numba: Any = import_module("numba")
 _caching: Any = import_module("numba.core.caching")
 events: Any = import_module("numba.core.event")
