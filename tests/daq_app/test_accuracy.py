@@ -1,6 +1,5 @@
 """The accuracy page: what is measured is told as it is, whatever was met, missed, left out or stopped."""
 
-import ast
 import json
 import math
 import re
@@ -13,24 +12,23 @@ from time import perf_counter
 import pytest
 
 from daq_app.accuracy_page.figures import plates
-from daq_app.accuracy_page.page import Table, filled_pages, page, tables, write
+from daq_app.accuracy_page.page import Table, filled_pages, tables, write
 from daq_app.child_process import interpreter
 from daq_app.cli.main import run
 from solver import NotConverged, solve
 from solver.response.answer import FIRST_FINENESS
 from solver.verification import estimates, processes, targets
-from solver.verification.costs import ENTIRE, PARTS, Cost, shares
+from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth, exponent
 from solver.verification.hard_cases import HardCase
 from solver.verification.machine import Machine
-from solver.verification.measuring import RunResults, Subject, measure, restore
+from solver.verification.measuring import RunResults, restore
 from solver.verification.methods import FiniteMethod
 from solver.verification.orders import Order
 from solver.verification.processes import Cold
 from solver.verification.published.problems import Problem
-from solver.verification.random_scenes import random_scene
-from solver.verification.request import Host, LeftOut, Request, median_time, rows_within
+from solver.verification.request import Host, LeftOut, Request
 from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.truth import JUDGED, SHIFTED, SHIFTED_QUICK, Truth, cases
 from solver.verification.warm import Warm
@@ -328,110 +326,3 @@ def test_a_table_stands_in_the_docs_as_markdown_whatever_its_cells_hold(example)
 def test_a_cell_of_the_docs_ends_in_an_ellipsis_where_it_has_more_than_25_words():
     table = Table("x", "", ("case",), ((" ".join("w" * 25),), (" ".join("w" * 26),)))
     assert table.markdown().splitlines()[2:] == [f"| {'w ' * 25}|", f"| {'w ' * 24}… |"]
-
-
-def test_random_scenes_are_the_same_every_time_and_differ_from_each_other():
-    assert random_scene("axis", 3, "small") == random_scene("axis", 3, "small")
-    assert random_scene("axis", 3, "small") != random_scene("axis", 5, "small")
-    assert random_scene("axis", 3, "finite").loading == random_scene("axis", 3, "small").loading
-
-
-def test_when_time_is_over_one_thing_is_still_measured_and_the_rest_is_named():
-    assert list(rows_within(FOREVER, [1, 2, 3], "things", lambda n: [n, -n])) == [1, -1, 2, -2, 3, -3]
-    assert list(rows_within(OVER, [1, 2, 3], "things", lambda n: [n])) == [
-        1,
-        LeftOut("Time was over after 1 of 3 things."),
-    ]
-
-
-def test_a_time_is_the_median_of_runs_and_slow_work_is_run_once():
-    runs = []
-    median_time(lambda: runs.append(1), repeats=5)
-    assert len(runs) == 5
-    median_time(lambda: runs.append(1), repeats=5, most_s=-1.0)
-    assert len(runs) == 6
-
-
-def subject(name, *rows):
-    def measure(*_):
-        for row in rows:
-            if row is KeyboardInterrupt:
-                raise KeyboardInterrupt
-            if isinstance(row, Exception):
-                raise row
-            yield row
-
-    return Subject(name, f"the {name}", 1.0, 1.0, measure, ())
-
-
-def quiet(*_):
-    """Show no progress, load nothing."""
-
-
-@pytest.fixture
-def unloaded(monkeypatch):
-    monkeypatch.setattr("solver.verification.measuring.warm_up", quiet)
-
-
-@pytest.mark.usefixtures("unloaded")
-def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
-    first, second = ROWS["growth"][:2]
-    parts = [subject("one", first), subject("two", second, KeyboardInterrupt), subject("three", first)]
-    found = measure(True, quiet, HOST, parts, seconds=5.0)
-    assert found.stopped
-    assert found.rows == {"one": (first,), "two": (second,)}
-    assert found.left_out == ("Stopped during: the two.", "Stopped before: the three.")
-    assert "Stopped by hand" in page(found)
-
-
-@pytest.mark.usefixtures("unloaded")
-@pytest.mark.parametrize("kind", [ValueError, MemoryError])
-def test_a_subject_that_breaks_off_loses_nothing_of_the_others(kind):
-    first, second = ROWS["growth"][:2]
-    parts = [subject("one", first, kind("bad luck")), subject("two", second)]
-    found = measure(True, quiet, HOST, parts, seconds=5.0)
-    assert found.rows == {"one": (first,), "two": (second,)}
-    assert found.left_out == ("The one broke off: bad luck",)
-
-
-def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_for_its_caller():
-    mesher, contact, library = (
-        ("/x/solver/mesh/mesher.py", 1, "a"),
-        ("/x/solver/contact.py", 1, "b"),
-        ("/lib/np.py", 1, "c"),
-    )
-    calls = {mesher: (1, 1, 3.0, 4.0), contact: (1, 1, 1.0, 3.0)}
-    profile = {mesher: (1, 1, 2.0, 6.0, {}), contact: (1, 1, 1.0, 4.0, {}), library: (2, 2, 4.0, 7.0, calls)}
-    found = shares(type("Profile", (), {"__init__": lambda self: vars(self).update(stats=profile)})())
-    assert found["mesh and tables"] == pytest.approx((2 + 4 * 4 / 7) / 7)
-    assert found["contact"] == pytest.approx((1 + 4 * 3 / 7) / 7)
-
-
-def test_every_part_of_the_solver_whose_time_is_counted_is_there():
-    solver = Path(__file__).parents[2] / "solver"
-    defined = {
-        ".".join([*file.relative_to(solver).with_suffix("").parts, node.name]).replace(".__init__", "")
-        for file in solver.rglob("*.py")
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef)
-    }
-    places = {".".join(name.split(".")[:n]) for name in defined for n in (1, 2, 3, 4)}
-    assert set(PARTS) - places == set()
-    assert set(ENTIRE) - {name.split(".")[-1] for name in defined} == set()
-
-
-@pytest.mark.slow
-def test_a_quick_run_measures_something_of_every_subject(tmp_path):
-    found = measure(True, quiet, HOST, seconds=1.0)
-    assert {name for name, rows in found.rows.items() if not rows} == set()
-    assert not [told for told in found.left_out if "broke off" in told]
-    write(found, tmp_path)
-    assert {row.kinematics for row in found.of(estimates.Estimate)} == {"small", "finite"}
-
-
-def test_a_folder_that_nothing_can_be_written_into_is_named_before_anything_is_measured(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("os.access", lambda *_: False)
-    assert run(["accuracy", "--quick", "--out", str(tmp_path)]) == 1
-    said = capsys.readouterr().err.splitlines()
-    assert "cannot be written into" in said[-1]
-    assert len(said) <= 2  # that it loads, and this

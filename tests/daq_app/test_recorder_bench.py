@@ -1,0 +1,97 @@
+"""The recorder's bench and its display, in this process on the simulated transducer."""
+
+import numpy as np
+import pytest
+from session_messages import INFO
+
+from daq_app.recorder.bench import Bench
+from daq_app.recorder.display import Display
+from daq_app.recorder.messages import Failed, HealthReport, LinkBack, LinkDown, Live, Tared
+from drivers.clock import RealClock
+from drivers.readings import ReadingBlock
+from drivers.transducer import Health, SetupError
+
+
+class Seat:
+    """A bench in this process on the simulated transducer, and what it reports."""
+
+    def __init__(self):
+        self.reports = []
+        self.display = Display(self.reports.append, 1.0)
+        self.bench = Bench(RealClock(), self.display, self.reports.append)
+        self.bench.connect("sim:?seed=7")
+
+    def until(self, wanted):
+        """Go on until a report of this kind comes, and return it; those before are forgotten."""
+        self.reports.clear()
+        while not (found := [report for report in self.reports if isinstance(report, wanted)]):
+            self.bench.look()
+            self.display.look(self.bench.health)
+        return found[0]
+
+
+@pytest.fixture
+def seat():
+    made = Seat()
+    yield made
+    made.bench.disconnect()
+
+
+def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(seat):
+    seat.bench.begin_tare(60.0)
+    seat.bench.lent(0)
+    seat.bench.stream()
+    seat.bench.begin_tare(60.0)
+    seat.bench.lose("the cable is out")
+    words = [report.sentence.partition(": ")[2] for report in seat.reports if isinstance(report, Failed)]
+    assert words == ["a session began; zero again after it", "the transducer is no longer connected"]
+
+
+def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_again(seat, monkeypatch):
+    def refuse():
+        raise SetupError("another program has it")
+
+    seat.bench.lent(0)
+    monkeypatch.setattr(seat.bench.connected.transducer, "start", refuse)
+    seat.bench.stream()
+    assert LinkDown("another program has it") in seat.reports
+    assert seat.until(LinkBack).same
+
+
+def test_readings_called_invalid_are_counted_until_somebody_acknowledges_also_across_streams():
+    reports = []
+    display = Display(reports.append, 1.0)
+    display.look(Health(saturated=3))
+    display.stream_began()
+    display.device(None)  # which has health reported at once
+    display.look(Health(saturated=2))
+    display.device(None)
+    display.look(Health())
+    display.acknowledge()
+    display.look(Health())
+    assert [report.saturated for report in reports] == [3, 5, 5, 0]
+
+
+def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
+    reports = []
+    display = Display(reports.append, 1.0)
+    display.device(INFO)
+    display.set_zero((0.0, 0.0, -9e6, 0.0, 0.0, 0.0))  # a plate of 9 N
+    one = np.zeros(1, np.int64)
+    display.take(ReadingBlock(one, one, one, one / 1.0, one, np.array([[4.5e6, 0.0, -18e6, 0.0, 0.0, 0.0]])))
+    display.look(Health())
+    [report] = (one for one in reports if isinstance(one, HealthReport))
+    assert report.load[:3] == report.peak[:3] == pytest.approx((4.5 / 36, 0.0, 0.5))
+
+
+def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and_go_with_another(seat):
+    seat.bench.begin_tare(0.5)
+    tared, peak = seat.until(Tared), seat.until(HealthReport).peak
+    seat.bench.lose("the cable is out")
+    assert seat.until(LinkBack).same
+    assert seat.until(Live).zero == tared.mean
+    assert np.all(np.array(seat.until(HealthReport).peak) >= peak)
+    seat.bench.lose("the cable is out")
+    seat.bench.uri = "sim:?seed=8"
+    assert not seat.until(LinkBack).same
+    assert seat.until(Live).zero == (0.0,) * 6
