@@ -281,7 +281,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     newton = finger.newton if way is None else way.newton
     # Under a light touch, errors of displacements far below a nanometre leave a large part of the forces unbalanced.
     checks = _audits(finger, newton, state)
-    correct = partial(_corrected, finger, newton)
+    correct = partial(_correct, finger, newton)
     state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
     solved = SceneSolution(scene, state, state.u, checks, steps, way)
     complete_audits(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
@@ -297,7 +297,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     return prediction(solved, finger, numbers, row, nested_numbers, estimate_s)
 
 
-def _corrected(
+def _correct(
     finger: FiniteFinger, newton: Newton, state: EquilibriumState, checks: dict[str, float]
 ) -> tuple[EquilibriumState, dict[str, float]] | None:
     """Return a state and its audits after one more Newton step, None where its contact then contradicts itself more.

@@ -136,8 +136,9 @@ class SmallMeshing(Meshing):
         in_tissue(scene, finger, state.load.depth)
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
-        marched = way is not None or scene.normal_force is not None or state.load.path_dependent
-        (state, displacement), checks = _audited(scene, finger, (state, displacement), refined=not marched)
+        direct_solve = way is None and scene.normal_force is None and not state.load.path_dependent
+        solution = state, displacement
+        (state, displacement), checks = _remove_round_off(scene, finger, solution, always=direct_solve)
         solved = SceneSolution(scene, state, displacement, checks, steps, way)
         complete_audits(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
@@ -162,20 +163,21 @@ class SmallMeshing(Meshing):
 Solution = tuple[EquilibriumState, Array]  # and its displacement (nodes, 2)
 
 
-def _audited(
-    scene: Scene, finger: LinearFinger, solution: Solution, *, refined: bool
+def _remove_round_off(
+    scene: Scene, finger: LinearFinger, solution: Solution, *, always: bool
 ) -> tuple[Solution, dict[str, float]]:
     """Return a solution without its round-off, and its audits.
 
-    `refined` ones lose it in any case, others where audits show it. Tissue that relaxes holds forces of its own.
+    With `always` it takes one step at least, otherwise where audits show round-off. Tissue that relaxes has forces of
+    its own, which are no round-off.
     """
 
     def correct(now: Solution, _: object = None) -> tuple[Solution, dict[str, float]]:
         corrected = remove_round_off(scene, finger, *now)
         return corrected, audits.audits(finger, *corrected)
 
-    audited = correct(solution) if refined else (solution, audits.audits(finger, *solution))
-    return audited if scene.viscoelastic else audits.balance(*audited, SMALL_IMBALANCE, correct)
+    first = correct(solution) if always else (solution, audits.audits(finger, *solution))
+    return first if scene.viscoelastic else audits.balance(*first, SMALL_IMBALANCE, correct)
 
 
 def nested_numbers_of_all(
