@@ -79,6 +79,23 @@ def t_quantile(dof: float) -> float:
     return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
 
 
+def jackknife(whole: ArrayLike, without: Array) -> tuple[Array, Array]:
+    """Return mean and standard error (m,) of the pseudo-values of numbers `whole` (m,), `without` each of k (k, m).
+
+    Their t interval has k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika 61:1).
+    """
+    k = len(without)
+    pseudo = k * np.asarray(whole, np.float64) - (k - 1) * without
+    return pseudo.mean(axis=0), pseudo.std(axis=0, ddof=1) / math.sqrt(k)
+
+
+def jackknife_interval(whole: ArrayLike, without: Array) -> tuple[Array, Array]:
+    """Return the ends (m,) of the jackknife's 95 % t interval of numbers `whole` (m,), `without` each of k (k, m)."""
+    mean, error = jackknife(whole, without)
+    half = t_quantile(len(without) - 1) * error
+    return mean - half, mean + half
+
+
 def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
     """Return Pearson's r, None for fewer than three points or where one of the two does not vary."""
     if len(x) < 3 or not _varies(x) or not _varies(y):
@@ -141,7 +158,7 @@ class Contrast:
     difference: float  # of the two correlations
     low: float | None  # its 95 % interval
     high: float | None
-    z: float | None  # Steiger's; None where the interval comes from a bootstrap
+    z: float | None  # Steiger's; None where the interval is the jackknife's
     p: float | None  # two-sided
 
     def differs(self, alpha: float) -> bool:

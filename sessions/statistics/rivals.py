@@ -9,10 +9,10 @@ import numpy as np
 from drivers.arrays import Array
 from sessions.prediction import BY_NAME, SED
 from sessions.statistics.correlations import (
-    TAILS,
     Contrast,
     contrast,
     fisher_interval,
+    jackknife_interval,
     leave_one_out_error,
     partial_correlation,
     pearson,
@@ -39,9 +39,8 @@ FIELDS: Mapping[str, str] = {
     "speed": "speed",
 }
 NAMES = (*RESPONSES, *FIELDS)
-_RESAMPLES = 10_000
 _NO_LINE = "without one of the surfaces the others do not determine a line"
-_LEAST_SUBJECTS = 3  # of a bootstrap over subjects, and of the jackknife beside it
+_LEAST_SUBJECTS = 3  # of a jackknife over subjects
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class Rival:
     high: float | None
     contrast: Contrast | None = None  # the model's r less this one
     partial: float | None = None  # r given the µ that the model got
-    partial_low: float | None = None  # 95 % interval: Fisher's z; within subjects bootstrap over subjects
+    partial_low: float | None = None  # 95 % interval: Fisher's z; within subjects the jackknife of it
     partial_high: float | None = None
     # Of a surface's scores by the line through the others, root mean square [points]
     left_out_error: float | None = None
@@ -104,8 +103,8 @@ def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL) -> tupl
 def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
     """Return how each quantity goes with the scores within subjects; () where no trial has `model`.
 
-    Differences and partial correlations have percentile intervals of a bootstrap over subjects: those of other people
-    on these very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
+    Differences and partial correlations have the jackknife's intervals over subjects: those of other people on these
+    very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
     """
     counted = [trial for trial in trials if model in trial.values]
     names = [name for name in _model_first(model) if any(name in trial.values for trial in counted)]
@@ -177,13 +176,13 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     shared = [trial for trial in mine if all(one in trial.values for one in used)]
     covariances = _covariances(shared, used)
     if covariances is None:
-        few = f"it takes {_LEAST_SUBJECTS} subjects with trials that have all of them"
+        few = f"it takes {_LEAST_SUBJECTS} subjects with two trials or more that have all of them"
         return _because(rival, partial=few, contrast=None if name == model else few)
     if name != model:
         own, models = (_correlations(covariances, 0, column) for column in (1, 2))
         steps = np.sign(models[0]) * models - np.sign(own[0]) * own
         if math.isfinite(steps[0]):
-            low, high = _percentiles(steps[1:])
+            low, high = _ends(*jackknife_interval(steps[0], steps[1:]))
             rival = replace(rival, contrast=Contrast(len(shared), float(steps[0]), low, high, None, None))
         else:
             rival = _because(rival, contrast="one of them does not vary within subjects")
@@ -193,36 +192,37 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     partials = partial_correlation(*(_correlations(covariances, *pair) for pair in ((0, 1), (0, mu), (1, mu))))
     if not math.isfinite(partials[0]):
         return _because(rival, partial="µ determines it")
-    low, high = _percentiles(partials[1:])
+    with np.errstate(divide="ignore", invalid="ignore"):  # a perfect one has no z
+        z = np.arctanh(partials)
+        low, high = _ends(*np.tanh(jackknife_interval(z[0], z[1:])))
     return replace(rival, partial=float(partials[0]), partial_low=low, partial_high=high)
 
 
 def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | None:
-    """Return covariances within subjects of score and quantities (1 + b, c, c), then those of subjects drawn anew.
+    """Return covariances within subjects of score and quantities (1 + k, c, c): of all k, then without each of them.
 
-    Each subject's products are summed once; a draw is then a sum over the subjects drawn. None of too few subjects.
+    One with a single trial tells nothing of what goes on within subjects. None of too few others.
     """
     rows = by_key((trial.subject, [trial.score, *(trial.values[name] for name in names)]) for trial in trials)
-    if len(rows) < _LEAST_SUBJECTS:
+    columns = [np.array(own) for own in rows.values() if len(own) > 1]
+    if len(columns) < _LEAST_SUBJECTS:
         return None
-    columns = [np.array(own) for own in rows.values()]
     scale = np.abs(np.concatenate(columns)).max(axis=0, initial=1e-300)
     centred = [own / scale - (own / scale).mean(axis=0) for own in columns]
     products = np.array([own.T @ own for own in centred])
-    draws = np.random.default_rng(0).multinomial(len(rows), np.full(len(rows), 1 / len(rows)), _RESAMPLES)
-    again = np.tensordot(draws.astype(np.float64), products, axes=1)
-    return np.concatenate([products.sum(axis=0, keepdims=True), again])
+    whole = products.sum(axis=0, keepdims=True)
+    return np.concatenate([whole, whole - products])
 
 
 def _correlations(covariances: Array, first: int, second: int) -> Array:
-    """Return the correlation of two columns in each of many covariances (b, c, c); nan where one does not vary."""
+    """Return the correlation of two columns in each of many covariances (k, c, c); nan where one does not vary."""
     size = covariances[:, first, first] * covariances[:, second, second]
     return np.where(size > 0.0, covariances[:, first, second], np.nan) / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
-def _percentiles(values: Array) -> tuple[float, float]:
-    low, high = np.nanquantile(values, TAILS).tolist()
-    return low, high
+def _ends(low: Array, high: Array) -> tuple[float, float] | tuple[None, None]:
+    """Return the ends of an interval, None where they are not known."""
+    return (float(low), float(high)) if math.isfinite(low) and math.isfinite(high) else (None, None)
 
 
 def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float | None:

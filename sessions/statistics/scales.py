@@ -27,7 +27,7 @@ from scipy import special
 from scipy.sparse import csgraph
 
 from drivers.arrays import Array, Indices
-from sessions.statistics.correlations import TAILS
+from sessions.statistics.correlations import jackknife_interval
 from sessions.statistics.mixed_model import Term, mixed_model
 from sessions.statistics.psychometric import QUARTILE, binomial_deviance
 from sessions.statistics.scores import IntervalEstimate, by_key
@@ -35,9 +35,7 @@ from sessions.statistics.scores import IntervalEstimate, by_key
 Model = Literal["Bradley–Terry", "Thurstone V"]
 MODELS: tuple[Model, ...] = ("Bradley–Terry", "Thurstone V")
 
-RESAMPLES = 1000
-MOST_LOST = 0.025  # share of draws without a finite scale beyond which an end of an interval may be one of them
-LEAST_SUBJECTS = 3  # of a bootstrap over subjects
+LEAST_SUBJECTS = 3  # of a jackknife over subjects
 _STEPS = 50  # of Fisher's scoring, which takes five
 _GOOD = 1e-10
 
@@ -79,7 +77,7 @@ class Consistence:
 
 
 def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") -> PairedScale:
-    """Return the scale of choices, with intervals by a bootstrap over subjects."""
+    """Return the scale of choices, with the jackknife's intervals over subjects."""
     indices = sorted({index for one in choices for index in (one.first, one.second)})
     subjects = sorted({one.subject for one in choices})
     none = PairedScale(model, len(choices), len(subjects))
@@ -92,8 +90,8 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") ->
     fitted = _fit(whole, model)
     if fitted is None:
         return replace(none, reason="the likelihood has no finite maximum")
-    draws, why = _bootstrap(counts, model, fitted)
-    ends = [_estimate(value, draws[:, n] if why == "" else None) for n, value in enumerate(fitted.tolist())]
+    without, why = _without_each(counts, model, fitted)
+    ends = [IntervalEstimate(value, None, None) for value in fitted.tolist()] if why else _estimates(fitted, without)
     deviance, freedom = _deviance(whole, fitted, model)
     return replace(
         none,
@@ -192,24 +190,22 @@ def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | Non
     return None
 
 
-def _bootstrap(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
-    """Return what fits to subjects drawn anew give (b, n + 1), and why that makes no interval, "" where it does."""
-    subjects = len(counts)
-    if subjects < LEAST_SUBJECTS:
+def _without_each(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
+    """Return the fits without each subject (s, n + 1), and why they make no interval, "" where they do."""
+    if len(counts) < LEAST_SUBJECTS:
         return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_SUBJECTS} of them"
-    drawn = np.random.default_rng(0).multinomial(subjects, np.full(subjects, 1.0 / subjects), RESAMPLES)
-    totals = np.tensordot(drawn.astype(np.float64), counts, axes=1)
-    indices = range(counts.shape[2])
-    fits = [None if _why_none(total, indices) else _fit(total, model, begin) for total in totals]
+    indices, rest = range(counts.shape[2]), counts.sum(axis=0) - counts
+    fits = [None if _why_none(own, indices) else _fit(own, model, begin) for own in rest]
     scales = [fit for fit in fits if fit is not None]
-    lost = RESAMPLES - len(scales)
-    if lost > MOST_LOST * RESAMPLES:
-        return np.zeros((0, 0)), f"{lost} of {RESAMPLES} draws of subjects have no finite scale"
+    if len(scales) < len(fits):
+        return np.zeros((0, 0)), "without one of the subjects the others have no finite scale"
     return np.array(scales), ""
 
 
-def _estimate(value: float, draws: Array | None) -> IntervalEstimate:
-    return IntervalEstimate(value, *([None, None] if draws is None else np.quantile(draws, TAILS).tolist()))
+def _estimates(whole: Array, without: Array) -> list[IntervalEstimate]:
+    """Return numbers (m,) with the jackknife's intervals, from the same without each subject (k, m)."""
+    low, high = jackknife_interval(whole, without)
+    return list(map(IntervalEstimate, whole.tolist(), low.tolist(), high.tolist()))
 
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
@@ -242,7 +238,7 @@ def stevens_exponent(
 ) -> Exponent:
     """Return the exponent of answers (n,) by magnitudes (n,), both above 0, in trials of subjects and surfaces (n,).
 
-    The interval of Deming's slope is a bootstrap over subjects. Others must have left out what is not above 0.
+    The interval of Deming's slope is the jackknife's over subjects. Others must have left out what is not above 0.
     """
     y, x = np.log(np.asarray(answers, np.float64)), np.log(np.asarray(magnitudes, np.float64))
     people = sorted(set(subjects))
@@ -258,11 +254,12 @@ def stevens_exponent(
     here = _deming(cells)
     if here is None:
         return Exponent(len(people), len(y), plain, reason=reason or "magnitudes or answers do not vary over surfaces")
-    rng = np.random.default_rng(0)
-    drawn = [_deming(cells[rng.integers(0, len(cells), len(cells))]) for _ in range(RESAMPLES)]
-    slopes = [one[0] for one in drawn if one is not None]
-    low, high = np.quantile(slopes, TAILS).tolist()
-    return Exponent(len(people), len(y), plain, (here[0], low, high), here[1], reason)
+    without = [_deming(np.delete(cells, n, axis=0)) for n in range(len(cells))]
+    slopes = [one[0] for one in without if one is not None]
+    if len(slopes) < len(cells):
+        return Exponent(len(people), len(y), plain, reason=reason or "without one of the subjects nothing varies")
+    low, high = jackknife_interval(here[0], np.array(slopes))
+    return Exponent(len(people), len(y), plain, (here[0], float(low), float(high)), here[1], reason)
 
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:
@@ -299,10 +296,8 @@ JUDGEMENTS: tuple[Judgement, ...] = ("scores", "estimates", "choices", "comparis
 def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
 
-    Intervals are expanded percentiles of a bootstrap over subjects (Hesterberg 2015, Am. Stat. 69, 371): of few
-    subjects plain ones are too narrow, as a normal quantile is in place of t's. Subjects who missed a surface that
-    another judged do not count. Nothing of fewer than three others, of fewer than two surfaces, and where nothing is
-    left to tell a unit from.
+    Intervals are the jackknife's over subjects. Subjects who missed a surface that another judged do not count. Nothing
+    of fewer than three others, of fewer than two surfaces, and where nothing is left to tell a unit from.
     """
     own = by_key((subject, (index, value)) for subject, index, value in points)
     indices = sorted({index for _, index, _ in points})
@@ -315,14 +310,12 @@ def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, Inte
         np.array([[float(len(cell)) for cell in row] for row in whole]),
         np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in whole]),
     )
-    here = answered.values(np.arange(len(whole))[None])[0]
-    if not np.isfinite(here).all():
+    people = np.arange(len(whole))
+    here = answered.values(people[None])[0]
+    without = answered.values(np.array([np.delete(people, n) for n in people]))
+    if not np.isfinite([here, *without]).all():
         return {}
-    drawn = np.random.default_rng(0).integers(0, len(whole), (RESAMPLES, len(whole)))
-    n = len(whole)
-    tail = float(special.ndtr(math.sqrt(n / (n - 1)) * special.stdtrit(n - 1, TAILS[0])))
-    ends = np.nanquantile(answered.values(drawn), [tail, 1.0 - tail], axis=0).T.tolist()
-    return {i: IntervalEstimate(value, *two) for i, value, two in zip(indices, here.tolist(), ends, strict=True)}
+    return dict(zip(indices, _estimates(here, without), strict=True))
 
 
 def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from drivers.arrays import Array
-from sessions.statistics.correlations import CONFIDENCE, t_quantile
+from sessions.statistics.correlations import CONFIDENCE, jackknife, t_quantile
 
 Table = Mapping[str, Mapping[int, float]]  # subject -> stimulus' index -> score, as `scores.score_matrix` gives it
 
@@ -120,8 +120,7 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
     if k < 3 or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
-    pseudo = k * z - (k - 1) * np.arctanh(others_xy / size)
-    mean, error = float(pseudo.mean()), float(pseudo.std(ddof=1)) / math.sqrt(k)
+    mean, error = map(float, jackknife(z, np.arctanh(others_xy / size)))
     half = t_quantile(k - 1) * error
     p = 2.0 * float(special.stdtr(k - 1, -abs(mean) / error)) if error > 0.0 else 0.0
     return (math.tanh(mean - half), math.tanh(mean + half)), p

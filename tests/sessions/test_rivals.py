@@ -170,6 +170,37 @@ def test_numbers_within_subjects_are_those_of_trials_without_each_subjects_mean(
     assert found[MODEL].partial == pytest.approx(np.corrcoef(rest)[0, 1])
 
 
+def test_intervals_over_four_subjects_hold_the_differences_of_very_many():
+    """r of 200,000 subjects is the truth."""
+    draw = np.random.default_rng(31)
+
+    def cases(people):
+        base = np.linspace(-2.0, 2.0, 5)
+        model = base + 0.5 * draw.standard_normal((people, 5))
+        rival, mu = (share * base + 0.9 * draw.standard_normal((people, 5)) for share in (0.6, 0.8))
+        level, slope = draw.normal((50.0, 8.0), (10.0, 3.0), (people, 2)).T[:, :, None]
+        return level + slope * model + 8.0 * draw.standard_normal((people, 5)), model, rival, mu
+
+    scores, *values = (column - column.mean(axis=1, keepdims=True) for column in cases(200_000))
+    among = np.corrcoef([column.ravel() for column in (scores, *values)])
+    partial = (among[0, 1] - among[0, 3] * among[1, 3]) / math.sqrt((1 - among[0, 3] ** 2) * (1 - among[1, 3] ** 2))
+    held = []
+    for _ in range(100):
+        score, *columns = cases(4)
+        trials = [
+            RivalTrial(
+                str(i), j, score[i, j], {MODEL: columns[0][i, j], "N": columns[1][i, j], MODEL_MU: columns[2][i, j]}
+            )
+            for i in range(4)
+            for j in range(5)
+        ]
+        found = {one.name: one for one in rivals_within(trials)}
+        step, given_mu = found["N"].contrast, found[MODEL]
+        holds = step.low <= among[0, 1] - among[0, 2] <= step.high
+        held.append((holds, given_mu.partial_low <= partial <= given_mu.partial_high))
+    assert (np.mean(held, axis=0) >= 0.90).all()  # two standard errors of 100 below 95 %
+
+
 def test_a_quantity_that_trials_lack_gets_no_weight_and_the_others_keep_theirs():
     trials = people(np.random.default_rng(9), lambda mu, _: 90.0 * mu)
     some = [

@@ -23,7 +23,7 @@ def rivals_table(compared: Compared, quantity: str, model: str) -> Table | None:
 
     The model's other quantities stand in `responses_table`.
     """
-    within = "Steiger (1980), within subjects by bootstrap" if _weighed(compared) else "Steiger (1980)"
+    within = "Steiger (1980), within subjects by the jackknife" if _weighed(compared) else "Steiger (1980)"
     aic = "AIC: crossed mixed models. " if _weighed(compared) else ""
     words = caption("rivals", label=quantity, model=model, within=within, aic=aic)
     return _table("table-rivals", words, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
