@@ -13,7 +13,6 @@ from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body import Patches
 from solver.contact import STATE_NAMES
-from solver.continuation.small_states import expected_depth
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, Way
@@ -138,13 +137,18 @@ Answer = Prediction | SolveFailure
 Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # position, answer, finger, load path
 
 
+LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
+
+
 class Meshing(ABC):
     """Solves scenes of one finger on meshes of any fineness, and keeps meshes for reuse."""
 
-    def __init__(self, scenes: Sequence[Scene], progress: Progress | None) -> None:
-        """Start without meshes, which are made for the depths of `scenes`, estimates where forces are given."""
-        self.depths = [expected_depth(scene) for scene in scenes]
+    def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
+        """Start without meshes, which are made for the `depths` [mm] of `scenes`, estimates where forces are given."""
         self.progress = progress
+        self.deepest: dict[LoadingGroup, float] = {}  # [mm]
+        for scene, depth in zip(scenes, depths, strict=True):
+            self.deepest[scene.loading_group] = max(depth, self.deepest.get(scene.loading_group, 0.0))
 
     @abstractmethod
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:

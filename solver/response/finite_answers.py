@@ -24,7 +24,16 @@ from solver.mesh import Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.progress import Progress, check_stop, interruptible, report_progress
-from solver.response.answer import FIRST_FINENESS, Answer, Meshing, SceneSolution, Watch, complete_audits, prediction
+from solver.response.answer import (
+    FIRST_FINENESS,
+    Answer,
+    LoadingGroup,
+    Meshing,
+    SceneSolution,
+    Watch,
+    complete_audits,
+    prediction,
+)
 from solver.scene import Scene
 
 OFFSET_FINENESS = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
@@ -224,7 +233,6 @@ def solve_nested(
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
-LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
 
 
 class FiniteMeshing(Meshing):
@@ -233,13 +241,10 @@ class FiniteMeshing(Meshing):
     Scenes that are pressed and move alike share meshes. They are solved by rising friction, each from the one before.
     """
 
-    def __init__(self, scenes: Sequence[Scene], progress: Progress | None) -> None:
+    def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
         """Start without meshes."""
-        super().__init__(scenes, progress)
+        super().__init__(scenes, depths, progress)
         self._meshes: dict[LoadingGroup, Meshes] = {}
-        self._deepest: dict[LoadingGroup, float] = {}  # [mm]
-        for scene, depth in zip(scenes, self.depths, strict=True):
-            self._deepest[scene.loading_group] = max(depth, self._deepest.get(scene.loading_group, 0.0))
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
         """Do as `Meshing` says."""
@@ -252,7 +257,7 @@ class FiniteMeshing(Meshing):
                 meshes = self._meshes.setdefault(scene.loading_group, Meshes())
                 meshes.keep(fineness)
                 try:
-                    coarse = coarse_solution(scene, self._deepest[scene.loading_group], fineness, meshes)
+                    coarse = coarse_solution(scene, self.deepest[scene.loading_group], fineness, meshes)
                     answers[number] = _predict(scene, refine(scene, fineness, coarse, meshes), meshes, start)
                 except SolveFailure as failure:
                     answers[number] = failure

@@ -43,9 +43,9 @@ BEYOND_THE_SKIN = NotConverged(
 class SmallMeshing(Meshing):
     """Small strain: all scenes share one mesh and its nested mesh."""
 
-    def __init__(self, scenes: Sequence[Scene], progress: Progress | None) -> None:
+    def __init__(self, scenes: Sequence[Scene], depths: Sequence[float], progress: Progress | None) -> None:
         """Start without meshes."""
-        super().__init__(scenes, progress)
+        super().__init__(scenes, depths, progress)
         self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and what each took to make [s]
 
     def _finger(self, scene: Scene, sizing: Sizing) -> tuple[LinearFinger, float]:
@@ -58,7 +58,7 @@ class SmallMeshing(Meshing):
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
         """Do as `Meshing` says; where contact leaves the skin considered, solve all on a mesh with more of it."""
         self._fingers = {sizing: kept for sizing, kept in self._fingers.items() if sizing.fineness == fineness}
-        deep = max(self.depths)
+        deep = max(self.deepest.values())
         most = max(deep, min(WIDE * deep, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
         narrow, wide = (Sizing(fineness, depth, margin=WIDE) for depth in (deep, most))
         try:

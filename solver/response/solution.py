@@ -11,6 +11,7 @@ from solver.accuracy.adaptivity import refine_lines
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error, stiffness_warning
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
 from solver.accuracy.residual_overstress import with_viscosity
+from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
@@ -142,7 +143,7 @@ def _solve_group(
 ) -> list[Answer]:
     """Return the answers of scenes that share meshes."""
     kind = scenes[0].solve.kinematics
-    meshing = MESHINGS[kind](scenes, progress)
+    meshing = MESHINGS[kind](scenes, [expected_depth(scene) for scene in scenes], progress)
     if kind == "small" and any(scene.solve.course == "history" for scene in scenes):
         return _march(scenes, meshing, watch)
     refinement = _refine(scenes, meshing, watch, rough)
