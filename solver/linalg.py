@@ -231,18 +231,17 @@ class ElementSubset(NamedTuple):
 class Elimination:
     """Elimination of one body's tangent down to its skin, with its own memory."""
 
-    def __init__(self, plan: SymbolicFactorization, waiting: Array | None = None) -> None:
-        """Allocate memory for `plan`; `waiting`, if given, is the memory for Schur complements."""
+    def __init__(self, plan: SymbolicFactorization) -> None:
+        """Allocate memory for `plan`."""
         skin = int(plan.border[-1])
         self.plan = plan
         self.stiffness = np.zeros((skin, skin))  # the tangent's Schur complement
         values, near = np.empty(plan.factors), np.empty(int((plan.inner + plan.border).max()))
-        waiting = np.empty(plan.waiting) if waiting is None else waiting
         factors = Factors(
             plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, values, near
         )
         self._every = np.ones(len(plan.start), bool)
-        self._eliminate = bind_arguments(multifrontal.eliminate, plan, values, waiting, self.stiffness)
+        self._eliminate = bind_arguments(multifrontal.eliminate, plan, values, np.empty(plan.waiting), self.stiffness)
         self._condense = bind_arguments(multifrontal.condense, factors)
         self._back_substitute = bind_arguments(multifrontal.back_substitute, factors)
         self._displace = bind_arguments(multifrontal.displace, factors)

@@ -2,9 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import prod
-from threading import Lock
 from typing import Literal
 
 import numpy as np
@@ -19,9 +18,6 @@ from solver.constitutive import Elasticity
 from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
 from solver.quantities import QUANTITIES, SED
-
-_ALONE = Lock()  # held while the memory of `_memory` is in use
-
 
 Carried = tuple[Array, Array]  # a load after forward elimination (n,), and the displacements (e, 2) of centres by it
 
@@ -75,16 +71,13 @@ class LinearElimination:
             np.zeros((count, 3)),
             np.zeros((count, 2, 17)),
         )
-        with _ALONE:
-            memory = _memory(256 * count + plan.waiting)
-            self._inside = Elimination(plan, memory[256 * count :])
-            system = ElementSystem(
-                memory[: 256 * count].reshape(count, 16, 16), np.zeros(plan.size), self._recovery_matrix, self._inverse,
-                np.empty((count, 3, 18)), np.empty((count, 3)), np.zeros((0, 18)), np.zeros((0, 18, 18)),
-            )  # fmt: skip
-            element_loops.assemble(still, np.zeros((count, 3)), True, self.elastic.elements, system)
-            sign = self._inside.factorise(system.tangent)
-        if sign != DEFINITE:
+        self._inside = Elimination(plan)
+        system = ElementSystem(
+            np.empty((count, 16, 16)), np.zeros(plan.size), self._recovery_matrix, self._inverse,
+            np.empty((count, 3, 18)), np.empty((count, 3)), np.zeros((0, 18)), np.zeros((0, 18, 18)),
+        )  # fmt: skip
+        element_loops.assemble(still, np.zeros((count, 3)), True, self.elastic.elements, system)
+        if self._inside.factorise(system.tangent) != DEFINITE:
             raise LinAlgError("the stiffness inside the body is not positive definite")
         self._recovery_matrix = self._recovery_matrix[:, :, :16].copy()
         self.stiffness = self._inside.stiffness
@@ -134,12 +127,6 @@ class LinearElimination:
                 ElementSubset(parts, of.nodes[used], of.unknown[used], self._recovery_matrix[used]),
             )
         return self._subsets[key]
-
-
-@lru_cache(maxsize=1)
-def _memory(size: int) -> Array:
-    """Return scratch memory, always the same: new pages would take as long as the assembly."""
-    return np.empty(size)
 
 
 Motion = Literal["x", "y", "turn"]
