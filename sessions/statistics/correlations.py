@@ -82,11 +82,13 @@ def t_quantile(dof: float) -> float:
 def jackknife(whole: ArrayLike, without: Array) -> tuple[Array, Array]:
     """Return mean and standard error (m,) of the pseudo-values of numbers `whole` (m,), `without` each of k (k, m).
 
+    An error of round-off alone is nan: cases that are all alike tell none.
     Their t interval has k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika 61:1).
     """
     k = len(without)
     pseudo = k * np.asarray(whole, np.float64) - (k - 1) * without
-    return pseudo.mean(axis=0), pseudo.std(axis=0, ddof=1) / math.sqrt(k)
+    error = pseudo.std(axis=0, ddof=1) / math.sqrt(k)
+    return pseudo.mean(axis=0), np.where(error > 1e-9 * np.abs(whole), error, np.nan)
 
 
 def jackknife_interval(whole: ArrayLike, without: Array) -> tuple[Array, Array]:

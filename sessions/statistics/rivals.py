@@ -191,7 +191,7 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     mu = used.index(MODEL_MU) + 1
     partials = partial_correlation(*(_correlations(covariances, *pair) for pair in ((0, 1), (0, mu), (1, mu))))
     if not math.isfinite(partials[0]):
-        return _because(rival, partial="µ determines it")
+        return _because(rival, partial="µ determines it, or one of them does not vary")
     with np.errstate(divide="ignore", invalid="ignore"):  # a perfect one has no z
         z = np.arctanh(partials)
         low, high = _ends(*np.tanh(jackknife_interval(z[0], z[1:])))
@@ -209,7 +209,7 @@ def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | 
         return None
     scale = np.abs(np.concatenate(columns)).max(axis=0, initial=1e-300)
     centred = [own / scale - (own / scale).mean(axis=0) for own in columns]
-    products = np.array([own.T @ own for own in centred])
+    products = np.array([own.T @ own for own in (own * (np.abs(own) > 1e-12) for own in centred)])  # no round-off
     whole = products.sum(axis=0, keepdims=True)
     return np.concatenate([whole, whole - products])
 

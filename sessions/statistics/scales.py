@@ -205,7 +205,8 @@ def _without_each(counts: Array, model: Model, begin: Array) -> tuple[Array, str
 def _estimates(whole: Array, without: Array) -> list[IntervalEstimate]:
     """Return numbers (m,) with the jackknife's intervals, from the same without each subject (k, m)."""
     low, high = jackknife_interval(whole, without)
-    return list(map(IntervalEstimate, whole.tolist(), low.tolist(), high.tolist()))
+    ends = [(a, b) if math.isfinite(a) else (None, None) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    return [IntervalEstimate(value, *two) for value, two in zip(whole.tolist(), ends, strict=True)]
 
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:

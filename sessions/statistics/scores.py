@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
 SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
-_RESAMPLES = 10_000
+_ALIKE = 1e-12  # of the greatest value: a spread so small is round-off
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 
@@ -58,8 +58,8 @@ class Average:
 
     n: int  # subjects, each one's own repeats averaged first
     mean: float
-    sd: float | None  # between subjects; None of one alone, and so with the next two
-    low: float | None  # 95 % t interval
+    sd: float | None  # between subjects; None of one alone
+    low: float | None  # 95 % t interval; None of one alone, and of several who are all alike
     high: float | None
 
 
@@ -93,9 +93,8 @@ class MeanScore:
     n: int  # subjects, not trials
     mean: float
     sd: float | None  # standard deviation between subjects
-    low: float | None  # 95 % t interval of the mean
+    low: float | None  # 95 % t interval of the mean, cut at the ends of the scale: the mean of all people lies on it
     high: float | None
-    bootstrap: tuple[float, float] | None  # percentile interval over subjects, only where the t interval leaves 0..100
     reason: str | None
 
 
@@ -155,7 +154,7 @@ def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
 def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
     """Return the mean over subjects of every stimulus, by descriptor (as first met) and index.
 
-    Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects.
+    Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects, as far as they lie on the scale.
     """
     by_descriptor = by_key((one.descriptor, (one.index, one.score)) for one in subject_scores(tables))
     return tuple(
@@ -193,6 +192,8 @@ def _average(values: Sequence[float]) -> Average:
     if n < 2:
         return Average(n, mean, None, None, None)
     sd = float(np.std(values, ddof=1))
+    if sd <= _ALIKE * float(np.max(np.abs(values))):
+        return Average(n, mean, 0.0, None, None)
     half = t_quantile(n - 1) * sd / math.sqrt(n)
     return Average(n, mean, sd, mean - half, mean + half)
 
@@ -209,17 +210,15 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
 
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     of = _average(values)
-    ends = bounds(of.low, of.high)
-    alone = "one subject alone has no interval" if ends is None else None
-    bootstrap = None if ends is None or SCALE[0] <= ends[0] <= ends[1] <= SCALE[1] else _bootstrap(values)
-    return MeanScore(descriptor, index, of.n, of.mean, of.sd, of.low, of.high, bootstrap, alone)
+    low, high = (None if end is None else min(max(end, SCALE[0]), SCALE[1]) for end in (of.low, of.high))
+    return MeanScore(descriptor, index, of.n, of.mean, of.sd, low, high, no_interval(of))
 
 
-def _bootstrap(values: Sequence[float]) -> tuple[float, float]:
-    """Return the percentile interval of the mean, resampling subjects; always inside the range of the answers."""
-    drawn = np.random.default_rng(0).choice(np.asarray(values), (_RESAMPLES, len(values)))
-    low, high = np.quantile(drawn.mean(axis=1), TAILS).tolist()
-    return low, high
+def no_interval(mean: Average) -> str | None:
+    """Return why a mean has no interval; None where it has one."""
+    if mean.low is not None:
+        return None
+    return "one subject alone has no interval" if mean.n == 1 else "no interval: subjects who are all alike tell none"
 
 
 def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] | None:

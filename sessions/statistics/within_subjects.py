@@ -22,8 +22,8 @@ class WithinMean:
     index: int
     n: int  # subjects who scored every stimulus
     mean: float
-    low: float
-    high: float
+    low: float | None  # None where all subjects differ alike between stimuli
+    high: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,8 @@ class RepeatedCorrelation:
     p: float  # two-sided, of the same
     dof: int  # N - k - 1 for N pairs from k subjects
     subjects: int  # with two pairs or more: one alone has no variation within its subject
-    people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli; None of two
-    people_p: float | None  # two-sided, of the same
+    people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli
+    people_p: float | None  # two-sided, of the same; None as it is of two subjects, of some all alike, and of r = ±1
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +68,12 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
     n, c = scores.shape
     if n < 2 or c < 2:
         return ()
+    means = scores.mean(axis=0).tolist()
     levelled = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
     deviation = levelled.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
     half = t_quantile(n - 1) * deviation / math.sqrt(n)
-    means = scores.mean(axis=0)
-    return tuple(
-        WithinMean(index, len(subjects), float(mean), float(mean - h), float(mean + h))
-        for index, mean, h in zip(indices, means, half, strict=True)
-    )
+    ends = [(m - h, m + h) if h > 1e-9 * abs(m) else (None, None) for m, h in zip(means, half.tolist(), strict=True)]
+    return tuple(WithinMean(i, len(subjects), m, *two) for i, m, two in zip(indices, means, ends, strict=True))
 
 
 def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequence[float]) -> RepeatedCorrelation | None:
@@ -100,7 +98,7 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     several = np.bincount(codes) > 1
     k = int(several.sum())
     if 1.0 - abs(r) < 1e-12:
-        return RepeatedCorrelation(r, r, r, 0.0, dof, k, (r, r), 0.0)
+        return RepeatedCorrelation(r, r, r, 0.0, dof, k, None, None)
     t = r * math.sqrt(dof / (1.0 - r * r))
     p = 2.0 * float(special.stdtr(dof, -abs(t)))
     xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
@@ -113,7 +111,7 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
 def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], float] | None:
     """Return the jackknife's interval of r, and its p, from each subject's sums (k).
 
-    None of two subjects, or where r is ±1 without one of them.
+    None of two subjects, of subjects who are all alike, or where r is ±1 without one of them.
     """
     k = len(xy)
     others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
@@ -121,8 +119,10 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     mean, error = map(float, jackknife(z, np.arctanh(others_xy / size)))
+    if math.isnan(error):
+        return None
     half = t_quantile(k - 1) * error
-    p = 2.0 * float(special.stdtr(k - 1, -abs(mean) / error)) if error > 0.0 else 0.0
+    p = 2.0 * float(special.stdtr(k - 1, -abs(mean) / error))
     return (math.tanh(mean - half), math.tanh(mean + half)), p
 
 

@@ -58,17 +58,18 @@ def _with_ends(**ends):
 
 
 def _full(made):
+    number = int(made.subject[1:])
     small = [path for path in PATHS if path.kinematics == "small"]
     rows = [
         replace(
             row,
             rule="maximum",
             sed_interval="by derivatives",
-            **MEASURED,
+            **MEASURED | {"normal_force": 2.5 + 0.01 * number},
             **_with_ends(mu=(row.mu - 0.02, row.mu + 0.02), sed=(0.98 * row.sed, 1.03 * row.sed), **ENDS),
             error_estimate=0.002,
-            model_normal_force=2.1,
-            matching_depth=2.2,
+            model_normal_force=2.1 + 0.01 * number,
+            matching_depth=2.2 + 0.01 * number,
             flaws=("too_little_force",) if row.trial == 3 else (),
             paths=tuple(row.sed * (1.0 if path.receptor == "ending" else 1.0 - 0.002 * row.index) for path in small),
         )

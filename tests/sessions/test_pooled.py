@@ -261,8 +261,17 @@ def test_a_study_of_one_subject_says_why_tables_are_missing():
     assert order.startswith("No agreement on the order: it takes two subjects")
     assert order.endswith("stickiness has 1 such subject and 5 surfaces.")
     assert within.startswith("No intervals within subjects: they take two subjects")
-    assert differences.startswith("No differences of surfaces of stickiness: they take three subjects")
+    assert differences.startswith("No differences of surfaces of stickiness: it takes three subjects")
     assert missing_scores(pool_visits(VISITS[:3])) == []
+
+
+def test_a_pair_of_surfaces_that_has_no_test_is_named():
+    alike = [
+        replace(v, rows=tuple(replace(r, score=float(r.index)) if r.index < 30 else r for r in v.rows))
+        for v in VISITS[:4]
+    ]
+    (said,) = missing_scores(pool_visits(alike))
+    assert said.startswith("No difference of surfaces 20 − 0 of stickiness: it takes three subjects who scored both")
 
 
 def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that_a_study_finds():

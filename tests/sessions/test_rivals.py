@@ -112,6 +112,18 @@ def test_a_tip_of_seven_millimetres_turns_the_published_signs_round(radius, stic
     assert signs == [sticky, slippery]
 
 
+def test_scores_that_no_subject_varies_are_compared_with_nothing_and_the_reason_is_said():
+    trials = [
+        RivalTrial(subject, index, level, {MODEL: mu**2, MODEL_MU: mu, "N": 1.0 + 0.1 * mu + level / 50.0 * mu**3})
+        for subject, level in (("a", 20.1), ("b", 50.3), ("c", 80.7))
+        for index, mu in zip((0, 20, 50, 80, 100), (0.28, 0.44, 0.48, 0.64, 0.67), strict=True)
+    ]
+    found = rivals_within(trials)
+    assert all(one.r is None and one.contrast is None and one.partial is None for one in found)
+    (said,) = rivals_sentences("stickiness", found)
+    assert said == "Of stickiness, the SED is compared with no rival: one of them does not vary within subjects."
+
+
 def test_what_has_no_number_has_a_reason_instead():
     series = {MODEL: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}, "µ static": {0: 1.0}, MODEL_MU: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}}
     found = {rival.name: rival for rival in rivals_of_means({0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0}, series)}

@@ -59,6 +59,13 @@ def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
     assert found.people_p == pytest.approx(test.pvalue)
 
 
+def test_subjects_who_are_all_alike_tell_nothing_of_other_people():
+    found = repeated_correlation(list("aaabbbccc"), [1.0, 2.0, 3.0] * 3, [1.0, 2.5, 3.1] * 3)
+    assert (found.people, found.people_p) == (None, None)
+    table = {subject: {0: level, 50: level + 30.0} for subject, level in (("a", 1.0), ("b", 4.0), ("c", 9.0))}
+    assert [(one.low, one.high) for one in within_means(table)] == [(None, None)] * 2
+
+
 def test_subjects_with_one_trial_tell_nothing_of_what_goes_on_within_them():
     who, x, y = list("aaabbbccc"), [1.0, 2.0, 3.0] * 3, [1.0, 2.5, 3.1, 2.0, 2.2, 4.0, 0.0, 1.5, 1.2]
     alone = repeated_correlation(who, x, y)

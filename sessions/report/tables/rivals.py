@@ -67,7 +67,9 @@ def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
     if len(rivals) < 2:
         return []
     compared = [rival for rival in rivals if rival.contrast is not None]
-    return [*_alike(name, rivals[0].name, rivals), *_verdict(name, rivals[0].name, compared)]
+    why = next((one.reasons["contrast"] for one in rivals if "contrast" in one.reasons), "")
+    none = f"Of {name}, the {rivals[0].name} is compared with no rival: {why}."
+    return [*_alike(name, rivals[0].name, rivals), _verdict(name, rivals[0].name, compared) if compared else none]
 
 
 def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
@@ -78,7 +80,8 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     order, them = ("orders", "it") if len(alike) == 1 else ("order", "them")
     names = _rival_names([rival.name for rival in alike])
     needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
-    each = [f"{_two_figures(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
+    figures = {_two_figures(count): name for count, name in (*needed[-1:], *needed[:1])}
+    each = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
     opening = (
         f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
         f"of scores can tell {them} apart from it; "
@@ -86,20 +89,18 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     if not each:
         return [f"{opening}at the r seen here, no number of surfaces would."]
     return [
-        f"{opening}at the r seen here, Steiger's test would need about {' to '.join(each)} surfaces for {POWER:.0%} "
+        f"{opening}at the r seen here, Steiger's test would need {' to '.join(each)} surfaces for {POWER:.0%} "
         "power.".replace("%", "\N{NO-BREAK SPACE}%")
     ]
 
 
-def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
+def _verdict(name: str, model: str, compared: Sequence[Rival]) -> str:
     """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
     for rival in compared:
         if (contrast := rival.contrast) is not None:
             side = "more" if contrast.difference < 0.0 else "less"
             sides[side if contrast.differs(_ALPHA) else "neither"].append(rival.name)
-    if not compared:
-        return [f"Of {name} the surfaces are too few, or r too near 1, to compare the {model} with any rival."]
     followed = [
         f"{_rival_names(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]
     ]
@@ -108,7 +109,7 @@ def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
         sentence += (
             "; they" if sentence else "the scores"
         ) + f" tell no difference between the {model} and {_rival_names(sides['neither'])}"
-    return [f"On {name}, {sentence}."]
+    return f"On {name}, {sentence}."
 
 
 def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
@@ -161,6 +162,6 @@ def _two_figures(n: int) -> str:
     """Return a count with two figures, for it rests on correlations that are themselves uncertain.
 
     >>> _two_figures(2347), _two_figures(8), _two_figures(2_600_000)
-    ('2300', '8', 'more than 10 000')
+    ('about 2300', 'about 8', 'more than 10 000')
     """
-    return f"more than {MANY_SURFACES // 1000} 000" if n > MANY_SURFACES else f"{float(f'{n:.2g}'):.0f}"
+    return f"more than {MANY_SURFACES // 1000} 000" if n > MANY_SURFACES else f"about {float(f'{n:.2g}'):.0f}"

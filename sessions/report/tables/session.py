@@ -12,7 +12,6 @@ from sessions.report.tables import (
     Rows,
     Table,
     group_by_experiment,
-    range_cell,
     sections_of,
     table,
 )
@@ -171,19 +170,13 @@ def score_table(report: Report) -> Table | None:
 def score_cells(mean: MeanScore, notes: Notes) -> Row:
     """Return index, subjects, mean score, its interval and standard deviation; of a session as of a study."""
     interval = notes.interval(mean.low, mean.high, places(1), mean.reason)
-    if mean.bootstrap is not None:
-        why = (
-            "The t interval leaves the scale, where no score can be. Resampling the subjects gives instead, "
-            f"for index {mean.index} of {mean.descriptor}, {range_cell(*mean.bootstrap, places(1)).text}."
-        )
-        interval = Cell(interval.text, notes.mark(why), why)
     sd = spread_cell(mean.sd, mean.n, places(1), mean.reason, notes)
     return mean.index, mean.n, digits(mean.mean, 1), interval, sd
 
 
 def spread_cell(sd: float | None, n: int, shown: Format, reason: str | None, notes: Notes) -> Cell:
     """Return the standard deviation of n values over its interval."""
-    return notes.estimate(sd, shown, reason, None if sd is None else sd_interval(sd, n))
+    return notes.estimate(sd, shown, reason, sd_interval(sd, n) if sd else None, "all are alike")
 
 
 def answer_tables(report: Report) -> tuple[Table | None, ...]:

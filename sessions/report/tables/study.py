@@ -22,9 +22,9 @@ from sessions.report.wording import (
 )
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
-from sessions.statistics.scores import Average, MeanScore
+from sessions.statistics.scores import Average, no_interval
 from sessions.statistics.visit import Visit
-from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
+from sessions.statistics.within_subjects import RepeatedCorrelation
 
 RowsOf = Callable[[DescriptorFindings], Iterable[Row]]
 
@@ -84,7 +84,7 @@ def _scores(study: StudyFindings) -> Table | None:
             inner = within.get(mean.index)
             *cells, spread = score_cells(mean, notes)
             low, high = (None, None) if inner is None else (inner.low, inner.high)
-            yield (*cells, range_cell(low, high, places(1)), spread)
+            yield (*cells, notes.interval(low, high, places(1), _NOT_WITHIN), spread)
 
     columns = (
         "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | "
@@ -106,22 +106,27 @@ def _agreement(study: StudyFindings) -> Table | None:
 
 
 def _normalised_scores(study: StudyFindings) -> Table | None:
+    notes = Notes()
+
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
-            yield (index, *_with_interval(raw[index], 1), *_with_interval(mean, 2))
+            plain = raw[index]
+            ends = notes.interval(plain.low, plain.high, places(1), plain.reason)
+            yield (index, plain.n, digits(plain.mean, 1), ends, mean.n, *_mean(mean, places(2), notes))
 
     columns = (
         "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
     )
-    return _table(study, "table-normalised", caption("study-normalised"), columns, rows)
+    return _table(study, "table-normalised", caption("study-normalised"), columns, rows, notes)
 
 
 def _differences(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         for pair in one.differences:
             name = f"{pair.high_index} − {pair.low_index}"
-            yield (name, *_with_interval(pair, 1), p_value(pair.p), p_value(pair.p_holm))
+            ends = range_cell(pair.low, pair.high, places(1))
+            yield (name, pair.n, digits(pair.mean, 1), ends, p_value(pair.p), p_value(pair.p_holm))
 
     columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
     return _table(study, "table-differences", caption("study-differences"), columns, rows)
@@ -190,12 +195,7 @@ def _forces(study: StudyFindings) -> Table | None:
     return _table(study, "table-forces", caption("study-forces", model=study_model(study)), columns, row, notes)
 
 
-def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row:
-    """Return how many subjects a mean is over, the mean, and its interval."""
-    ends = range_cell(mean.low, mean.high, places(decimals))
-    return mean.n, digits(mean.mean, decimals), ends
-
-
+_NOT_WITHIN = "no interval: no two subjects scored every surface, or they differ alike between surfaces"
 _NO_STROKE = "no subject's stroke gives this number"
 
 
@@ -203,7 +203,7 @@ def _mean(mean: Average | None, shown: Callable[[float], str], notes: Notes) -> 
     """Return a mean and its interval, or dashes with the reason."""
     if mean is None:
         return (notes.number(None, str, _NO_STROKE),) * 2
-    return shown(mean.mean), notes.interval(mean.low, mean.high, shown, "one subject alone has no interval")
+    return shown(mean.mean), notes.interval(mean.low, mean.high, shown, no_interval(mean))
 
 
 def _relation(study: StudyFindings) -> Table | None:

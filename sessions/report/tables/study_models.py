@@ -1,6 +1,7 @@
 """Tables of a study's page: mixed models, planted and estimated values, and every trial."""
 
 from collections.abc import Callable, Iterable
+from itertools import combinations
 
 from sessions.prediction import BY_NAME, Quantity
 from sessions.report.tables import Cell, Notes, Row, Table, range_cell, table
@@ -69,10 +70,15 @@ def missing_scores(study: StudyFindings) -> list[str]:
             continue
         order = "it takes two subjects who scored each of three surfaces or more, not all alike"
         within = "they take two subjects who scored each of two surfaces"
-        pairs = "they take three subjects who scored both, not all with the same difference"
+        pairs = "it takes three subjects who scored both, not all with the same difference"
+        known = {(pair.low_index, pair.high_index) for pair in one.differences}
+        scored = sorted(mean.index for mean in one.scores)
+        without = [f"{b} − {a}" for a, b in combinations(scored, 2) if (a, b) not in known]
         sentences += [] if one.agreement else [f"No agreement on the order: {order}; {have}."]
         sentences += [] if one.within else [f"No intervals within subjects: {within}; {have}."]
-        sentences += [] if one.differences else [f"No differences of surfaces of {one.descriptor}: {pairs}."]
+        if without:
+            which = f" {', '.join(without)}" if one.differences else ""
+            sentences.append(f"No difference{'' if which else 's'} of surfaces{which} of {one.descriptor}: {pairs}.")
     return sentences
 
 
