@@ -1,5 +1,6 @@
 """Start of the program."""
 
+import _thread
 import gc
 import os
 import signal
@@ -25,10 +26,34 @@ def main() -> None:
 
     if answered:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.unraisablehook = _repeat_stop
     code = run(sys.argv[1:])
     if answered:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     _leave(code)
+
+
+def _repeat_stop(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Press Ctrl-C once more where it came while Python let go of an object, where no exception leaves."""
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+        return
+    import threading
+
+    again = threading.Timer(0.01, _press_ctrl_c)  # at once, it would be raised in here, and end here too
+    again.daemon = True
+    again.start()
+
+
+def _press_ctrl_c() -> None:
+    """Send the main thread what Ctrl-C sends it, which also ends its sleep where the system can."""
+    import threading
+
+    main_thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main_thread is not None:
+        signal.pthread_kill(main_thread, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
 
 
 def _open_streams() -> None:

@@ -157,6 +157,31 @@ def test_a_verb_whose_standard_streams_are_closed_does_its_work_as_with_them(tmp
     assert (tmp_path / "nl.xlf").read_text(encoding="utf-8").startswith("<?xml")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="no process sends itself Ctrl-C there")
+def test_ctrl_c_that_comes_while_python_lets_go_of_an_object_still_stops():
+    code = """
+import os, signal, sys, time, types
+from daq_app.__main__ import main
+
+class Stop:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+
+def verb(options, console):
+    stop = Stop()
+    del stop  # Python ignores what is raised in here
+    time.sleep(30.0)
+    return 0
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start what runs in the background without one
+name = "daq_app.cli.verbs.solve"
+sys.modules[name] = types.SimpleNamespace(run=verb, add_arguments=lambda parser: None, EXAMPLE="")
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code, "solve"], capture_output=True, timeout=20, check=False)
+    assert (done.returncode, done.stderr) == (130, b"daq-app: stopped\n")
+
+
 @pytest.mark.skipif(os.name != "posix", reason="no process dies of a signal there")
 @pytest.mark.parametrize(
     ("loaded", "words"),
