@@ -8,6 +8,9 @@ from daq_app.cli.main import run
 from daq_app.cli.verbs import selftest
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.head import certificate_for, write_certificate
+from sessions.run.runner import Status
+
+kill = selftest.Recorder.kill
 
 
 def test_the_selftest_kills_cuts_fills_stops_and_later_sessions_carry_its_certificate(tmp_path, capsys, monkeypatch):
@@ -25,6 +28,19 @@ def test_the_selftest_kills_cuts_fills_stops_and_later_sessions_carry_its_certif
     carried = Recording.open(folder).provenance["selftest"]
     assert carried["same_program"]
     assert carried["sentence"] == told["sentence"]
+
+
+def test_a_selftest_that_is_stopped_leaves_nothing_however_long_its_recorder_has_run(tmp_path, monkeypatch):
+    def press_ctrl_c(watched, _):
+        watched.until(Status)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(selftest._WatchedRecorder, "hear", press_ctrl_c)
+    killed = []
+    monkeypatch.setattr(selftest.Recorder, "kill", lambda recorder: killed.append(recorder) or kill(recorder))
+    assert run(["selftest", "--out", str(tmp_path)]) == 130
+    assert [recorder._process.wait(0) for recorder in killed] == [-9]
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("what", ["readings", "event", "trial"])

@@ -9,7 +9,8 @@ import random
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
@@ -167,6 +168,16 @@ class _WatchedRecorder:
                 pass
 
 
+@contextmanager
+def _recorder_to_kill() -> Generator[_WatchedRecorder]:
+    """Lend a recorder and kill it, after Ctrl-C too: one that lived on would rescue what is removed then."""
+    watched = _WatchedRecorder()
+    try:
+        yield watched
+    finally:
+        watched.kill()
+
+
 def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[dict[str, Any], list[Path]]:
     """Kill the recorder while a session runs, and go on with it, again and again.
 
@@ -179,10 +190,9 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
     folder = room / "killed-0"
     for number in range(KILLS):
         progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
-        watched = _WatchedRecorder()
-        trial = _begin_or_resume(watched, folder)
-        watched.hear(chance.uniform(*RUNNING))
-        watched.kill()
+        with _recorder_to_kill() as watched:
+            trial = _begin_or_resume(watched, folder)
+            watched.hear(chance.uniform(*RUNNING))
         recording = Recording.open(folder)
         _check_recording(recording, watched, trial)
         block = recording.last_block()
@@ -228,8 +238,7 @@ def _try_stops(room: Path) -> float:
     """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
     took: list[float] = []
     for number in range(STOPS):
-        watched = _WatchedRecorder()
-        with watched.recorder:
+        with _recorder_to_kill() as watched:
             _begin_or_resume(watched, room / str(number))
             watched.hear(0.3)
             began = time.monotonic()
