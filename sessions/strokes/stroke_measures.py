@@ -64,8 +64,7 @@ def measure_stroke(
             first, last = contact.uncut
             uncut = track_of(span, replace(contact, start=first, stop=last), zero)
         window = slide(findings, span, track, decided.value("steady"), uncut)
-        if (onset := decided.instant("slide_onset")) is not None:
-            findings.numbers["slide_onset"] = onset
+        _decide_slide_onset(findings, track, decided)
         if window is not None:
             missed = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area)
             _friction(findings, track, window)
@@ -278,6 +277,16 @@ def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> 
         f"{', so no force, friction or speed is given' if refused else ''}."
     )
     findings.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
+
+
+def _decide_slide_onset(findings: Findings, track: Track, decided: StrokeDecisions) -> None:
+    """Set the slide onset that a person decided, unless it lies outside of the contact."""
+    onset = decided.instant("slide_onset")
+    if onset is not None and track.time[0] <= onset <= track.time[-1]:
+        findings.numbers["slide_onset"] = onset
+    elif onset is not None:
+        sentence = "The slide onset that was decided lies outside of the contact: it stays as it was found."
+        findings.flaw(FlawName.DECISION, sentence, "doubtful")
 
 
 def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZero, *, turned: bool) -> None:

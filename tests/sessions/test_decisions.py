@@ -245,6 +245,15 @@ def test_a_slide_onset_decided_is_that_of_the_stroke_and_ends_the_search_for_a_s
     assert one.mu_static == pytest.approx(0.7, rel=0.05)
 
 
+@pytest.mark.parametrize("outside", [0.5, 3.5, -5.0, 1000.0])
+def test_a_slide_onset_decided_outside_of_the_contact_is_named_and_changes_nothing(outside):
+    found = decided(Decision("E02", "seen", "slide_onset", 1, 1, None, outside))
+    assert found.strokes[0].slide_onset == decided().strokes[0].slide_onset
+    assert [flaw.sentence for flaw in found.flaws if flaw.name == "decision"] == [
+        "The slide onset that was decided lies outside of the contact: it stays as it was found."
+    ]
+
+
 def test_onset_lift_and_direction_are_those_decided():
     ends = [Decision("E02", "w", "onset", 1, 1, None, 0.9), Decision("E02", "w", "lift", 1, 1, None, 2.7)]
     (one,) = decided(*ends, Decision("E02", "w", "direction", 1, 1, 1, -1)).strokes
