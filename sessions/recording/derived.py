@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from sessions.file_access import json_object, json_text, name_failure, read_within_limit, write_whole
-from sessions.plan.study import STUDY_FILE, Key
+from sessions.plan.study import Key
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
 from sessions.recording.manifest import is_sealed, list_in_manifest
@@ -61,11 +61,14 @@ def _store(folder: Path, name: str, content: bytes) -> Path:
     return path
 
 
-def check_replaceable(path: Path) -> None:
-    """Raise RecordingError where a file that somebody named for a text is one that a session or a study holds."""
-    in_folder = any((path.parent / name).is_file() for name in (LIVE_FILE, STUDY_FILE))
-    if in_folder and path.is_file() and path.suffix not in (".toml", ".txt"):
-        raise RecordingError(f"{path} belongs to a session or a study, so it is left alone: choose another file")
+def check_replaceable(path: Path, head: str) -> None:
+    """Raise RecordingError where a file that somebody named for a text holds something else than one of these.
+
+    Such a text has the line `head` at its start, or after a line that says SIMULATED.
+    """
+    content = bytes_of(path)
+    if content and head.encode() not in content.split(b"\n", 2)[:2]:
+        raise RecordingError(f"{path} holds something else, so it is left alone: choose another file")
 
 
 GAIN_ERROR = "calibration-error.json"

@@ -7,8 +7,10 @@ import pytest
 from planted_fingers import law
 
 from daq_app.cli.main import run
+from daq_app.cli.verbs.fit_finger import SCENE_HEAD
 from sessions.prediction import finger_in
 from sessions.prediction.press_model import PressModel
+from sessions.recording.derived import check_replaceable
 
 PLANTED = (0.25, 0.1, 0.025)  # [MPa]
 RATE, DEEP, TOUCH = 200.0, 1.4, 3.2  # [Hz], [mm], displacement of the stage at the touch [mm]
@@ -37,6 +39,15 @@ def pressed(tmp_path_factory):
     return folder
 
 
+def test_the_scene_of_a_finger_is_never_written_over_one_that_somebody_wrote(pressed, tmp_path, capsys):
+    mine = tmp_path / "mine.toml"
+    mine.write_text("[friction]\nmu = 0.3\n")
+    words = ["fit-finger", str(pressed / "session"), "--displacement", str(pressed / "stage.csv"), "--scene", str(mine)]
+    assert run(words) == 1
+    assert "mine.toml holds something else, so it is left alone" in capsys.readouterr().err
+    assert mine.read_text() == "[friction]\nmu = 0.3\n"
+
+
 @pytest.mark.slow
 def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict(pressed, tmp_path, capsys):
     out = tmp_path / "own.toml"
@@ -55,6 +66,7 @@ def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict
     depth = np.array([0.4, 0.8, 1.1])
     own = law([scene.materials.of(name).E for name in ("epidermis", "dermis", "fat")], depths=depth)
     np.testing.assert_allclose(own(depth), law(PLANTED)(depth), rtol=0.05)
+    check_replaceable(out, SCENE_HEAD)  # the next fit may replace it
     assert run(["solve", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["normal_force"] > 0.0
 

@@ -101,15 +101,17 @@ def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, tmp_path
 
 
 @pytest.mark.parametrize(
-    "name", ["P01_scores/session.sqlite", "P01_scores/session.h5", "study.sqlite", "sealed-key.json"]
+    "name", ["P01_scores/session.sqlite", "P01_scores/session.h5", "study.sqlite", "sealed-key.json", "../two.toml"]
 )
-def test_labels_are_never_written_over_what_a_session_or_a_study_holds(study, tmp_path, capsys, name):
+def test_labels_are_never_written_over_anything_but_older_labels(study, tmp_path, capsys, name):
     friction = shutil.copytree(study, tmp_path / "friction")
+    shutil.copy(study.with_name("two.toml"), tmp_path)
     before = (friction / name).read_bytes()
     assert run(["enrol", str(friction), "--subject", "P07", "--labels", str(friction / name)]) == 1
     assert "it is left alone: choose another file" in capsys.readouterr().err
     assert (friction / name).read_bytes() == before
-    _, shown = said(capsys, "enrol", friction, "--labels", friction / "labels.txt")
+    for _ in range(2):  # a list of labels is written over an older one
+        _, shown = said(capsys, "enrol", friction, "--labels", friction / "labels.txt")
     assert [row["subject"] for row in shown["subjects"]] == ["P01", "P02"]
     assert (friction / "labels.txt").read_text().startswith("For whoever puts the labels on.")
 

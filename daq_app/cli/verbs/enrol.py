@@ -29,6 +29,7 @@ from sessions.recording.derived import check_replaceable
 from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"
+LABELS = "For whoever puts the labels on."  # the first line of their file
 HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
 
 
@@ -49,7 +50,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     folder: Path = options.study
     _refuse_mixtures(options)
     if options.labels is not None:
-        check_replaceable(options.labels)
+        check_replaceable(options.labels, LABELS)
     body = body_of(options)
     if options.protocol is not None:
         file = protocol_file(options.protocol)
@@ -86,7 +87,7 @@ def _write_labels(folder: Path, path: Path) -> None:
     lines = [f"{descriptor} {index}: {code}" for (descriptor, index), code in labels.items()]
     if key is not None:
         note(folder, "labels_told", {})
-    write_whole(path, "\n".join(["For whoever puts the labels on.", *lines, ""]).encode())
+    write_whole(path, "\n".join([LABELS, *lines, ""]).encode())
 
 
 def _show(study: Study, member: Member | None, console: Console) -> None:

@@ -33,6 +33,7 @@ from sessions.toml_file import toml_text
 from solver import Scene
 
 EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
+SCENE_HEAD = "# A finger found by 'daq-app fit-finger'"  # at the head of its scene file
 MU, FACTOR = 0.5, 2.0  # usual ones
 DEEPER = 1.1  # the model goes so much deeper than the stage, should the finger be touched before its onset is seen [-]
 FALL = 0.05  # of the force in a hold, from which on relaxing is named [-]
@@ -59,7 +60,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.scene is not None and not options.scene.parent.is_dir():
         raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
     if options.scene is not None:
-        check_replaceable(options.scene)
+        check_replaceable(options.scene, SCENE_HEAD)
     recording, _, unreadable = open_visit(options.session, options.subject, console)
     settings = stored_settings(recording)
     gain_error = calibration_error(options)
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     simulated = recording.simulated_sentence
     if options.scene is not None:
         head = f"# {simulated}\n" if simulated else ""
-        write_whole(options.scene, (head + toml_text(outcome.scene)).encode())
+        write_whole(options.scene, f"{head}{SCENE_HEAD}\n{toml_text(outcome.scene)}".encode())
     assumed = {
         "mu": options.mu,
         "prior_factor": options.prior,
