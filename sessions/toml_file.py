@@ -54,7 +54,7 @@ def check_scale_ends(ends: tuple[str, str] | None) -> None:
 def load_toml(path: Path, cls: type[T]) -> T:
     """Return the dataclass that a TOML file describes.
 
-    Raises FileNotFoundError where there is none, SettingsError for anything wrong in it.
+    Raises OSError where it cannot be read, SettingsError for anything wrong in it.
     """
     return from_toml(text_of(path), cls, str(path))
 
@@ -64,7 +64,7 @@ def text_of(path: Path) -> str:
     if path.is_dir() or not path.exists():
         what = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {what}; give the path of a TOML file")
-    with name_failure(SettingsError, f"{path} cannot be read"):
+    with name_failure(OSError, f"{path} cannot be read"):
         content = read_within_limit(path, LARGEST_TEXT)
     try:
         return content.decode("utf-8-sig")  # some editors begin a file with a mark

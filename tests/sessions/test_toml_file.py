@@ -1,3 +1,4 @@
+import errno
 import os
 import re
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sessions import toml_file
 from sessions.toml_file import NotAllowed, SettingsError, from_table, from_toml, load_toml, toml_text
 from solver import Finger, Friction, Loading, Material, Materials, Relaxation, Scene
 from solver.scene.published import STICKINESS
@@ -101,6 +103,16 @@ def test_any_table_gives_the_dataclass_or_one_sentence(table):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"none\.toml: there is no such file"):
         load_toml(tmp_path / "none.toml", Outer)
+
+
+def test_a_file_that_cannot_be_read_is_no_wrong_value(tmp_path, monkeypatch):
+    def refuse(path, _):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(toml_file, "read_within_limit", refuse)
+    (tmp_path / "locked.toml").touch()
+    with pytest.raises(OSError, match=r"locked\.toml cannot be read \(Permission denied\); permit reading"):
+        load_toml(tmp_path / "locked.toml", Outer)
 
 
 @pytest.mark.parametrize("content", [b"count = = 1", b"count = 1\ncount = 2", b"\xff\xfe"])

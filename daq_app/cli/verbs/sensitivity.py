@@ -9,6 +9,7 @@ keeps that sign: single changes, a map over the receptor's place and the tip rad
 """
 
 import argparse
+import errno
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -31,8 +32,10 @@ from daq_app.batch.sign_map import Answer
 from daq_app.cli.options import add_seed, add_shared
 from daq_app.console import DONE, Console, WrongValue, table
 from daq_app.wording import number
+from sessions.file_access import remedy
 from sessions.prediction import QUANTITIES
 from sessions.prediction.surface_series import SERIES
+from sessions.recording import RecordingError
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
 
@@ -129,7 +132,8 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     except OSError as error:
         if options.keep is None:
             raise
-        raise WrongValue(f"--keep {options.keep} cannot be used ({error.strerror})") from error
+        kind = WrongValue if error.errno in (errno.EEXIST, errno.EISDIR) else RecordingError
+        raise kind(f"--keep {options.keep} cannot be used ({error.strerror}); {remedy(error, new=True)}") from error
     single = dict(zip(changes, answers, strict=False))
     radii = dict(zip(mapped, answers[len(changes) :], strict=False))
     random = answers[len(changes) + len(mapped) :]
