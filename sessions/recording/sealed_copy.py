@@ -182,7 +182,9 @@ def write_copy(
 
 
 def differences(recording: Recording) -> Iterator[str]:
-    """Yield a sentence for each way in which the copy differs from the live file."""
+    """Yield a sentence for each way in which the copy differs from the live file; of no copy the manifest tells."""
+    if not (recording.folder / SEALED_FILE).is_file():
+        return
     try:
         with h5py.File(recording.folder / SEALED_FILE, "r") as file:
             yield from _different_readings(recording, file)
