@@ -18,6 +18,15 @@ class RecordingError(Exception):
     """A session folder cannot be written or read; the message says which, why, and what is safe."""
 
 
+class DiskRefused(RecordingError):
+    """The disk takes no more of a session; `why` says it without what is safe, and ends with what mends it."""
+
+    def __init__(self, sentence: str, why: str) -> None:
+        """Take the sentence of a session that goes on when resumed, and the reason alone."""
+        super().__init__(sentence)
+        self.why = why
+
+
 FORMAT = "daq-app session"
 FORMAT_VERSION = 3  # also PRAGMA user_version of the live file
 APPLICATION_ID = 0x44415146  # "DAQF" in ASCII: PRAGMA application_id, at byte 68 of the file

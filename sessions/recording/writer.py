@@ -313,7 +313,7 @@ class SessionWriter:
             f"the disk took no more ({error}): the first {safe.readings} readings and {safe.events} events are safe; "
             f"{remedy(error)} and resume"
         )
-        raise RecordingError(f"{self._path}: {self._failure}") from error
+        raise schema.DiskRefused(f"{self._path}: {self._failure}", f"({error}); {remedy(error)}") from error
 
     def _check(self) -> None:
         """Raise RecordingError when nothing can be written any more."""

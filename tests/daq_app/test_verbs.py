@@ -18,6 +18,7 @@ from examples import short_protocol
 from recordings import PLAN, TRIAL, begun, ended
 
 from daq_app.cli.main import run
+from daq_app.cli.verbs import demo
 from sessions.plan.plan import Stimulus
 from sessions.recording import Recording, archive
 from sessions.recording.schema import COLUMNS
@@ -263,6 +264,43 @@ def test_an_import_that_cannot_be_sealed_leaves_no_folder(session, tmp_path, cap
         assert not (tmp_path / "again").exists()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="limits the size of files")
+def test_an_import_that_fills_the_disk_says_that_nothing_is_left_of_it(session, tmp_path, capsys):
+    import resource
+
+    csv = tmp_path / "strokes.csv"
+    rows = [f"{0.1 * at:.1f},1,2,3,4,5,6" for at in range(2000)]
+    csv.write_text("\n".join(["t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm", *rows]))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for source in (session / "session.h5", csv):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))  # a live file takes more
+        try:
+            code = run(["import", str(source), "--out", str(tmp_path / "again")])
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        sentence = capsys.readouterr().err
+        assert code == 1
+        assert f"{tmp_path / 'again'} cannot be written (" in sentence
+        assert "import again: nothing is left of it" in sentence
+        assert "safe" not in sentence
+        assert not (tmp_path / "again").exists()
+
+
+def test_a_demonstration_that_is_stopped_after_it_recorded_says_where_that_is(tmp_path, capsys, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    def study(out, *_):
+        ended(out / "S01")
+        stop()
+
+    monkeypatch.setattr(demo, "simulated_study", study)
+    assert run(["demo", "--out", str(tmp_path / "demo")]) == 3
+    assert f"what was recorded is in {tmp_path / 'demo'}" in capsys.readouterr().err
+    monkeypatch.setattr(demo, "simulated_study", stop)
+    assert run(["demo", "--out", str(tmp_path / "none")]) == 130
+
+
 def test_a_report_takes_no_scores_twice(session, tmp_path, capsys):
     words = ["report", str(session), "-o", str(tmp_path / "page.html"), "--scores", str(session)]
     assert run(words) == 2
@@ -289,6 +327,14 @@ def test_a_report_that_has_no_place_is_refused_before_it_is_made(session, tmp_pa
     (tmp_path / "taken").write_text("a file")
     assert run(["report", str(session), *words]) == 1
     assert "taken cannot be written into" in capsys.readouterr().err
+    assert not (session / "prediction.json").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders have no such permission")
+def test_a_report_beside_a_recording_that_is_locked_is_refused_before_it_is_made(session, capsys, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: path != session or mode != os.W_OK)  # root may write anywhere
+    assert run(["report", str(session)]) == 1
+    assert "P07 cannot be written into (Permission denied)" in capsys.readouterr().err
     assert not (session / "prediction.json").exists()
 
 

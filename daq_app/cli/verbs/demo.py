@@ -34,10 +34,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    began = time.monotonic()
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     if holds_something(out):
         raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
+    try:
+        return _demonstrate(options, out, console)
+    except KeyboardInterrupt:
+        if not holds_something(out):
+            raise
+        console.note(f"daq-app: stopped; what was recorded is in {out}")
+        return FLAWED
+
+
+def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> int:
+    """Run the study into `out`, and print what came of it."""
+    began = time.monotonic()
     clock = clock_at(1.0 if options.real_time else PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:

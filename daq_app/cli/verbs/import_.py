@@ -7,6 +7,8 @@ which rate they were taken.
 """
 
 import argparse
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,17 +44,31 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return _import_foreign(options, console) if session is None else _restore_export(session, options, console)
 
 
+@contextmanager
+def _whole_session(folder: Path) -> Generator[None]:
+    """Leave a whole session or nothing; where the disk takes no more there is nothing to resume, and that is said."""
+    from sessions.file_access import whole_or_nothing
+    from sessions.recording.schema import DiskRefused, RecordingError
+
+    try:
+        with whole_or_nothing(folder):
+            yield
+    except DiskRefused as error:
+        raise RecordingError(
+            f"{folder} cannot be written {error.why}, and import again: nothing is left of it"
+        ) from error
+
+
 def _restore_export(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
     """Make a session of an export of ours again."""
     from sessions.exchange.exported import import_session
-    from sessions.file_access import whole_or_nothing
     from sessions.recording.archive import seal
 
     stated = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
     if stated:
         raise WrongValue(f"--{stated[0]} says nothing of an export, which holds all that is known: leave it out")
     folder = options.out or Path("recordings") / options.file.stem
-    with whole_or_nothing(folder):
+    with _whole_session(folder):
         imported = import_session(session, folder)
         seal(folder)
     console.result({"session": str(folder), "format": session.form, **asdict(imported)})
@@ -64,7 +80,6 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
 def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     """Import a CSV file of somebody else's."""
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
-    from sessions.file_access import whole_or_nothing
     from sessions.recording.archive import seal
     from sessions.recording.manifest import list_in_manifest
 
@@ -81,7 +96,7 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
         subject=options.subject or "unknown",
     )
     folder = options.out or Path("recordings") / options.file.stem
-    with whole_or_nothing(folder):
+    with _whole_session(folder):
         imported = import_csv(options.file, folder, stated)
         seal(imported.folder)
         list_in_manifest(imported.folder, (ORIGINAL_FILE,))

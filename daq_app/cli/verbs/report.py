@@ -58,6 +58,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     if options.out is not None:
         pages.check_replaceable(options.out)
+    else:
+        pages.make_place(recording.folder)
     if options.figures is not None:
         pages.make_place(options.figures)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
