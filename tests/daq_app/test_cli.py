@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from driver_courses import identified
+from driver_courses import identity_or_reason
 
 from daq_app.cli import main as cli
 from daq_app.cli.main import VERBS, run
@@ -113,7 +113,7 @@ def test_the_simulated_device_of_a_wire_answers_at_the_address_that_is_printed_u
     answers = []
 
     def look(_):
-        answers.append(identified(wire, json.loads(capsys.readouterr().out)["address"]))
+        answers.append(identity_or_reason(wire, json.loads(capsys.readouterr().out)["address"]))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(simulate, "time", SimpleNamespace(sleep=look))

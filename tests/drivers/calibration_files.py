@@ -13,5 +13,5 @@ NANO43_MATRIX = FT32831.tolist()
 GAMMA = (HERE / "FT8578.cal").read_text(encoding="utf-8")
 
 
-def parsed(text):
+def parse(text):
     return parse_calibration_file(text.encode(), "FT.cal")

@@ -11,21 +11,21 @@ from simulators.net_ft_box import NetFtBox
 
 
 @pytest.fixture
-def box(monkeypatch):
-    """Return a function that starts a networked box, by default told that time runs ten times as fast.
+def start_box(monkeypatch):
+    """Return a function that starts a networked box, by default in simulated time ten times as fast.
 
-    However busy this machine is, its first reading is waited for.
+    A driver waits for its first reading however busy this machine is.
     """
     monkeypatch.setattr(deadline, "CONNECTING", 120.0)
-    boxes, before = [], set(threading.enumerate())
+    boxes, threads_before = [], set(threading.enumerate())
 
-    def started(bench=None, *, clock=None, **settings):
+    def start(bench=None, *, clock=None, **settings):
         boxes.append(NetFtBox(bench or Bench(1), clock or PacedClock(10.0), **settings))
         boxes[-1].start()
         return boxes[-1]
 
-    yield started
-    for one in boxes:
-        one.close()
-    left = [thread.name for thread in set(threading.enumerate()) - before]
-    assert not left, f"threads left running: {left}"
+    yield start
+    for box in boxes:
+        box.close()
+    leftovers = [thread.name for thread in set(threading.enumerate()) - threads_before]
+    assert not leftovers, f"threads left running: {leftovers}"

@@ -66,10 +66,10 @@ def recording():
 
 
 @contextmanager
-def started(name, faults, clock, folder):
-    """Let the device of a driver run inside, and the driver wait no longer than a test needs."""
+def running_device(name, faults, clock, folder):
+    """Run the simulated device of a driver, and let the driver wait no longer than a test needs."""
     with pytest.MonkeyPatch.context() as monkeypatch:
-        quickened(monkeypatch)
+        shorten_waits(monkeypatch)
         match name:
             case "sim":
                 device = simulated_bench(faults, monkeypatch)
@@ -88,7 +88,7 @@ def simulator(name):
     return SIMULATORS["net-ft" if name in ("sim", "replay") else name]
 
 
-def handles(device, before=0):
+def count_handles(device, before=0):
     """Return how many handles are open beyond `before`; a simulated device needs a moment to hang up."""
     for _ in range(50):
         count = len(list(Path("/dev/fd").iterdir())) + device.open_handles() - before
@@ -98,8 +98,8 @@ def handles(device, before=0):
     return count
 
 
-def quickened(monkeypatch):
-    """Let what a driver waits for be no longer than a test needs; a first reading comes, however busy the machine."""
+def shorten_waits(monkeypatch):
+    """Let a driver wait no longer than a test needs, but for its first reading however busy the machine is."""
     monkeypatch.setattr(deadline, "CONNECTING", 120.0)
     monkeypatch.setattr(serial_ft, "_MEASURED", 0.25)
     monkeypatch.setattr(digital_ft, "_MEASURED", 0.15)
@@ -109,30 +109,30 @@ def quickened(monkeypatch):
 
 
 @dataclass
-class Undisturbed:
+class CalmCourse:
     """What came of an undisturbed course."""
 
     uri: str
     bench: Bench
-    found: Any = None  # who was identified before, during and after it was open; or the refusal
-    found_in_use: Any = None
-    found_after: Any = None
+    identity: Any = None  # who was identified before, during and after it was open; or the refusal
+    identity_in_use: Any = None
+    identity_after: Any = None
     info: Any = None
     healths: list[Any] = field(default_factory=list)  # of the first stream, and of a second one
     blocks: list[ReadingBlock] = field(default_factory=list)
-    planted: Any = None
+    ground_truth: Any = None
     stops: list[float] = field(default_factory=list)  # how long each took [real s]
-    started_twice: str = ""
+    second_start: str = ""
     after_stop: int = -1  # readings still coming
     threads_left: set[Any] = field(default_factory=set)
     handles_left: int = -1
 
 
 @dataclass
-class Disturbed:
+class FaultyCourse:
     """What came of a course full of faults."""
 
-    told: dict[str, tuple[Any, Any, bool]]  # by fault: health before and after, and whether the stream went on
+    outcomes: dict[str, tuple[Any, Any, bool]]  # by fault: health before and after, and whether the stream went on
     info: Any
     block: ReadingBlock
     health: Any
@@ -142,8 +142,8 @@ class Disturbed:
     handles_left: int
 
 
-def identified(name, uri):
-    """Return who answers, or why nobody may ask; nothing where the address is not of the catalogue's."""
+def identity_or_reason(name, uri):
+    """Return who answers, or why nobody may ask; None where the catalogue has no such driver."""
     if name not in IDENTIFY:
         return None
     for _ in range(20):  # a device may be deaf for a moment after its stream was ended
@@ -152,19 +152,19 @@ def identified(name, uri):
         except SetupError as error:
             return str(error)
         except LinkLost as error:
-            why = str(error)
+            reason = str(error)
             time.sleep(0.05)
-    return why
+    return reason
 
 
-def stopped(transducer, course):
+def time_stop(transducer, course):
     began = time.monotonic()
     transducer.stop()
     course.stops.append(time.monotonic() - began)
 
 
 class Metronome:
-    """Measures for how long this process did not run: how much longer than asked a thread of it slept."""
+    """Measures how long this process stood still: by how much a thread overslept."""
 
     def __enter__(self):
         self.longest = 0.0  # [real s]
@@ -184,73 +184,75 @@ class Metronome:
         self._thread.join()
 
 
-def uninterrupted(run, whole=lambda _: True, pause=PAUSE):
+def retry_if_interrupted(run, whole=lambda _: True, pause=PAUSE):
     """Return what `run` returns; again where the machine stood still for `pause`, a device was lost, or not `whole`."""
     for _ in range(AGAIN):
         try:
             with Metronome() as metronome:
-                came = run()
+                result = run()
         except LinkLost:  # as of a device that had no time to answer
             continue
-        if metronome.longest < pause and whole(came):
-            return came
+        if metronome.longest < pause and whole(result):
+            return result
     return run()
 
 
-def undisturbed_course(name, folder):
+def run_calm_course(name, folder):
     """Go through the undisturbed course with one driver; again where it lost readings, as a faulty one always does."""
 
     def whole(course):
         return name == "replay" or not any(health.lost for health in course.healths)
 
-    return uninterrupted(lambda: undisturbed_run(name, folder), whole)
+    return retry_if_interrupted(lambda: run_calm_course_once(name, folder), whole)
 
 
-def undisturbed_run(name, folder):
+def run_calm_course_once(name, folder):
     """Go through the undisturbed course with one driver, once."""
     clock, threads = PacedClock(simulator(name).factor), set(threading.enumerate())
-    with started(name, Faults(), clock, folder) as device:
-        before = handles(device)
-        course = Undisturbed(device.uri, device.bench)
-        course.found = identified(name, device.uri)
-        with connect(device.uri, clock) as opened:
+    with running_device(name, Faults(), clock, folder) as device:
+        before = count_handles(device)
+        course = CalmCourse(device.uri, device.bench)
+        course.identity = identity_or_reason(name, device.uri)
+        with connect(device.uri, clock) as connection:
             transducer, bench, now = (
-                opened.transducer,
-                opened.bench or device.bench,
-                opened.bench_now or device.now,
+                connection.transducer,
+                connection.bench or device.bench,
+                connection.bench_now or device.now,
             )
             course.info, course.bench = transducer.info, bench
             bench.mount(paper_surfaces()["stickiness", 80])
             start = now()
             transducer.start()
             stroke = Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8)
-            course.planted = bench.begin_stroke(stroke, now() + 0.2 * clock.factor)
-            course.found_in_use = identified(name, device.uri)
+            course.ground_truth = bench.begin_stroke(stroke, now() + 0.2 * clock.factor)
+            course.identity_in_use = identity_or_reason(name, device.uri)
             blocks, newest = [], 0.0
-            far = 0.5 if name == "replay" else course.planted.end - start  # readings count from the first of them
+            duration = (
+                0.5 if name == "replay" else course.ground_truth.end - start
+            )  # readings count from the first of them
             try:
-                while newest < far:
+                while newest < duration:
                     blocks.append(transducer.read(0.1))
                     newest = max([newest, *blocks[-1].time[-1:].tolist()])
             finally:
-                stopped(transducer, course)
+                time_stop(transducer, course)
             course.blocks.append(ReadingBlock.concatenate([*blocks, transducer.read(0.0)]))
             course.after_stop = len(transducer.read(0.0))
             course.healths.append(transducer.health)
             if name != "replay":
                 transducer.start()
-                course.started_twice = refusal(transducer)
-                again = transducer.read(10.0)
-                stopped(transducer, course)
-                course.blocks.append(ReadingBlock.concatenate([again, transducer.read(0.0)]))
+                course.second_start = refusal(transducer)
+                second_block = transducer.read(10.0)
+                time_stop(transducer, course)
+                course.blocks.append(ReadingBlock.concatenate([second_block, transducer.read(0.0)]))
                 course.healths.append(transducer.health)
                 while min(course.stops) >= STOPS_WITHIN and len(course.stops) < 4 * AGAIN:  # a busy machine
                     transducer.start()
-                    stopped(transducer, course)
+                    time_stop(transducer, course)
             transducer.stop()
             transducer.close()
-        course.found_after = identified(name, device.uri)
-        course.handles_left = handles(device, before)
+        course.identity_after = identity_or_reason(name, device.uri)
+        course.handles_left = count_handles(device, before)
     course.threads_left = set(threading.enumerate()) - threads
     return course
 
@@ -263,52 +265,52 @@ def refusal(transducer):
     return ""
 
 
-def disturbed_course(name, folder):
+def run_faulty_course(name, folder):
     """Go through all that can go wrong; again where the device is given up too early, as by a faulty driver always."""
-    return uninterrupted(lambda: disturbed_run(name, folder), pause=math.inf)
+    return retry_if_interrupted(lambda: run_faulty_course_once(name, folder), pause=math.inf)
 
 
-def disturbed_run(name, folder):
+def run_faulty_course_once(name, folder):
     """Go through all that can go wrong with one driver, once, and lose the device at the end."""
     clock, faults, threads = PacedClock(simulator(name).factor), Faults(seed=1), set(threading.enumerate())
-    with started(name, faults, clock, folder) as device:
-        before = handles(device)
-        told, blocks, sentence = {}, [], ""
-        with connect(device.uri, clock) as opened:
-            transducer, now = opened.transducer, opened.bench_now or device.now
+    with running_device(name, faults, clock, folder) as device:
+        before = count_handles(device)
+        outcomes, blocks, sentence = {}, [], ""
+        with connect(device.uri, clock) as connection:
+            transducer, now = connection.transducer, connection.bench_now or device.now
             transducer.start()
             blocks.append(transducer.read(10.0))
             for kind in ONE_AFTER_THE_OTHER:
                 tells = kind in simulator(name).tells
                 for _ in range(1 + AGAIN if tells or kind in simulator(name).hides else 0):
-                    told[kind] = gone_through(kind, tells, transducer, blocks, faults, clock, now)
-                    if not tells or counted(kind, told[kind]):
+                    outcomes[kind] = inject_fault(kind, tells, transducer, blocks, faults, clock, now)
+                    if not tells or is_counted(kind, outcomes[kind]):
                         break  # else the machine slept through the fault, and there was none
             if name == "sim":  # whose device cannot be taken away: it is closed with it
                 transducer.stop()
                 blocks.append(transducer.read(0.0))
             else:
                 device.close()
-                sentence = lost(transducer, blocks)
+                sentence = read_until_lost(transducer, blocks)
             health, info = transducer.health, transducer.info
-        left = handles(device, before)
-    return Disturbed(
-        told,
+        handles_left = count_handles(device, before)
+    return FaultyCourse(
+        outcomes,
         info,
         ReadingBlock.concatenate(blocks),
         health,
         sentence,
         device.uri,
         set(threading.enumerate()) - threads,
-        left,
+        handles_left,
     )
 
 
-def planted_statuses_course(name, folder):
-    """Plant each status that the maker lists, one after the other; return who it is, and what health said of each."""
-    clock, faults, said = PacedClock(1.0), Faults(), {}
-    with started(name, faults, clock, folder) as device, connect(device.uri, clock) as opened:
-        transducer, now = opened.transducer, opened.bench_now or device.now
+def run_status_course(name, folder):
+    """Plant each status that the maker lists, in turn; return the device's info and health before and after each."""
+    clock, faults, health_by_status = PacedClock(1.0), Faults(), {}
+    with running_device(name, faults, clock, folder) as device, connect(device.uri, clock) as connection:
+        transducer, now = connection.transducer, connection.bench_now or device.now
         transducer.start()
         for status in simulator(name).statuses:
             if simulator(name).at_start:
@@ -321,28 +323,28 @@ def planted_statuses_course(name, folder):
             since = time.monotonic()
             while transducer.health.flagged == before.flagged and time.monotonic() - since < PATIENCE:
                 transducer.read(0.02)
-            said[status] = before, transducer.health, time.monotonic() - since
+            health_by_status[status] = before, transducer.health, time.monotonic() - since
             faults.put()
             while (block := transducer.read(0.1)) is not None and len(block) and block.status[-1]:
                 pass
         transducer.stop()
-    return opened.transducer.info, said
+    return connection.transducer.info, health_by_status
 
 
-def counted(kind, told):
-    """Say whether the counter of a fault has grown."""
-    before, after, _ = told
+def is_counted(kind, outcome):
+    """Return whether the counter of a fault has grown."""
+    before, after, _ = outcome
     return getattr(after, FIELD[kind]) > getattr(before, FIELD[kind])
 
 
-def gone_through(kind, tells, transducer, blocks, faults, clock, now):
+def inject_fault(kind, tells, transducer, blocks, faults, clock, now):
     """Let one thing go wrong, and read until the stream has gone on behind it and, where it `tells`, is counted."""
     before = transducer.health
     begin = now() + 0.02 * clock.factor
     end = begin + LENGTH.get(kind, 0.25) * clock.factor
     faults.put(Fault(kind, begin, end, SHARE.get(kind, 1.0), 0.05 * clock.factor))
     origin_ns = clock.now_ns() - round(now() * 1e9)
-    deadline, behind = Deadline(PATIENCE), None
+    deadline, lag_limit = Deadline(PATIENCE), None
     went_on = False
     while deadline.remaining > 0.0:
         block = transducer.read(0.1 * clock.factor)
@@ -351,17 +353,17 @@ def gone_through(kind, tells, transducer, blocks, faults, clock, now):
             went_on = transducer.health.off_rate > before.off_rate
         elif len(block):
             went_on = (int(block.received_ns[-1]) - origin_ns) * 1e-9 > end + 0.05 * clock.factor
-        if went_on and behind is None:
-            behind = Deadline(LAGS)  # a busy device may still have to send what it made before the fault
-        if behind is not None and (
-            not tells or behind.remaining <= 0.0 or counted(kind, (before, transducer.health, True))
+        if went_on and lag_limit is None:
+            lag_limit = Deadline(LAGS)  # a busy device may still have to send what it made before the fault
+        if lag_limit is not None and (
+            not tells or lag_limit.remaining <= 0.0 or is_counted(kind, (before, transducer.health, True))
         ):
             break
     return before, transducer.health, went_on
 
 
-def lost(transducer, blocks):
-    """Return what is said when the device has gone away."""
+def read_until_lost(transducer, blocks):
+    """Return the sentence with which the driver gives up a device that has gone away."""
     while True:
         try:
             blocks.append(transducer.read(10.0))

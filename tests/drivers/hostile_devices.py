@@ -34,16 +34,16 @@ class Hostile:
 
     def __init__(self):
         self.uri = ""
-        self.asked = threading.Event()  # for a stream
+        self.stream_request = threading.Event()  # for a stream
         self._over = threading.Event()
         self._threads = []
         self._ends = []
 
     def serve(self, work):
-        self._threads.append(threading.Thread(target=self._again, args=(work,), daemon=True))
+        self._threads.append(threading.Thread(target=self._repeat, args=(work,), daemon=True))
         self._threads[-1].start()
 
-    def _again(self, work):
+    def _repeat(self, work):
         with contextlib.suppress(OSError, ValueError):
             while not self._over.is_set():
                 work()
@@ -60,19 +60,19 @@ class Hostile:
 
 
 def _port(hostile, kind=socket.SOCK_STREAM):
-    bound = socket.socket(socket.AF_INET, kind)
-    bound.bind(("127.0.0.1", 0))
-    bound.settimeout(0.1)
-    hostile.at_close(bound.close)
+    listener = socket.socket(socket.AF_INET, kind)
+    listener.bind(("127.0.0.1", 0))
+    listener.settimeout(0.1)
+    hostile.at_close(listener.close)
     if kind == socket.SOCK_STREAM:
-        bound.listen()
-    return bound
+        listener.listen()
+    return listener
 
 
-def _served(hostile, listener, answer, *, drip=0.0):
+def _serve_answer(hostile, listener, answer, *, drip=0.0):
     """Answer each call with these bytes, all at once, or a byte every `drip` seconds."""
 
-    def one():
+    def answer_call():
         try:
             caller, _ = listener.accept()
         except TimeoutError:
@@ -83,14 +83,14 @@ def _served(hostile, listener, answer, *, drip=0.0):
                 caller.sendall(piece)
                 time.sleep(drip)
 
-    hostile.serve(one)
+    hostile.serve(answer_call)
 
 
 def web(status, body):
     """Return a web server that gives every page the same answer, at the address of a box."""
     hostile = Hostile()
     http = _port(hostile)
-    _served(hostile, http, f"HTTP/1.0 {status} X\r\n\r\n".encode() + body)
+    _serve_answer(hostile, http, f"HTTP/1.0 {status} X\r\n\r\n".encode() + body)
     hostile.uri = f"net-ft://127.0.0.1?http={http.getsockname()[1]}"
     return hostile
 
@@ -99,21 +99,21 @@ def net_ft(datagram, *, page_drip=0.0):
     """Return a box whose page is in order, and whose stream is this datagram, every millisecond."""
     hostile = Hostile()
     http, tcp, rdt = _port(hostile), _port(hostile), _port(hostile, socket.SOCK_DGRAM)
-    _served(hostile, http, PAGE, drip=page_drip)
-    _served(hostile, tcp, bytes(24), drip=2.0)
-    asker = []
+    _serve_answer(hostile, http, PAGE, drip=page_drip)
+    _serve_answer(hostile, tcp, bytes(24), drip=2.0)
+    client_address = []
 
     def stream():
         rdt.settimeout(0.001)
         with contextlib.suppress(TimeoutError, ConnectionError):
-            asker[:] = [rdt.recvfrom(100)[1]]
-            hostile.asked.set()
-        if asker:
+            client_address[:] = [rdt.recvfrom(100)[1]]
+            hostile.stream_request.set()
+        if client_address:
             with contextlib.suppress(ConnectionError):
-                rdt.sendto(os.urandom(36) if datagram is None else datagram, asker[0])
+                rdt.sendto(os.urandom(36) if datagram is None else datagram, client_address[0])
 
     hostile.serve(stream)
-    http_port, tcp_port, rdt_port = (bound.getsockname()[1] for bound in (http, tcp, rdt))
+    http_port, tcp_port, rdt_port = (endpoint.getsockname()[1] for endpoint in (http, tcp, rdt))
     hostile.uri = f"net-ft://127.0.0.1?http={http_port}&tcp={tcp_port}&rdt={rdt_port}"
     return hostile
 

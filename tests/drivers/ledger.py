@@ -12,8 +12,8 @@ class Ledger(Faults):
 
     def route(self, now, datagrams):
         """Return what leaves, and keep it."""
-        made = list(datagrams)
-        self.datagrams += [datagram for _, datagram in made]
-        leaving = super().route(now, made)
+        batch = list(datagrams)
+        self.datagrams += [datagram for _, datagram in batch]
+        leaving = super().route(now, batch)
         self.delivered += leaving
         return leaving

@@ -17,10 +17,10 @@ def machine(monkeypatch):
         def sleep(self, seconds):
             self.now_ns += round(seconds * 1e9)
 
-    one = Machine()
-    monkeypatch.setattr(time, "monotonic_ns", lambda: one.now_ns)
-    monkeypatch.setattr(time, "sleep", one.sleep)
-    return one
+    simulated_machine = Machine()
+    monkeypatch.setattr(time, "monotonic_ns", lambda: simulated_machine.now_ns)
+    monkeypatch.setattr(time, "sleep", simulated_machine.sleep)
+    return simulated_machine
 
 
 def test_fifty_seconds_pass_in_one_of_the_machine(machine):

@@ -26,41 +26,41 @@ STOPS_WITHIN = 5.0
 BY_LIBRARY = {"nidaq"}  # its maker's library speaks to the device
 
 
-class Far:
+class FarLink:
     """A link on a clock of the test's own, which gives this after each wait."""
 
-    def __init__(self, arrives):
-        self.now, self._arrives = 0.0, arrives
+    def __init__(self, arrival):
+        self.now, self._arrival = 0.0, arrival
 
     def receive(self, timeout):
         self.now += timeout
-        return self._arrives
+        return self._arrival
 
 
-@pytest.mark.parametrize("arrives", [None, b"x"])
-def test_every_wait_for_a_device_ends_within_five_seconds_with_closing_whatever_arrives(arrives, monkeypatch):
-    far = Far(arrives)
-    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: far.now))
-    link = Deadline(deadline.CONNECTING).bound(far)
+@pytest.mark.parametrize("arrival", [None, b"x"])
+def test_every_wait_for_a_device_ends_within_five_seconds_with_closing_whatever_arrives(arrival, monkeypatch):
+    far_link = FarLink(arrival)
+    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: far_link.now))
+    link = Deadline(deadline.CONNECTING).bound(far_link)
     with pytest.raises(LinkLost, match="not ready within"):
         deque((link.receive(1.0) for _ in range(1000)), maxlen=0)
-    assert 4.0 < far.now <= 5.0 - deadline.ENDING
+    assert 4.0 < far_link.now <= 5.0 - deadline.ENDING
 
 
-def connect(uri, opened):
+def connect(uri, transducers):
     """Open and start, and return the sentence that says why it could not be done."""
     try:
-        opened.append(open_transducer(uri, RealClock()))
-        opened[-1].start()
+        transducers.append(open_transducer(uri, RealClock()))
+        transducers[-1].start()
     except (LinkLost, DeviceFault, SetupError) as error:
         return str(error)
     return ""
 
 
-def at_once(work, names):
+def run_in_parallel(task, names):
     """Return by its name what `work` returns for each, all run beside each other."""
     with ThreadPoolExecutor(len(names)) as pool:
-        return dict(zip(names, pool.map(work, names), strict=True))
+        return dict(zip(names, pool.map(task, names), strict=True))
 
 
 def test_every_driver_with_bytes_of_its_own_has_a_hostile_device():
@@ -70,28 +70,28 @@ def test_every_driver_with_bytes_of_its_own_has_a_hostile_device():
 @pytest.fixture(scope="module")
 def attempts(tmp_path_factory):
     """Of each hostile device what connecting said and how long it took [s]; all at once, for they mostly wait."""
-    room = tmp_path_factory.mktemp("devices")  # its factory is not made for threads
+    folder = tmp_path_factory.mktemp("devices")  # its factory is not made for threads
     threads = set(threading.enumerate())
 
     def attempt(name):
-        device, opened = HOSTILE[name](Path(mkdtemp(dir=room))), []
+        device, transducers = HOSTILE[name](Path(mkdtemp(dir=folder))), []
         try:
             began = time.monotonic()
-            sentence = connect(device.uri, opened)
+            sentence = connect(device.uri, transducers)
             elapsed_s = time.monotonic() - began
         finally:
-            for transducer in opened:
+            for transducer in transducers:
                 transducer.close()
             device.close()
         return device.uri, sentence, elapsed_s
 
-    return at_once(attempt, HOSTILE), set(threading.enumerate()) - threads
+    return run_in_parallel(attempt, HOSTILE), set(threading.enumerate()) - threads
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_connecting_ends_in_one_sentence_whatever_arrives(name, attempts):
-    uri, sentence, took = attempts[0][name]
-    assert took < CONNECTS_WITHIN
+    uri, sentence, elapsed_s = attempts[0][name]
+    assert elapsed_s < CONNECTS_WITHIN
     assert uri.partition("?")[0].split("://")[0] in sentence or "http" in sentence or "tty" in sentence
     assert "\n" not in sentence
 
@@ -106,18 +106,18 @@ PATIENT = [name for name in HOSTILE if "drips" not in name and "any baud" not in
 @pytest.fixture(scope="module")
 def stops(tmp_path_factory):
     """Of each hostile device how long a stop took [s], and whether connecting ended with it; all at once."""
-    room = tmp_path_factory.mktemp("devices")
+    folder = tmp_path_factory.mktemp("devices")
 
     def stop(name):
-        device, opened = HOSTILE[name](Path(mkdtemp(dir=room))), []
-        connecting = threading.Thread(target=lambda: connect(device.uri, opened))
+        device, transducers = HOSTILE[name](Path(mkdtemp(dir=folder))), []
+        connecting = threading.Thread(target=lambda: connect(device.uri, transducers))
         try:
             connecting.start()
-            while connecting.is_alive() and not opened:
+            while connecting.is_alive() and not transducers:
                 time.sleep(0.01)
             time.sleep(0.3)
             began = time.monotonic()
-            for transducer in opened:
+            for transducer in transducers:
                 transducer.stop()
             elapsed_s = time.monotonic() - began
             connecting.join(CONNECTS_WITHIN)
@@ -125,14 +125,14 @@ def stops(tmp_path_factory):
             device.close()
         return elapsed_s, not connecting.is_alive()
 
-    return at_once(stop, PATIENT)
+    return run_in_parallel(stop, PATIENT)
 
 
 @pytest.mark.parametrize("name", PATIENT)
 def test_a_stop_ends_connecting_whatever_arrives(name, stops):
-    took, ended = stops[name]
-    assert took < STOPS_WITHIN
-    assert ended
+    elapsed_s, connecting_ended = stops[name]
+    assert elapsed_s < STOPS_WITHIN
+    assert connecting_ended
 
 
 def test_setting_a_bias_ends_on_a_command_port_that_drips():
@@ -148,10 +148,10 @@ def test_setting_a_bias_ends_on_a_command_port_that_drips():
 
 
 def test_datagrams_that_are_no_readings_are_named():
-    device, opened = net_ft(bytes(35)), []
+    device, transducers = net_ft(bytes(35)), []
     try:
-        sentence = connect(device.uri, opened)
+        sentence = connect(device.uri, transducers)
     finally:
         device.close()
     assert "of which none is a reading" in sentence
-    assert opened[0].health.malformed > 0
+    assert transducers[0].health.malformed > 0

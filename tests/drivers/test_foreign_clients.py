@@ -50,18 +50,18 @@ def test_pymodbus_reads_the_stored_calibration_from_the_digital_transducer():
             for first in range(0xE3, 0xE3 + 133, 19)
             for word in client.read_holding_registers(first, count=19, device_id=10).registers
         ]
-        refused = client.write_registers(0, [1, 2, 3], device_id=10)
+        write_reply = client.write_registers(0, [1, 2, 3], device_id=10)
         client.close()
     finally:
         box.close()
-    stored = b"".join(word.to_bytes(2, "big") for word in words)
-    assert stored[:8].rstrip(b"\0") == b"SIM00003"
-    matrix = np.frombuffer(stored, ">f4", 36, 64).reshape(6, 6)
-    force_counts, torque_counts = np.frombuffer(stored, ">i4", 2, 64 + 144 + 2 + 24).tolist()
+    memory = b"".join(word.to_bytes(2, "big") for word in words)
+    assert memory[:8].rstrip(b"\0") == b"SIM00003"
+    matrix = np.frombuffer(memory, ">f4", 36, 64).reshape(6, 6)
+    force_counts, torque_counts = np.frombuffer(memory, ">i4", 2, 64 + 144 + 2 + 24).tolist()
     # The box's gauges give 3000 counts a volt; a million of what the matrix gives are one N or one N m.
-    told = matrix * 3000.0 / np.repeat([force_counts, torque_counts / 1000.0], 3)[:, None]
-    np.testing.assert_allclose(told, FT32831, rtol=1e-5, atol=1e-6)
-    assert refused.isError(), "nothing is written while it is locked"
+    newton_matrix = matrix * 3000.0 / np.repeat([force_counts, torque_counts / 1000.0], 3)[:, None]
+    np.testing.assert_allclose(newton_matrix, FT32831, rtol=1e-5, atol=1e-6)
+    assert write_reply.isError(), "nothing is written while it is locked"
 
 
 def test_a_second_client_takes_the_stream_of_the_networked_box():
@@ -70,16 +70,16 @@ def test_a_second_client_takes_the_stream_of_the_networked_box():
     try:
         port = int(box.uri.split("rdt=")[1].split("&")[0])
         first, second = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
-        for one in (first, second):
-            one.settimeout(1.0)
-            one.sendto(bytes.fromhex("1234 0002 0000 0000"), ("127.0.0.1", port))
-            assert len(one.recv(100)) == 36
+        for client in (first, second):
+            client.settimeout(1.0)
+            client.sendto(bytes.fromhex("1234 0002 0000 0000"), ("127.0.0.1", port))
+            assert len(client.recv(100)) == 36
         first.settimeout(0.1)
-        on_its_way = 0
+        in_flight = 0
         with contextlib.suppress(TimeoutError):
-            while on_its_way < 100 and first.recv(100):
-                on_its_way += 1
-        assert on_its_way < 100
+            while in_flight < 100 and first.recv(100):
+                in_flight += 1
+        assert in_flight < 100
         assert len(second.recv(100)) == 36
         first.close()
         second.close()

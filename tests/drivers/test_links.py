@@ -13,16 +13,16 @@ from drivers.transducer import LinkLost, SetupError
 @pytest.fixture
 def serve():
     """Serve one connection with the given chunks of an answer, then close it, or leave it open and silent."""
-    opened, threads = [], []
+    sockets, threads = [], []
 
     def start(*chunks, close=True):
         listener = socket.create_server(("127.0.0.1", 0))
-        opened.append(listener)
+        sockets.append(listener)
 
         def answer():
             try:
                 connection, _ = listener.accept()
-                opened.append(connection)
+                sockets.append(connection)
                 connection.recv(4096)
                 for chunk in chunks:
                     connection.sendall(chunk)
@@ -38,8 +38,8 @@ def serve():
     yield start
     for thread in threads:
         thread.join(5)
-    for port in opened:
-        port.close()
+    for opened_socket in sockets:
+        opened_socket.close()
 
 
 def get(port, patience=5.0):
@@ -112,9 +112,9 @@ def far_end():
 def test_datagrams_go_both_ways_one_by_one(far_end):
     link = UdpLink("127.0.0.1", far_end.getsockname()[1])
     link.send(b"start")
-    request, asker = far_end.recvfrom(100)
+    request, client_address = far_end.recvfrom(100)
     for answer in (b"one", b"", b"three"):
-        far_end.sendto(answer, asker)
+        far_end.sendto(answer, client_address)
     assert request == b"start"
     assert [link.receive(5.0) for _ in range(3)] == [b"one", b"", b"three"]
     assert link.receive(0.0) is None
@@ -126,10 +126,10 @@ def test_datagrams_go_both_ways_one_by_one(far_end):
 def test_datagrams_of_strangers_are_not_seen(far_end):
     link = UdpLink("127.0.0.1", far_end.getsockname()[1])
     link.send(b"start")
-    _, asker = far_end.recvfrom(100)
+    _, client_address = far_end.recvfrom(100)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.sendto(b"stranger", asker)
-    far_end.sendto(b"box", asker)
+        stranger.sendto(b"stranger", client_address)
+    far_end.sendto(b"box", client_address)
     assert link.receive(5.0) == b"box"
     assert link.receive(0.0) is None
     link.close()

@@ -21,22 +21,22 @@ needs_terminals = pytest.mark.skipif(os.name != "posix", reason="there are no ps
 
 @pytest.fixture
 def terminal():
-    made = PseudoTerminal("ttyTest")
-    yield made
-    made.close()
+    pseudo_terminal = PseudoTerminal("ttyTest")
+    yield pseudo_terminal
+    pseudo_terminal.close()
 
 
 @pytest.fixture
-def stand_in(monkeypatch):
+def port_calls(monkeypatch):
     """Let every port opened be one that keeps how it was set and never answers."""
-    opened = []
+    calls = []
 
     class Port:
         is_open = True
         in_waiting = 0
 
         def __init__(self, *arguments, **settings):
-            opened.append((arguments, settings))
+            calls.append((arguments, settings))
 
         def fileno(self):
             return nowhere.fileno()
@@ -52,13 +52,13 @@ def stand_in(monkeypatch):
 
     monkeypatch.setattr(serial_link.serial, "Serial", Port)
     with Path(os.devnull).open("wb") as nowhere:
-        yield opened
+        yield calls
 
 
-def test_the_rs485_transducer_is_opened_with_its_own_line_settings(stand_in):
+def test_the_rs485_transducer_is_opened_with_its_own_line_settings(port_calls):
     with pytest.raises(LinkLost, match="does not answer"):
         open_digital_ft(parse_address("digital-ft:///dev/ttyUSB7"), RealClock(), Deadline.for_opening())
-    ((port, baud), settings) = stand_in[0]
+    ((port, baud), settings) = port_calls[0]
     assert (port, baud) == ("/dev/ttyUSB7", 1_250_000)
     assert settings["parity"] == serial.PARITY_EVEN
     assert settings["bytesize"] == serial.EIGHTBITS
@@ -67,27 +67,27 @@ def test_the_rs485_transducer_is_opened_with_its_own_line_settings(stand_in):
     assert not settings["xonxoff"]
 
 
-def test_the_controller_is_opened_without_parity_at_each_rate_it_might_have(stand_in):
+def test_the_controller_is_opened_without_parity_at_each_rate_it_might_have(port_calls):
     with pytest.raises(LinkLost, match="no controller answers"):
         open_serial_ft(
             parse_address("serial-ft:///dev/ttyUSB0?counts_per_N=20&counts_per_Nm=333.33"),
             RealClock(),
             Deadline.for_opening(),
         )
-    assert [arguments[1] for arguments, _ in stand_in][:3] == [38400, 9600, 115200]
-    assert {settings["parity"] for _, settings in stand_in} == {serial.PARITY_NONE}
+    assert [arguments[1] for arguments, _ in port_calls][:3] == [38400, 9600, 115200]
+    assert {settings["parity"] for _, settings in port_calls} == {serial.PARITY_NONE}
 
 
 @needs_terminals
 def test_a_computer_busy_while_it_sends_has_sent_all_the_same(terminal, monkeypatch):
     import serial.serialposix
 
-    def late(*given):
+    def write_late(*arguments):
         time.sleep(1.5 * serial_link._WRITE_PATIENCE)
-        return os.write(*given)
+        return os.write(*arguments)
 
     link = SerialLink(terminal.path, 38400)
-    monkeypatch.setattr(serial.serialposix, "os", SimpleNamespace(**{**vars(os), "write": late}))
+    monkeypatch.setattr(serial.serialposix, "os", SimpleNamespace(**{**vars(os), "write": write_late}))
     link.send(b"asked")
     monkeypatch.undo()
     assert terminal.heard(1.0) == b"asked"
@@ -113,17 +113,17 @@ def test_an_answer_that_waited_for_a_busy_computer_is_heard():
 @needs_terminals
 def test_every_byte_goes_through_unchanged_both_ways(terminal):
     link = SerialLink(terminal.path, 38400)
-    every = bytes(range(256))
-    link.send(every)
-    heard = b""
-    while len(heard) < 256:
-        heard += terminal.heard(1.0)
-    terminal.say(every)
-    got = b""
-    while len(got) < 256:
-        got += link.receive(1.0) or b""
+    all_bytes = bytes(range(256))
+    link.send(all_bytes)
+    terminal_bytes = b""
+    while len(terminal_bytes) < 256:
+        terminal_bytes += terminal.heard(1.0)
+    terminal.say(all_bytes)
+    link_bytes = b""
+    while len(link_bytes) < 256:
+        link_bytes += link.receive(1.0) or b""
     link.close()
-    assert heard == got == every
+    assert terminal_bytes == link_bytes == all_bytes
 
 
 @needs_terminals
@@ -151,18 +151,18 @@ def test_a_port_is_had_by_one_at_a_time(terminal):
 
 def test_a_port_that_cannot_be_opened_is_named_with_the_reason(tmp_path, monkeypatch):
     missing = str(tmp_path / "ttyNone")
-    with pytest.raises(SetupError, match="no such port") as refused:
+    with pytest.raises(SetupError, match="no such port") as refusal:
         SerialLink(missing, 9600)
-    assert str(refused.value).startswith(missing)
-    plain = tmp_path / "plain.txt"
-    plain.write_bytes(b"")
+    assert str(refusal.value).startswith(missing)
+    text_file = tmp_path / "plain.txt"
+    text_file.write_bytes(b"")
     with pytest.raises(SetupError, match="no serial port"):
-        SerialLink(str(plain), 9600)
+        SerialLink(str(text_file), 9600)
 
-    def forbidden(*_, **__):
+    def deny(*_, **__):
         raise serial.SerialException(13, "could not open port: Permission denied")
 
-    monkeypatch.setattr(serial_link.serial, "Serial", forbidden)
+    monkeypatch.setattr(serial_link.serial, "Serial", deny)
     with pytest.raises(SetupError, match="you may not use it"):
         SerialLink("/dev/ttyS0", 9600)
 
@@ -172,7 +172,7 @@ def test_an_address_without_a_port_is_refused():
         port_of(parse_address("serial-ft://?baud=9600"))
 
 
-def test_a_port_that_vanishes_while_its_waiting_time_is_set_is_lost(stand_in, monkeypatch):
+def test_a_port_that_vanishes_while_its_waiting_time_is_set_is_lost(port_calls, monkeypatch):
     link = SerialLink("/dev/ttyUSB7", 1_250_000)
 
     def refuse(*_):
@@ -181,4 +181,4 @@ def test_a_port_that_vanishes_while_its_waiting_time_is_set_is_lost(stand_in, mo
     monkeypatch.setattr(serial_link.serial.Serial, "timeout", property(fset=refuse), raising=False)
     with pytest.raises(LinkLost, match="/dev/ttyUSB7 is gone"):
         link.receive(0.1)
-    assert len(stand_in) == 1
+    assert len(port_calls) == 1

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driver_courses import uninterrupted
+from driver_courses import retry_if_interrupted
+from reading import read_until
 
 from drivers import digital_ft as digital_ft_device
 from drivers import serial_ft as serial_ft_device
@@ -32,39 +33,39 @@ FACTOR = 2.0
 
 
 @dataclass
-class Simulated:
+class SimulatedDevice:
     """A simulated device: where it is, how to open it, what it feels, its clock, and how to switch it off."""
 
     uri: str
-    opens: Any
-    identifies: Any
+    open_function: Any
+    identify_function: Any
     bench: Bench
     clock: Clock
     box: Any
 
-    def open(self, more=""):
-        return self.opens(parse_address(self.uri + more), self.clock, Deadline.for_opening())
+    def open(self, options=""):
+        return self.open_function(parse_address(self.uri + options), self.clock, Deadline.for_opening())
 
-    def heard(self, block):
+    def last_arrival(self, block):
         """When the last reading arrived, on the bench's clock."""
         return (block.received_ns[-1] - self.box._origin_ns) * 1e-9 if len(block) else 0.0
 
     def identify(self):
-        return self.identifies(parse_address(self.uri), Deadline(1.0))
+        return self.identify_function(parse_address(self.uri), Deadline(1.0))
 
 
 def serial_ft(form="binary"):
     bench, clock = Bench(3), PacedClock(FACTOR)
     box = SerialFtBox(bench, clock, baud=115200 if form == "ascii" else 38400)
     box.start()
-    return Simulated(f"{box.uri}&format={form}", open_serial_ft, identify_serial_ft, bench, clock, box)
+    return SimulatedDevice(f"{box.uri}&format={form}", open_serial_ft, identify_serial_ft, bench, clock, box)
 
 
 def digital_ft(**settings):
     bench, clock = Bench(3), PacedClock(1.0)
     box = DigitalFtBox(bench, clock, **settings)
     box.start()
-    return Simulated(box.uri, open_digital_ft, identify_digital_ft, bench, clock, box)
+    return SimulatedDevice(box.uri, open_digital_ft, identify_digital_ft, bench, clock, box)
 
 
 WIRES = {"serial-ft": serial_ft, "digital-ft": digital_ft}
@@ -80,26 +81,22 @@ def simulator(request, monkeypatch):
     monkeypatch.setattr(serial_ft_device, "_MEASURED", 0.25)
     monkeypatch.setattr(digital_ft_device, "_MEASURED", 0.15)
     threads_before, files_before = set(threading.enumerate()), open_files()
-    started = []
+    devices = []
 
     def start():
-        started.append(WIRES[request.param]())
-        return started[-1]
+        devices.append(WIRES[request.param]())
+        return devices[-1]
 
     yield start
-    for one in started:
-        one.box.close()
+    for device in devices:
+        device.box.close()
     assert set(threading.enumerate()) <= threads_before, "a thread was left running"
     assert open_files() <= files_before, "a port was left open"
 
 
-def readings(device, transducer, until):
+def readings(device, transducer, end):
     """Return what comes until so many seconds of the bench's time, and the rest after a stop."""
-    blocks = []
-    while device.box.now() < until:
-        blocks.append(transducer.read(0.1))
-    transducer.stop()
-    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
+    return read_until(transducer, lambda: device.box.now() >= end)
 
 
 FAULTS = {  # what a line without numbers and clock can show of each
@@ -112,12 +109,12 @@ FAULTS = {  # what a line without numbers and clock can show of each
 def test_a_controller_that_sends_text_survives_too(kind):
     device = serial_ft("ascii")
     try:
-        survives(device, kind)
+        check_survival(device, kind)
     finally:
         device.box.close()
 
 
-def survives(device, kind):
+def check_survival(device, kind):
     transducer = device.open()
     transducer.start()
     begin = device.box.now() + 0.3
@@ -125,13 +122,13 @@ def survives(device, kind):
     share = 0.05 if kind == "shorten" else 1.0
     device.box.faults = Faults([Fault(kind, begin, end, share=share)], seed=1)
     block, deadline = ReadingBlock.empty(), end + 20.0 * device.clock.factor
-    while (device.heard(block) < end + 0.3) and device.box.now() < deadline:
+    while (device.last_arrival(block) < end + 0.3) and device.box.now() < deadline:
         block = ReadingBlock.concatenate([block, transducer.read(0.1)])
     transducer.stop()
     block = ReadingBlock.concatenate([block, transducer.read(0.0)])
     health = transducer.health
     transducer.close()
-    assert device.heard(block) > end, "it did not go on after the fault"
+    assert device.last_arrival(block) > end, "it did not go on after the fault"
     assert FAULTS[kind](health), health
     assert health.received == len(block)
     assert health.received + health.lost == block.sequence[-1]
@@ -161,15 +158,17 @@ def test_the_baud_rate_of_a_controller_is_found_by_trying():
     try:
         uri = box.uri.replace("baud=19200&", "")
 
-        opened: list[Any] = []
+        transducers: list[Any] = []
 
         def run():
-            while opened:
-                opened.pop().close()
-            opened.append(open_serial_ft(parse_address(uri), clock, Deadline.for_opening()))
-            return opened[0]
+            while transducers:
+                transducers.pop().close()
+            transducers.append(open_serial_ft(parse_address(uri), clock, Deadline.for_opening()))
+            return transducers[0]
 
-        transducer = uninterrupted(run, lambda one: one.info.rate == pytest.approx(19200 / 130, rel=0.05))
+        transducer = retry_if_interrupted(
+            run, lambda candidate: candidate.info.rate == pytest.approx(19200 / 130, rel=0.05)
+        )
         assert transducer.info.settings["baud"] == "19200, found by trying"
         assert transducer.info.rate == pytest.approx(19200 / 130, rel=0.05)
         with pytest.raises(LinkLost, match="tried 9600 baud"):
@@ -204,17 +203,17 @@ def test_an_empty_calibration_is_refused_by_its_number():
 def test_another_transducer_on_the_same_line_is_not_read():
     device = digital_ft()
     transducer = device.open()
-    other = DigitalFtBox(Bench(4), device.clock)
-    other.start()
+    other_box = DigitalFtBox(Bench(4), device.clock)
+    other_box.start()
     try:
         path = Path(port_of(parse_address(device.uri)))
         path.unlink()
-        path.symlink_to(Path(port_of(parse_address(other.uri))).readlink())
+        path.symlink_to(Path(port_of(parse_address(other_box.uri))).readlink())
         with pytest.raises(DeviceFault, match="transducer SIM00004 answers where SIM00003 was"):
             transducer.start()
     finally:
         transducer.close()
-        other.close()
+        other_box.close()
         device.box.close()
 
 
@@ -241,7 +240,7 @@ def test_times_follow_the_bench_though_the_rate_is_half_a_percent_off():
         device.box.close()
         return transducer, block
 
-    transducer, block = uninterrupted(run)
+    transducer, block = retry_if_interrupted(run)
     assert transducer.info.rate == 7000.0
     assert transducer.health.lost == 0
     half = len(block) // 2

@@ -49,7 +49,7 @@ class Line:
 
     def __init__(self, busy=lambda: None):
         self.began = time.monotonic()
-        self.taken = 0
+        self.sent_count = 0
         self.waits = 0
         self.busy = busy
 
@@ -63,14 +63,14 @@ class Line:
             return None  # as where the wait was over before the computer was busy
         time.sleep(min(timeout, 0.01))
         due = int((time.monotonic() - self.began) * RATE)
-        data, self.taken = bytes(max(due - self.taken, 0)), max(due, self.taken)
+        data, self.sent_count = bytes(max(due - self.sent_count, 0)), max(due, self.sent_count)
         return data or None
 
     def close(self):
         pass
 
 
-def opened(line):
+def transducer_on(line):
     calibration = Calibration("FT1", "counts", np.eye(6), np.full(6, np.nan), "a test")
     info = TransducerInfo("test://line", "test", "Test", "FT1", False, RATE, np.nan, calibration)
     return StreamingTransducer(info, lambda _: line, PlainConversation(), RealClock())
@@ -78,7 +78,7 @@ def opened(line):
 
 def test_a_device_is_not_taken_to_be_silent_while_this_computer_was_busy():
     line = Line(lambda: time.sleep(BUSY))
-    transducer = opened(line)
+    transducer = transducer_on(line)
     transducer.start()
     received = 0
     while received < 2.0 * BUSY * RATE:
@@ -97,7 +97,7 @@ class LateThread(threading.Thread):
 
 
 def test_a_start_that_was_broken_off_can_be_made_again(monkeypatch):
-    transducer = opened(Line())
+    transducer = transducer_on(Line())
     with monkeypatch.context() as patch:
         patch.setattr(threaded, "threading", SimpleNamespace(Thread=LateThread))
         with pytest.raises(KeyboardInterrupt):
@@ -109,16 +109,16 @@ def test_a_start_that_was_broken_off_can_be_made_again(monkeypatch):
 
 def test_a_stream_that_its_device_holds_up_beyond_a_stop_does_not_come_back_with_the_next_start(monkeypatch):
     monkeypatch.setattr(threaded, "_LEAVING", 0.05)
-    released = threading.Event()
-    line = Line(lambda: released.wait(10.0))
-    transducer = opened(line)
+    release = threading.Event()
+    line = Line(lambda: release.wait(10.0))
+    transducer = transducer_on(line)
     transducer.start()
     while line.waits < 10:
         time.sleep(0.001)
     transducer.stop()
     with pytest.raises(SetupError, match="test://line still holds up the stream before"):
         transducer.start()
-    released.set()
+    release.set()
     while transducer._last_thread.is_alive():
         time.sleep(0.001)
     transducer.start()

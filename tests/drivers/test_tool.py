@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_files import GAMMA, NANO43, parsed
+from calibration_files import GAMMA, NANO43, parse
 
 from daq_app.simulation.wiring import connect
 from drivers.address import parse_address, with_tool, without_tool
@@ -15,22 +15,22 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import SetupError, TransducerInfo
 from sessions.recording.head import info_from_dict, info_to_dict
 
-CALIBRATION = parsed(NANO43).calibration
+CALIBRATION = parse(NANO43).calibration
 
 
 def info_with(uri):
     address, tool = without_tool(parse_address(uri))
     assert "tool" not in address.options
-    plain = TransducerInfo(uri, "net-ft", "Net F/T", "FT32831", False, 200.0, 7000.0, CALIBRATION, {"filter": "off"})
-    return with_tool(plain, tool)
+    info = TransducerInfo(uri, "net-ft", "Net F/T", "FT32831", False, 200.0, 7000.0, CALIBRATION, {"filter": "off"})
+    return with_tool(info, tool)
 
 
 def test_a_finger_that_presses_on_the_new_origin_exerts_no_torque_about_it():
     point, force = np.array([3.0, -4.0, 20.0]), np.array([0.5, -0.25, -2.0])
     wrench = np.concatenate([force, np.cross(point, force)])  # a force at a point, about the transducer's origin
     raw = np.linalg.solve(CALIBRATION.matrix, wrench)[None]
-    moved = info_with("net-ft://box?tool=3,-4,20,0,0,0").calibration.wrench(raw, np.zeros(6))[0]
-    np.testing.assert_allclose(moved, [*force, 0, 0, 0], atol=1e-9)
+    moved_wrench = info_with("net-ft://box?tool=3,-4,20,0,0,0").calibration.wrench(raw, np.zeros(6))[0]
+    np.testing.assert_allclose(moved_wrench, [*force, 0, 0, 0], atol=1e-9)
 
 
 def test_a_couple_moved_5_mm_away_changes_by_force_times_lever():
@@ -50,33 +50,34 @@ def test_turns_follow_each_other_about_x_then_y_then_z():
 
 
 def test_the_makers_own_transform_given_as_a_tool_gives_the_makers_own_product():
-    printed = parsed(GAMMA).calibration.matrix  # agrees with the file's UserAxis
-    bare = parsed(re.sub(r"<UserAxis[^>]*>", "", GAMMA).replace("0.0120142", "0")).calibration
-    assert not np.allclose(bare.matrix, printed)
-    np.testing.assert_allclose(bare.with_tool((0.0, 0.0, 12.0142, 0.0, 0.0, 0.0)).matrix, printed, rtol=1e-12)
+    printed_matrix = parse(GAMMA).calibration.matrix  # agrees with the file's UserAxis
+    calibration = parse(re.sub(r"<UserAxis[^>]*>", "", GAMMA).replace("0.0120142", "0")).calibration
+    assert not np.allclose(calibration.matrix, printed_matrix)
+    matrix = calibration.with_tool((0.0, 0.0, 12.0142, 0.0, 0.0, 0.0)).matrix
+    np.testing.assert_allclose(matrix, printed_matrix, rtol=1e-12)
 
 
 def test_it_comes_after_the_files_own_transform():
     # Displacements add where nothing is turned.
-    more = parsed(NANO43.replace("4.3434", "9.3434")).calibration.matrix
-    np.testing.assert_allclose(info_with("net-ft://box?tool=0,0,5,0,0,0").calibration.matrix, more, rtol=1e-12)
+    matrix = parse(NANO43.replace("4.3434", "9.3434")).calibration.matrix
+    np.testing.assert_allclose(info_with("net-ft://box?tool=0,0,5,0,0,0").calibration.matrix, matrix, rtol=1e-12)
 
 
 def test_a_range_is_that_of_the_transducers_own_axes():
     calibration = info_with("net-ft://box?tool=0,0,100,0,0,90").calibration
     raw = np.linalg.solve(CALIBRATION.matrix, [18.0, 0.0, 0.0, 0.0, 0.0, 0.0])[None]
-    felt = calibration.own(calibration.wrench(raw, np.zeros(6)))
-    np.testing.assert_allclose(loads(felt, calibration.rated)[0], [0.5, 0, 0, 0, 0, 0, 0.5], atol=1e-12)
+    own_wrench = calibration.own(calibration.wrench(raw, np.zeros(6)))
+    np.testing.assert_allclose(loads(own_wrench, calibration.rated)[0], [0.5, 0, 0, 0, 0, 0, 0.5], atol=1e-12)
 
 
 def test_it_is_recorded_with_its_origin_and_comes_back():
-    told = info_with("net-ft://box?tool=0,0,-5,0,0,45")
-    assert told.settings["user's tool transform"] == "0 0 -5 mm, 0 0 45 degrees, as the address says"
-    assert "tool transform" in told.calibration.source
-    back = info_from_dict(info_to_dict(told))
-    assert back.calibration.tool == (0.0, 0.0, -5.0, 0.0, 0.0, 45.0)
-    np.testing.assert_array_equal(back.calibration.matrix, told.calibration.matrix)
-    assert info_from_dict(info_to_dict(replace(told, calibration=CALIBRATION))).calibration.tool == ()
+    info = info_with("net-ft://box?tool=0,0,-5,0,0,45")
+    assert info.settings["user's tool transform"] == "0 0 -5 mm, 0 0 45 degrees, as the address says"
+    assert "tool transform" in info.calibration.source
+    restored = info_from_dict(info_to_dict(info))
+    assert restored.calibration.tool == (0.0, 0.0, -5.0, 0.0, 0.0, 45.0)
+    np.testing.assert_array_equal(restored.calibration.matrix, info.calibration.matrix)
+    assert info_from_dict(info_to_dict(replace(info, calibration=CALIBRATION))).calibration.tool == ()
 
 
 def test_zeros_are_no_transform():
@@ -101,6 +102,6 @@ def test_a_box_that_combines_its_gauges_itself_is_moved_too_and_its_raw_readings
         transducer.stop()
     block, calibration = ReadingBlock.concatenate(blocks), transducer.info.calibration
     assert transducer.health.received >= len(block) > 0
-    own, moved = block.raw * np.repeat([1e-6, 1e-3], 3), calibration.wrench(block.raw, np.zeros(6))
-    np.testing.assert_allclose(moved[:, 3], own[:, 3] + 20.0 * own[:, 1])
-    np.testing.assert_allclose(moved[:, 4], own[:, 4] - 20.0 * own[:, 0])
+    own_wrench, moved_wrench = block.raw * np.repeat([1e-6, 1e-3], 3), calibration.wrench(block.raw, np.zeros(6))
+    np.testing.assert_allclose(moved_wrench[:, 3], own_wrench[:, 3] + 20.0 * own_wrench[:, 1])
+    np.testing.assert_allclose(moved_wrench[:, 4], own_wrench[:, 4] - 20.0 * own_wrench[:, 0])

@@ -1,9 +1,12 @@
-"""The simulated bench: what was planted is what is felt."""
+"""The simulated bench: its wrench is the ground truth of the stroke, with the stated errors."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from simulators.bench import Bench, BenchSettings
 from simulators.stroke import Stroke, Surface, paper_surfaces
@@ -13,7 +16,7 @@ EXACT = BenchSettings(noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_
 SURFACES = paper_surfaces()
 
 
-def planted(surface, *, seed=0, at=0.0, settings=None):
+def stroked_bench(surface, *, seed=0, at=0.0, settings=None):
     bench = Bench(seed, settings)
     bench.mount(surface)
     return bench, bench.begin_stroke(SimulatedSubject(seed).stroke(surface), at)
@@ -31,7 +34,7 @@ def test_the_papers_surfaces_are_pressed_as_their_tables_ask(descriptor, forces)
 @pytest.mark.parametrize("surface", SURFACES.values())
 @pytest.mark.parametrize("seed", [1, 2])
 def test_mu_tau_max_speed_and_direction_lie_in_the_wrench(surface, seed):
-    bench, truth = planted(surface, seed=seed, settings=EXACT)
+    bench, truth = stroked_bench(surface, seed=seed, settings=EXACT)
     times = np.arange(0.0, truth.end + 0.2, 1e-3)
     wrench = bench.wrench(times)
     normal, tangential = -wrench[:, 2], np.hypot(wrench[:, 0], wrench[:, 1])
@@ -39,22 +42,22 @@ def test_mu_tau_max_speed_and_direction_lie_in_the_wrench(surface, seed):
     height = bench.settings.height
     x = (wrench[steady, 4] - height * wrench[steady, 0]) / normal[steady]
     y = -(wrench[steady, 3] + height * wrench[steady, 1]) / normal[steady]
-    moved = np.array([x[-1] - x[0], y[-1] - y[0]])
+    displacement = np.array([x[-1] - x[0], y[-1] - y[0]])
 
     assert tangential[steady] / normal[steady] == pytest.approx(np.full(steady.sum(), surface.mu))
     assert (tangential / np.maximum(normal, 1e-9)).max() <= surface.mu * (1 + 1e-9)
     assert tangential.max() / 100.0 == pytest.approx(surface.tau_max, rel=1e-4)
     assert (truth.mu, truth.tau_max) == (surface.mu, pytest.approx(surface.tau_max))
-    assert np.sign(moved[0]) == truth.direction == surface.direction
+    assert np.sign(displacement[0]) == truth.direction == surface.direction
     assert np.sign(wrench[steady, 0].mean()) == surface.direction
-    assert np.hypot(*moved) / np.ptp(times[steady]) == pytest.approx(truth.speed, rel=1e-3)
+    assert np.hypot(*displacement) / np.ptp(times[steady]) == pytest.approx(truth.speed, rel=1e-3)
     assert truth.speed == pytest.approx(surface.speed, rel=0.1)
 
 
 def test_onset_and_lift_are_where_the_planted_force_crosses_three_deviations_of_the_noise():
-    bench, truth = planted(SURFACES["stickiness", 50], at=3.0)
-    at = np.array([truth.onset - 2e-5, truth.onset + 2e-5, truth.lift - 2e-5, truth.lift + 2e-5])
-    normal = -bench.true_wrench(at)[:, 2]
+    bench, truth = stroked_bench(SURFACES["stickiness", 50], at=3.0)
+    times = np.array([truth.onset - 2e-5, truth.onset + 2e-5, truth.lift - 2e-5, truth.lift + 2e-5])
+    normal = -bench.true_wrench(times)[:, 2]
     assert (normal > 0.012).tolist() == [False, True, True, False]
     assert truth.touch < truth.onset < truth.slip < truth.peak < truth.lift < truth.end
     assert truth.touch - 3.0 >= 0.5
@@ -90,29 +93,19 @@ def test_the_same_seed_and_instant_feel_the_same_whoever_asks_and_when():
 def test_a_tilted_stimulus_turns_the_wrench_and_keeps_its_size(about_x, about_y):
     surface = SURFACES["slipperiness", 20]
     times = np.linspace(1.0, 2.5, 50)
-    flat = planted(surface, settings=EXACT)[0].wrench(times)
-    tilted_settings = BenchSettings(
-        noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_torque=0.0, tilt=(about_x, about_y)
-    )
-    tilted = planted(surface, settings=tilted_settings)[0].wrench(times)
-    for part in (slice(0, 3), slice(3, 6)):
-        sizes = np.linalg.norm(tilted[:, part], axis=1)
-        assert sizes == pytest.approx(np.linalg.norm(flat[:, part], axis=1), rel=1e-12)
-    # Pressing straight down on a face turned about y by +a pushes along -x by N sin a.
-    fx, fz = flat[:, 0], flat[:, 2]
-    a = np.radians(about_y)
-    if about_x == 0.0:
-        assert tilted[:, 0] == pytest.approx(np.cos(a) * fx + np.sin(a) * fz, abs=1e-12)
+    flat = stroked_bench(surface, settings=EXACT)[0].wrench(times)
+    tilted = stroked_bench(surface, settings=replace(EXACT, tilt=(about_x, about_y)))[0].wrench(times)
+    turn = Rotation.from_euler("xy", [about_x, about_y], degrees=True)  # about the fixed axes: x, then y
+    for columns in (slice(0, 3), slice(3, 6)):
+        assert tilted[:, columns] == pytest.approx(turn.apply(flat[:, columns]), abs=1e-10)
 
 
 def test_offset_and_wrong_gains_are_felt():
-    wrong = BenchSettings(
-        noise_force=0, noise_torque=0, drift_force=0, drift_torque=0, offset=(1, 0, -2, 0, 0, 5), gains=(2,) * 6
-    )
+    settings = replace(EXACT, offset=(1, 0, -2, 0, 0, 5), gains=(2,) * 6)
     surface = SURFACES["stickiness", 0]
     times = np.linspace(0.0, 2.0, 20)
-    expected = 2 * planted(surface, settings=EXACT)[0].wrench(times) + [1, 0, -2, 0, 0, 5]
-    assert planted(surface, settings=wrong)[0].wrench(times) == pytest.approx(expected)
+    expected = 2 * stroked_bench(surface, settings=EXACT)[0].wrench(times) + [1, 0, -2, 0, 0, 5]
+    assert stroked_bench(surface, settings=settings)[0].wrench(times) == pytest.approx(expected)
 
 
 def test_nothing_is_stroked_unless_mounted_and_no_two_strokes_at_once():
@@ -128,14 +121,14 @@ def test_nothing_is_stroked_unless_mounted_and_no_two_strokes_at_once():
 
 
 def test_a_surface_mounted_after_a_stroke_began_does_not_change_it():
-    bench, truth = planted(SURFACES["stickiness", 0])
+    bench, truth = stroked_bench(SURFACES["stickiness", 0])
     bench.mount(SURFACES["stickiness", 100])
     assert bench.ground_truth() == (truth,)
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"mu": 0.0}, {"mu": 0.5, "tau_max": -1.0}, {"mu": 0.5, "speed": 0.0}, {"mu": 0.5, "direction": 2}]
+    "properties", [{"mu": 0.0}, {"mu": 0.5, "tau_max": -1.0}, {"mu": 0.5, "speed": 0.0}, {"mu": 0.5, "direction": 2}]
 )
-def test_what_no_surface_can_be_is_refused(wrong):
+def test_what_no_surface_can_be_is_refused(properties):
     with pytest.raises(ValueError, match="surface"):
-        Surface(**wrong)
+        Surface(**properties)

@@ -28,33 +28,33 @@ STOP, START, BUFFERED, RESET_LATCH, BIAS = (struct.pack(">HHI", 0x1234, c, 0) fo
 
 
 @pytest.fixture
-def box():
-    """Return a function that starts a box told that time runs ten times as fast."""
+def start_box():
+    """Return a function that starts a box in simulated time ten times as fast."""
     boxes = []
 
-    def started(settings=QUIET, **options):
+    def start(settings=QUIET, **options):
         boxes.append(NetFtBox(Bench(1, settings), PacedClock(10.0), **options))
         boxes[-1].start()
         return boxes[-1]
 
-    yield started
-    for one in boxes:
-        one.close()
+    yield start
+    for box in boxes:
+        box.close()
 
 
-def ports(one):
-    return {name: int(port) for name, port in re.findall(r"(rdt|tcp|http)=(\d+)", one.uri)}
+def ports(box):
+    return {name: int(port) for name, port in re.findall(r"(rdt|tcp|http)=(\d+)", box.uri)}
 
 
 @contextlib.contextmanager
-def client(one):
+def client(box):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.connect(("127.0.0.1", ports(one)["rdt"]))
+        udp.connect(("127.0.0.1", ports(box)["rdt"]))
         udp.settimeout(5)
         yield udp
 
 
-def records(udp, count):
+def receive_records(udp, count):
     return [struct.unpack(">3I6i", udp.recv(4096)) for _ in range(count)]
 
 
@@ -67,174 +67,174 @@ def until_silent(udp):
     udp.settimeout(5)
 
 
-def page(one, path):
-    with urllib.request.urlopen(f"http://127.0.0.1:{ports(one)['http']}{path}", timeout=5) as answer:
+def read_page(box, path):
+    with urllib.request.urlopen(f"http://127.0.0.1:{ports(box)['http']}{path}", timeout=5) as answer:
         return answer.status, answer.read().decode()
 
 
-def told(one, name):
-    return re.search(f"<{name}>(.*)</{name}>", page(one, "/netftapi2.xml")[1])[1]
+def setting(box, name):
+    return re.search(f"<{name}>(.*)</{name}>", read_page(box, "/netftapi2.xml")[1])[1]
 
 
-def set_by_web(one, path):
+def change_setting(box, path):
     """Set a value as a browser would, and return the status without following where it leads."""
-    with socket.create_connection(("127.0.0.1", ports(one)["http"]), timeout=5) as tcp:
+    with socket.create_connection(("127.0.0.1", ports(box)["http"]), timeout=5) as tcp:
         tcp.sendall(f"GET {path} HTTP/1.0\r\n\r\n".encode())
         return tcp.recv(4096).split(b"\r\n")[0]
 
 
-def test_a_stream_numbers_its_records_from_1_and_counts_35_ticks_at_200_hz(box):
-    with client(box()) as udp:
+def test_a_stream_numbers_its_records_from_1_and_counts_35_ticks_at_200_hz(start_box):
+    with client(start_box()) as udp:
         udp.send(START)
-        got = records(udp, 20)
-    assert [r[0] for r in got] == list(range(1, 21))
-    assert np.diff([r[1] for r in got]).tolist() == [35] * 19
-    assert {r[2] for r in got} == {0}
-    assert {r[3:] for r in got} == {(1_000_000, -2_000_000, 5_000_000, 125_000, 0, 0)}
+        records = receive_records(udp, 20)
+    assert [r[0] for r in records] == list(range(1, 21))
+    assert np.diff([r[1] for r in records]).tolist() == [35] * 19
+    assert {r[2] for r in records} == {0}
+    assert {r[3:] for r in records} == {(1_000_000, -2_000_000, 5_000_000, 125_000, 0, 0)}
 
 
-@pytest.mark.parametrize(("asked", "step", "shown"), [(7000, 1, 7000), (1000, 7, 1000), (150, 46, 152), (99, 70, 100)])
-def test_rates_are_integer_fractions_of_7000_rounded_up(box, asked, step, shown):
-    one = box()
-    assert set_by_web(one, f"/comm.cgi?comrdtrate={asked}") == b"HTTP/1.0 302 Found"
-    assert told(one, "comrdtrate") == str(shown)
-    with client(one) as udp:
+@pytest.mark.parametrize(("rate", "step", "shown"), [(7000, 1, 7000), (1000, 7, 1000), (150, 46, 152), (99, 70, 100)])
+def test_rates_are_integer_fractions_of_7000_rounded_up(start_box, rate, step, shown):
+    box = start_box()
+    assert change_setting(box, f"/comm.cgi?comrdtrate={rate}") == b"HTTP/1.0 302 Found"
+    assert setting(box, "comrdtrate") == str(shown)
+    with client(box) as udp:
         udp.send(START)
-        got = records(udp, 10)
-    assert np.diff([r[1] for r in got]).tolist() == [step] * 9
+        records = receive_records(udp, 10)
+    assert np.diff([r[1] for r in records]).tolist() == [step] * 9
 
 
 @pytest.mark.parametrize("rate", ["0", "7001", "-1", "fast", ""])
-def test_a_rate_the_box_does_not_have_changes_nothing(box, rate):
-    one = box()
-    set_by_web(one, f"/comm.cgi?comrdtrate={rate}")
-    assert told(one, "comrdtrate") == "200"
+def test_a_rate_the_box_does_not_have_changes_nothing(start_box, rate):
+    box = start_box()
+    change_setting(box, f"/comm.cgi?comrdtrate={rate}")
+    assert setting(box, "comrdtrate") == "200"
 
 
-def test_so_many_records_are_sent_as_were_asked_for(box):
-    with client(box()) as udp:
+def test_so_many_records_are_sent_as_were_asked_for(start_box):
+    with client(start_box()) as udp:
         udp.send(struct.pack(">HHI", 0x1234, 2, 3))
-        assert len(records(udp, 3)) == 3
+        assert len(receive_records(udp, 3)) == 3
         udp.settimeout(0.1)
         with pytest.raises(TimeoutError):
             udp.recv(100)
 
 
-def test_buffered_streaming_sends_several_records_in_a_datagram(box):
-    one = box()
-    set_by_web(one, "/comm.cgi?comrdtbsiz=4")
-    with client(one) as udp:
+def test_buffered_streaming_sends_several_records_in_a_datagram(start_box):
+    box = start_box()
+    change_setting(box, "/comm.cgi?comrdtbsiz=4")
+    with client(box) as udp:
         udp.send(struct.pack(">HHI", 0x1234, 3, 10))
         datagrams = [udp.recv(4096) for _ in range(3)]
     assert [len(d) for d in datagrams] == [144, 144, 72]
     assert [struct.unpack_from(">I", b"".join(datagrams), 36 * i)[0] for i in range(10)] == list(range(1, 11))
 
 
-def test_a_stop_stops_and_a_new_start_begins_at_1(box):
-    with client(box()) as udp:
+def test_a_stop_stops_and_a_new_start_begins_at_1(start_box):
+    with client(start_box()) as udp:
         udp.send(START)
-        first = records(udp, 3)
+        first = receive_records(udp, 3)
         udp.send(STOP)
         until_silent(udp)
         udp.send(START)
-        again = records(udp, 1)
+        again = receive_records(udp, 1)
     assert again[0][0] == 1
     assert again[0][1] > first[-1][1], "the tick counter is not reset by a request"
 
 
-def test_a_box_on_a_busy_computer_sends_what_is_due_before_it_hears_another_start(box):
-    one, held = box(), threading.Event()
-    with client(one) as udp:
+def test_a_box_on_a_busy_computer_sends_what_is_due_before_it_hears_another_start(start_box):
+    box, hold = start_box(), threading.Event()
+    with client(box) as udp:
         udp.send(START)
-        told = records(udp, 5)
-        until_due = one._until_due
+        records = receive_records(udp, 5)
+        until_due = box._until_due
 
-        def late():
-            if not held.is_set():
-                held.set()
+        def delay_once():
+            if not hold.is_set():
+                hold.set()
                 time.sleep(0.1)
             return until_due()
 
-        one._until_due = late
-        held.wait()
+        box._until_due = delay_once
+        hold.wait()
         udp.send(START)
-        told += records(udp, 300)
-    assert set(np.diff([ticks for _, ticks, *_ in told]).tolist()) == {35}
-    assert [number for number, *_ in told].count(1) == 2
+        records += receive_records(udp, 300)
+    assert set(np.diff([ticks for _, ticks, *_ in records]).tolist()) == {35}
+    assert [number for number, *_ in records].count(1) == 2
 
 
-def test_a_second_client_takes_the_stream(box):
-    one = box()
-    with client(one) as first, client(one) as second:
+def test_a_second_client_takes_the_stream(start_box):
+    box = start_box()
+    with client(box) as first, client(box) as second:
         first.send(START)
-        records(first, 3)
+        receive_records(first, 3)
         second.send(START)
-        assert records(second, 1)[0][0] == 1
+        assert receive_records(second, 1)[0][0] == 1
         until_silent(first)
 
 
-def test_bias_makes_what_is_felt_read_zero_until_power_off(box):
-    one = box(faults=Faults([Fault("reboot", 3.0, 3.5)]))
-    with client(one) as udp:
+def test_bias_makes_what_is_felt_read_zero_until_power_off(start_box):
+    box = start_box(faults=Faults([Fault("reboot", 3.0, 3.5)]))
+    with client(box) as udp:
         udp.send(BIAS)
         udp.send(RESET_LATCH)
         udp.send(START)
-        assert records(udp, 1)[0][3:] == (0,) * 6
-        while one.now() < 4.0:
+        assert receive_records(udp, 1)[0][3:] == (0,) * 6
+        while box.now() < 4.0:
             udp.settimeout(0.05)
             with contextlib.suppress(TimeoutError):
                 udp.recv(100)
         udp.settimeout(5)
         udp.send(START)
-        (number, counter, _, *counts) = records(udp, 1)[0]
+        (number, counter, _, *counts) = receive_records(udp, 1)[0]
     assert counts == [1_000_000, -2_000_000, 5_000_000, 125_000, 0, 0]
     assert number == 1
-    assert counter < 7000 * (one.now() - 3.5)
+    assert counter < 7000 * (box.now() - 3.5)
 
 
 @pytest.mark.parametrize(
     "request_bytes",
     [b"", b"\x12\x34", START[:7], START + b"\0", b"\x43\x21" + START[2:], struct.pack(">HHI", 0x1234, 9, 0)],
 )
-def test_what_is_no_request_is_ignored(box, request_bytes):
-    with client(box()) as udp:
+def test_what_is_no_request_is_ignored(start_box, request_bytes):
+    with client(start_box()) as udp:
         udp.send(request_bytes)
         udp.settimeout(0.05)
         with pytest.raises(TimeoutError):
             udp.recv(100)
 
 
-def test_both_counters_wrap(box):
-    with client(box(first=(2**32 - 200, 2**32 - 3))) as udp:
+def test_both_counters_wrap(start_box):
+    with client(start_box(first=(2**32 - 200, 2**32 - 3))) as udp:
         udp.send(START)
-        got = records(udp, 50)
-    assert np.diff(np.array([r[:2] for r in got]).astype(np.uint32), axis=0).tolist() == [[1, 35]] * 49
-    assert 0 in [r[0] for r in got]
+        records = receive_records(udp, 50)
+    assert np.diff(np.array([r[:2] for r in records]).astype(np.uint32), axis=0).tolist() == [[1, 35]] * 49
+    assert 0 in [r[0] for r in records]
 
 
 def test_an_oscillator_that_is_wrong_counts_more_ticks_in_the_same_time():
-    right, wrong = (
+    exact, fast = (
         Electronics(Bench(1, QUIET), Faults(), rate=200, rate_error=error, first_tick=50) for error in (0.0, 0.005)
     )
-    assert right.tick(4.0) - right.tick(0.0) == 4 * 7000
-    assert wrong.tick(4.0) - wrong.tick(0.0) == pytest.approx(4 * 7000 * 1.005, abs=1)
-    assert wrong.time(50 + 7000) == pytest.approx(1.0 / 1.005, abs=1e-9)
+    assert exact.tick(4.0) - exact.tick(0.0) == 4 * 7000
+    assert fast.tick(4.0) - fast.tick(0.0) == pytest.approx(4 * 7000 * 1.005, abs=1)
+    assert fast.time(50 + 7000) == pytest.approx(1.0 / 1.005, abs=1e-9)
 
 
-def test_saturation_is_told_in_the_status_and_clips_at_the_rated_range(box):
-    beyond = BenchSettings(noise_force=0, noise_torque=0, drift_force=0, drift_torque=0, offset=(0, 0, -40, 0, 0, 0))
-    with client(box(beyond)) as udp:
+def test_saturation_is_told_in_the_status_and_clips_at_the_rated_range(start_box):
+    settings = BenchSettings(noise_force=0, noise_torque=0, drift_force=0, drift_torque=0, offset=(0, 0, -40, 0, 0, 0))
+    with client(start_box(settings)) as udp:
         udp.send(START)
-        (_, _, status, *counts) = records(udp, 1)[0]
+        (_, _, status, *counts) = receive_records(udp, 1)[0]
     assert status == 0x80020000
     assert counts == [0, 0, -36_000_000, 0, 0, 0]
 
 
-def test_the_page_tells_who_it_is_and_that_it_is_simulated(box):
-    one = box()
-    status, text = page(one, "/netftapi2.xml")
+def test_the_page_tells_who_it_is_and_that_it_is_simulated(start_box):
+    box = start_box()
+    status, text = read_page(box, "/netftapi2.xml")
     assert status == 200
-    assert "SIMULATED" in told(one, "prodname")
+    assert "SIMULATED" in setting(box, "prodname")
     for name, value in {
         "cfgcalsn": "SIM00001",
         "cfgcpf": "1000000",
@@ -247,42 +247,42 @@ def test_the_page_tells_who_it_is_and_that_it_is_simulated(box):
         "runft": "1000000;-2000000;5000000;125000;0;0",
     }.items():
         assert f"<{name}>{value}</{name}>" in text
-    assert "SIM00001" in page(one, "/netftcalapi.xml?index=0")[1]
+    assert "SIM00001" in read_page(box, "/netftcalapi.xml?index=0")[1]
 
 
-def test_what_was_set_is_read_back(box):
-    one = box()
-    set_by_web(one, "/setting.cgi?setuserfilter=5&setbias2=-18343")
-    set_by_web(one, "/config.cgi?cfgfu=1&cfgtu=4&cfgnam=a%26b")
-    assert told(one, "setuserfilter") == "5"
-    assert told(one, "setbias") == "0;0;-18343;0;0;0"
-    assert (told(one, "scfgfu"), told(one, "scfgtu")) == ("lb", "N-mm")
-    assert told(one, "cfgnam") == "a&amp;b"
-    with client(one) as udp:
+def test_what_was_set_is_read_back(start_box):
+    box = start_box()
+    change_setting(box, "/setting.cgi?setuserfilter=5&setbias2=-18343")
+    change_setting(box, "/config.cgi?cfgfu=1&cfgtu=4&cfgnam=a%26b")
+    assert setting(box, "setuserfilter") == "5"
+    assert setting(box, "setbias") == "0;0;-18343;0;0;0"
+    assert (setting(box, "scfgfu"), setting(box, "scfgtu")) == ("lb", "N-mm")
+    assert setting(box, "cfgnam") == "a&amp;b"
+    with client(box) as udp:
         udp.send(START)
-        counts = records(udp, 1)[0][3:]
+        counts = receive_records(udp, 1)[0][3:]
     assert counts == (224809, -449618, 1124045, 125_000_000, 0, 0)
 
 
-def test_a_disabled_output_sends_nothing(box):
-    one = box()
-    set_by_web(one, "/comm.cgi?comrdte=0")
-    assert told(one, "comrdte") == "Disabled"
-    with client(one) as udp:
+def test_a_disabled_output_sends_nothing(start_box):
+    box = start_box()
+    change_setting(box, "/comm.cgi?comrdte=0")
+    assert setting(box, "comrdte") == "Disabled"
+    with client(box) as udp:
         udp.send(START)
         udp.settimeout(0.05)
         with pytest.raises(TimeoutError):
             udp.recv(100)
 
 
-def test_an_unknown_page_is_not_found(box):
+def test_an_unknown_page_is_not_found(start_box):
     with pytest.raises(urllib.error.HTTPError, match="404"):
-        page(box(), "/nothing.html")
+        read_page(start_box(), "/nothing.html")
 
 
-def test_the_tcp_port_answers_in_16_bits_and_tells_the_calibration(box):
-    one = box()
-    with socket.create_connection(("127.0.0.1", ports(one)["tcp"]), timeout=5) as tcp:
+def test_the_tcp_port_answers_in_16_bits_and_tells_the_calibration(start_box):
+    box = start_box()
+    with socket.create_connection(("127.0.0.1", ports(box)["tcp"]), timeout=5) as tcp:
         calibration = b"\x01" + bytes(19)
         tcp.sendall(calibration[:7])
         tcp.sendall(calibration[7:] + bytes(20))
@@ -295,34 +295,34 @@ def test_the_tcp_port_answers_in_16_bits_and_tells_the_calibration(box):
     assert struct.unpack(">HH6h", biased[16:])[2:] == (0,) * 6
 
 
-def test_a_caller_that_hangs_up_or_talks_nonsense_harms_nobody(box):
-    one = box()
-    with socket.create_connection(("127.0.0.1", ports(one)["http"]), timeout=5) as tcp:
+def test_a_caller_that_hangs_up_or_talks_nonsense_harms_nobody(start_box):
+    box = start_box()
+    with socket.create_connection(("127.0.0.1", ports(box)["http"]), timeout=5) as tcp:
         tcp.sendall(b"x" * 9000)
         with contextlib.suppress(ConnectionError):  # it may hang up with some of that unread
             assert tcp.recv(100) == b""
-    socket.create_connection(("127.0.0.1", ports(one)["tcp"]), timeout=5).close()
-    with socket.create_connection(("127.0.0.1", ports(one)["http"]), timeout=5) as tcp:
+    socket.create_connection(("127.0.0.1", ports(box)["tcp"]), timeout=5).close()
+    with socket.create_connection(("127.0.0.1", ports(box)["http"]), timeout=5) as tcp:
         tcp.sendall(b"\xff\xfe nonsense\r\n\r\n")
         assert tcp.recv(100).startswith(b"HTTP/1.0 404")
-    assert told(one, "cfgcalsn") == "SIM00001"
+    assert setting(box, "cfgcalsn") == "SIM00001"
 
 
 @pytest.mark.parametrize("name", ["rdt", "tcp", "http"])
-def test_a_port_in_use_is_refused_in_one_sentence(box, name):
-    taken = ports(box())[name]
+def test_a_port_in_use_is_refused_in_one_sentence(start_box, name):
+    port = ports(start_box())[name]
     threads = threading.active_count()
-    with pytest.raises(SetupError, match=rf"port {taken} .*in use.*another {name} port"):
-        box(ports=tuple(taken if one == name else 0 for one in ("rdt", "tcp", "http")))
+    with pytest.raises(SetupError, match=rf"port {port} .*in use.*another {name} port"):
+        start_box(ports=tuple(port if box == name else 0 for box in ("rdt", "tcp", "http")))
     assert threading.active_count() == threads
 
 
-def test_a_closed_box_gives_its_ports_back(box):
-    one = box()
-    held = ports(one)
-    one.close()
-    one.close()
-    box(ports=tuple(held[name] for name in ("rdt", "tcp", "http")))
+def test_a_closed_box_gives_its_ports_back(start_box):
+    box = start_box()
+    box_ports = ports(box)
+    box.close()
+    box.close()
+    start_box(ports=tuple(box_ports[name] for name in ("rdt", "tcp", "http")))
 
 
 def test_a_box_does_not_keep_a_program_alive_that_fails():
@@ -333,10 +333,10 @@ def test_a_box_does_not_keep_a_program_alive_that_fails():
     assert subprocess.run([sys.executable, "-c", program], timeout=60, check=False).returncode == 7
 
 
-def test_the_same_seed_sends_the_same_bytes_whenever_it_is_asked(box):
+def test_the_same_seed_sends_the_same_bytes_whenever_it_is_asked(start_box):
     streams = []
     for _ in range(2):
-        with client(box(BenchSettings(), faults=Faults([Fault("corrupt", 0.0, 1e6, share=0.3)], seed=5))) as udp:
+        with client(start_box(BenchSettings(), faults=Faults([Fault("corrupt", 0.0, 1e6, share=0.3)], seed=5))) as udp:
             udp.send(struct.pack(">HHI", 0x1234, 2, 400))
             streams.append({d[4:8]: d[4:] for d in (udp.recv(100) for _ in range(400))})
     whole = [{k: d for k, d in stream.items() if d[4:8] == bytes(4)} for stream in streams]

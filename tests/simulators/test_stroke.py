@@ -63,8 +63,8 @@ def test_a_surface_that_does_not_hold_is_slid_on_from_the_touch(stroke, mu):
 def test_the_finger_slides_at_its_speed_and_never_leaps(stroke, mu, holds):
     course = Course(stroke, mu, holds)
     start, stop = course.steady
-    where = course.position(np.array([start, stop]))
-    assert (where[1] - where[0]) / (stop - start) == pytest.approx(stroke.speed, rel=0.1)
+    positions = course.position(np.array([start, stop]))
+    assert (positions[1] - positions[0]) / (stop - start) == pytest.approx(stroke.speed, rel=0.1)
     speed = np.gradient(course.position(TIMES), TIMES)
     sliding = (start + 0.3 <= TIMES) & (stop >= TIMES)
     assert np.all(np.abs(speed[sliding] / stroke.speed - 1.0) < 1.5 * stroke.speed_wander)
@@ -78,7 +78,7 @@ def test_every_start_is_smooth_as_a_hands_is():
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    "properties",
     [
         {"peak_normal_force": 0.0},
         {"speed": -1.0},
@@ -89,6 +89,6 @@ def test_every_start_is_smooth_as_a_hands_is():
         {"sag": 0.1, "wander": 0.2},
     ],
 )
-def test_a_course_no_hand_can_take_is_refused(wrong):
+def test_a_course_no_hand_can_take_is_refused(properties):
     with pytest.raises(ValueError, match=r"stroke|wander"):
-        Stroke(**({"peak_normal_force": 3.0, "speed": 20.0} | wrong))
+        Stroke(**({"peak_normal_force": 3.0, "speed": 20.0} | properties))

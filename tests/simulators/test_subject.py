@@ -59,8 +59,8 @@ def test_every_stroke_is_one_a_hand_can_do():
 def test_choices_by_friction_follow_a_cumulative_normal_law_of_log_friction_with_lapses():
     settings = SubjectSettings(discrimination=0.2, lapse=0.1)
     first, second = SURFACES["stickiness", 20], SURFACES["stickiness", 50]
-    chosen = np.mean([SimulatedSubject(n, settings).more_friction(first, second, 1) for n in range(4000)])
+    share = np.mean([SimulatedSubject(n, settings).more_friction(first, second, 1) for n in range(4000)])
     expected = 0.05 + 0.9 * stats.norm.cdf(np.log(0.44 / 0.48) / 0.2)
-    assert chosen == pytest.approx(expected, abs=4.0 * np.sqrt(expected * (1.0 - expected) / 4000))
+    assert share == pytest.approx(expected, abs=4.0 * np.sqrt(expected * (1.0 - expected) / 4000))
     answers = [SimulatedSubject(1, settings).more_friction(first, second, trial) for trial in range(50)]
     assert len(set(answers)) == 2  # each trial is judged anew

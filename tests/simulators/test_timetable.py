@@ -38,17 +38,17 @@ share = 0.25
 
 
 @pytest.fixture
-def script(tmp_path):
-    def written(text):
+def write_script(tmp_path):
+    def write(text):
         path = tmp_path / "script.toml"
         path.write_text(text, encoding="utf-8")
         return path
 
-    return written
+    return write
 
 
-def test_a_script_gives_strokes_in_order_and_faults(script):
-    timetable = load_timetable(script(SCRIPT))
+def test_a_script_gives_strokes_in_order_and_faults(write_script):
+    timetable = load_timetable(write_script(SCRIPT))
     assert timetable.strokes == (
         (2.0, paper_surfaces()["stickiness", 100]),
         (8.0, Surface(0.5, "scripted", 0, 0.02, 25.0, -1, holds=False)),
@@ -81,9 +81,9 @@ def test_a_script_gives_strokes_in_order_and_faults(script):
         ("\ufeff\x00", "not TOML"),
     ],
 )
-def test_a_wrong_script_is_refused_in_a_sentence_that_names_file_and_value(script, text, reason):
+def test_a_wrong_script_is_refused_in_a_sentence_that_names_file_and_value(write_script, text, reason):
     with pytest.raises(TimetableError, match=rf"script\.toml.*{reason}"):
-        load_timetable(script(text))
+        load_timetable(write_script(text))
 
 
 def test_a_missing_script_is_refused_in_a_sentence(tmp_path):
@@ -95,8 +95,8 @@ def test_a_bench_is_stroked_as_its_timetable_says_again_and_again():
     surface = paper_surfaces()["stickiness", 100]
     bench = ScriptedBench(1, Timetable(((1.0, surface),), repeat=10.0))
     normal = -bench.wrench(np.arange(0.0, 30.0, 0.01))[:, 2]
-    touched = [p.touch for p in bench.ground_truth()]
-    assert [int(t // 10) for t in touched] == [0, 1, 2]
+    touch_times = [p.touch for p in bench.ground_truth()]
+    assert [int(t // 10) for t in touch_times] == [0, 1, 2]
     assert all(normal[int(100 * p.peak)] == pytest.approx(p.peak_normal_force, abs=0.1) for p in bench.ground_truth())
 
 
@@ -116,33 +116,33 @@ def test_without_a_script_the_papers_ten_surfaces_are_stroked():
     assert [surface for _, surface in usual_timetable().strokes] == list(paper_surfaces().values())
 
 
-def test_a_served_box_is_opened_by_its_address_and_carries_out_its_script(script):
-    served = serve("net-ft", ports=(0, 0, 0), rate=1000, seed=4, factor=20.0, script=script(SCRIPT))
+def test_a_served_box_is_opened_by_its_address_and_carries_out_its_script(write_script):
+    simulator = serve("net-ft", ports=(0, 0, 0), rate=1000, seed=4, factor=20.0, script=write_script(SCRIPT))
     try:
-        transducer = open_transducer(served.uri, PacedClock(20.0))
+        transducer = open_transducer(simulator.uri, PacedClock(20.0))
         assert (transducer.info.rate, transducer.info.serial) == (1000.0, "SIM00004")
         transducer.start()
         while transducer.health.lost == 0:
             transducer.read(1.0)
         transducer.close()
     finally:
-        served.close()
+        simulator.close()
 
 
 def test_where_port_80_is_refused_a_free_one_is_taken():
     with contextlib.ExitStack() as stack:
-        taken = stack.enter_context(socket.socket())
+        port_80 = stack.enter_context(socket.socket())
         with contextlib.suppress(OSError):  # somebody else may hold it already
-            taken.bind(("127.0.0.1", 80))
-            taken.listen()
-        served = serve("net-ft", ports=(0, 0, None))
-        served.close()
-    assert "http=80" not in served.uri.split("&")
+            port_80.bind(("127.0.0.1", 80))
+            port_80.listen()
+        simulator = serve("net-ft", ports=(0, 0, None))
+        simulator.close()
+    assert "http=80" not in simulator.uri.split("&")
 
 
 def test_a_port_in_use_is_refused_in_one_sentence():
-    served = serve("net-ft", ports=(0, 0, 0))
-    port = int(served.uri.split("rdt=")[1].split("&")[0])
+    simulator = serve("net-ft", ports=(0, 0, 0))
+    port = int(simulator.uri.split("rdt=")[1].split("&")[0])
     with pytest.raises(SetupError, match=f"UDP port {port}"):
         serve("net-ft", ports=(port, 0, None))
-    served.close()
+    simulator.close()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from reading import read_until
 
 from drivers import usb_link
 from drivers.address import parse_address
@@ -14,7 +15,6 @@ from drivers.clock import PacedClock, RealClock
 from drivers.clock_recovery import ScanCount
 from drivers.deadline import Deadline
 from drivers.labjack_u6 import identify_labjack_u6, wire
-from drivers.readings import ReadingBlock
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from simulators.bench import RATED, Bench, calibration_file
 from simulators.faults import Fault, Faults
@@ -32,7 +32,7 @@ def cal(tmp_path):
 
 
 @pytest.fixture
-def plugged(monkeypatch):
+def plug_in(monkeypatch):
     """Return a function that plugs simulated converters in; no thread may be left when they are pulled."""
     before = set(threading.enumerate())
 
@@ -48,12 +48,8 @@ def box(clock, *timetable, serial=360_000_001):
     return LabJackU6Box(Bench(3), clock, serial=serial, faults=Faults(timetable, seed=1))
 
 
-def readings(transducer, device, until):
-    blocks = []
-    while device.now() < until:
-        blocks.append(transducer.read(0.1))
-    transducer.stop()
-    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
+def readings(transducer, device, end):
+    return read_until(transducer, lambda: device.now() >= end)
 
 
 @pytest.mark.parametrize(
@@ -90,8 +86,8 @@ def test_constants_are_signed_numbers_of_32_bits_before_and_behind_the_point():
 
     def answer(data):
         body = bytes(2) + data
-        whole = (sum(body) & 0xFFFF).to_bytes(2, "little")
-        head = bytes([0xF8, 0x11, 0x2D]) + whole
+        checksum = (sum(body) & 0xFFFF).to_bytes(2, "little")
+        head = bytes([0xF8, 0x11, 0x2D]) + checksum
         total = sum(head)
         return bytes([(total & 0xFF) + (total >> 8)]) + head + body
 
@@ -115,10 +111,10 @@ def packets(count, seed=5):
     device = LabJackU6Box(Bench(seed), clock)
     device.command(wire.configure_stream(wire.scan_clock(1000)))
     device.command(wire.START)
-    found = []
-    while len(found) < count:
-        found += filter(None, [device.stream_packet(0.1)])
-    return found
+    stream_packets = []
+    while len(stream_packets) < count:
+        stream_packets += filter(None, [device.stream_packet(0.1)])
+    return stream_packets
 
 
 STREAM = b"".join(packets(5))
@@ -126,12 +122,12 @@ STREAM = b"".join(packets(5))
 
 @given(cuts=st.lists(st.integers(0, len(STREAM)), max_size=12).map(sorted))
 def test_scans_do_not_depend_on_how_the_stream_was_cut(cuts):
-    whole, cut = wire.StreamDecoder(NOMINAL), wire.StreamDecoder(NOMINAL)
-    expected = whole.feed(STREAM)
-    found = [cut.feed(STREAM[a:b]) for a, b in zip([0, *cuts], [*cuts, len(STREAM)], strict=True)]
+    whole_decoder, cut_decoder = wire.StreamDecoder(NOMINAL), wire.StreamDecoder(NOMINAL)
+    expected = whole_decoder.feed(STREAM)
+    parts = [cut_decoder.feed(STREAM[a:b]) for a, b in zip([0, *cuts], [*cuts, len(STREAM)], strict=True)]
     assert len(expected.status) == 20
-    np.testing.assert_array_equal(np.concatenate([part.raw for part in found]), expected.raw)
-    assert cut.malformed == whole.malformed == 0
+    np.testing.assert_array_equal(np.concatenate([part.raw for part in parts]), expected.raw)
+    assert cut_decoder.malformed == whole_decoder.malformed == 0
 
 
 @given(garbage=st.binary(max_size=200), at=st.integers(0, len(STREAM)))
@@ -146,24 +142,24 @@ def test_garbage_raises_nothing_and_is_counted(garbage, at):
 
 
 def test_a_lost_packet_is_four_lost_scans_and_the_gauges_stay_in_place():
-    five = packets(5)
-    kept = wire.StreamDecoder(NOMINAL).feed(b"".join(five))
-    records = wire.StreamDecoder(NOMINAL).feed(b"".join(five[:2] + five[3:]))
+    sound_packets = packets(5)
+    expected = wire.StreamDecoder(NOMINAL).feed(b"".join(sound_packets))
+    records = wire.StreamDecoder(NOMINAL).feed(b"".join(sound_packets[:2] + sound_packets[3:]))
     assert records.damaged.tolist() == [0] * 8 + [4] + [0] * 7
-    np.testing.assert_array_equal(records.raw, np.delete(kept.raw, slice(8, 12), axis=0))
+    np.testing.assert_array_equal(records.raw, np.delete(expected.raw, slice(8, 12), axis=0))
 
 
 def test_losses_that_let_the_packet_counter_go_round_are_found_by_the_clock():
     count, period_ns = ScanCount(1000.0, wrap=256 * wire.SCANS), 1_000_000
     count.take(np.zeros(4, np.int64), 4 * period_ns)
-    gone = 2 * 1024 + 40  # two rounds of 256 packets of four scans, and ten packets
-    paced = count.take(np.array([40, 0, 0, 0]), (4 + gone + 4) * period_ns)
-    assert paced.sequence.tolist() == [4 + gone + k for k in (1, 2, 3, 4)]
-    assert count.lost == gone
+    lost_scans = 2 * 1024 + 40  # two rounds of 256 packets of four scans, and ten packets
+    block = count.take(np.array([40, 0, 0, 0]), (4 + lost_scans + 4) * period_ns)
+    assert block.sequence.tolist() == [4 + lost_scans + k for k in (1, 2, 3, 4)]
+    assert count.lost == lost_scans
 
 
-def test_it_says_who_it_is_and_what_it_rests_on(plugged, cal):
-    device = plugged(box(RealClock()))
+def test_it_says_who_it_is_and_what_it_rests_on(plug_in, cal):
+    device = plug_in(box(RealClock()))
     uri = f"labjack-u6://?cal={cal}"
     info = open_transducer(uri, RealClock()).info
     assert info.simulated
@@ -175,14 +171,14 @@ def test_it_says_who_it_is_and_what_it_rests_on(plugged, cal):
     assert identify_labjack_u6(parse_address(uri), Deadline(1.0)).model == info.model
 
 
-def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(plugged, cal):
+def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(plug_in, cal):
     clock = PacedClock(2.0)  # so that the converter's memory lasts for 0.4 s of a busy computer
-    device = plugged(box(clock))
+    device = plug_in(box(clock))
     transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=200", clock)
     transducer.start()
     device.bench.mount(paper_surfaces()["stickiness", 80])
-    planted = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8), device.now() + 0.5)
-    block = readings(transducer, device, planted.end + 0.3)
+    ground_truth = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8), device.now() + 0.5)
+    block = readings(transducer, device, ground_truth.end + 0.3)
     transducer.close()
     info, health = transducer.info, transducer.health
     assert health.received == len(block)
@@ -192,13 +188,13 @@ def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_ex
     bias = block.raw[block.time < 0.4].mean(axis=0)
     assert np.abs(bias).max() > 0.5, "gauges are never at 0 V when mounted"
     wrench = info.calibration.wrench(block.raw, bias)
-    assert -wrench[:, 2].min() == pytest.approx(planted.peak_normal_force, abs=0.05)
-    assert wrench[:, 0].max() == pytest.approx(planted.mu * planted.peak_normal_force, abs=0.05)
+    assert -wrench[:, 2].min() == pytest.approx(ground_truth.peak_normal_force, abs=0.05)
+    assert wrench[:, 0].max() == pytest.approx(ground_truth.mu * ground_truth.peak_normal_force, abs=0.05)
 
 
-def test_one_saturated_gauge_invalidates_the_reading_and_is_named_in_its_status(plugged, cal):
+def test_one_saturated_gauge_invalidates_the_reading_and_is_named_in_its_status(plug_in, cal):
     clock = PacedClock(2.0)
-    device = plugged(box(clock, Fault("saturate", 0.1, 0.3)))
+    device = plug_in(box(clock, Fault("saturate", 0.1, 0.3)))
     transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=300", clock)
     transducer.start()
     block = readings(transducer, device, 0.5)
@@ -207,26 +203,26 @@ def test_one_saturated_gauge_invalidates_the_reading_and_is_named_in_its_status(
     assert set(block.status[block.status > 0].tolist()) == {1 << 10}, "gauge 2, and no other"
 
 
-def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plugged, cal, monkeypatch):
+def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plug_in, cal, monkeypatch):
     clock = RealClock()
-    device = plugged(box(clock))
+    device = plug_in(box(clock))
     transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=2000", clock)
-    held = threading.Event()
+    hold = threading.Event()
     receive = usb_link.UsbLink.receive
 
-    def late(link, timeout):
-        if held.is_set():
-            held.clear()
+    def receive_late(link, timeout):
+        if hold.is_set():
+            hold.clear()
             threading.Event().wait(0.3)  # the computer is busy; the converter holds 82 ms
         return receive(link, timeout)
 
-    monkeypatch.setattr(usb_link.UsbLink, "receive", late)
+    monkeypatch.setattr(usb_link.UsbLink, "receive", receive_late)
     transducer.start()
     while device.now() < 0.3:
         transducer.read(0.05)
-    held.set()
-    until = device.now() + 1.0
-    readings(transducer, device, until)
+    hold.set()
+    end = device.now() + 1.0
+    readings(transducer, device, end)
     health = transducer.health
     transducer.close()
     assert health.restarted == 0
@@ -247,9 +243,9 @@ class Forgetful(LabJackU6Box):
             self.answer()
 
 
-def test_a_converter_that_answers_late_after_its_plug_was_put_in_again_is_read_on(plugged, cal):
+def test_a_converter_that_answers_late_after_its_plug_was_put_in_again_is_read_on(plug_in, cal):
     faults, clock = Faults(), RealClock()
-    device = plugged(Forgetful(Bench(3), clock, faults=faults))
+    device = plug_in(Forgetful(Bench(3), clock, faults=faults))
     transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=300", clock)
     transducer.start()
     device.unanswered = 1
@@ -260,8 +256,8 @@ def test_a_converter_that_answers_late_after_its_plug_was_put_in_again_is_read_o
     assert transducer.health.lost > 300, "for a second nothing answered"
 
 
-def test_two_converters_are_told_apart_by_serial_number_and_neither_is_taken_unasked(plugged, cal):
-    plugged(box(RealClock(), serial=11), box(RealClock(), serial=22))
+def test_two_converters_are_told_apart_by_serial_number_and_neither_is_taken_unasked(plug_in, cal):
+    plug_in(box(RealClock(), serial=11), box(RealClock(), serial=22))
     with pytest.raises(SetupError, match="several are plugged in; add serial= one of 11, 22"):
         open_transducer(f"labjack-u6://?cal={cal}", RealClock())
     info = open_transducer(f"labjack-u6://?cal={cal}&serial=22", RealClock()).info
@@ -270,8 +266,8 @@ def test_two_converters_are_told_apart_by_serial_number_and_neither_is_taken_una
         open_transducer(f"labjack-u6://?cal={cal}&serial=33", RealClock())
 
 
-def test_a_missing_calibration_is_asked_for_in_one_sentence(plugged):
-    plugged(box(RealClock()))
+def test_a_missing_calibration_is_asked_for_in_one_sentence(plug_in):
+    plug_in(box(RealClock()))
     with pytest.raises(SetupError, match="add cal=FILE"):
         open_transducer("labjack-u6://", RealClock())
     with pytest.raises(SetupError, match="360000001 is there; add cal=FILE"):
@@ -309,11 +305,11 @@ def test_another_client_reads_the_same_volts_from_the_simulated_converter():
     client.streamStart()
     client.streamSamplesPerPacket = 24
     packet = device.stream_packet(1.0)
-    theirs = client.processStreamData(packet, numBytes=62)
+    makers_volts = client.processStreamData(packet, numBytes=62)
     constants = wire.parse_constants(*_memory(device))
-    ours = wire.StreamDecoder(constants).feed(packet).raw
+    driver_volts = wire.StreamDecoder(constants).feed(packet).raw
     for gauge in range(6):
-        np.testing.assert_allclose(theirs[f"AIN{2 * gauge}"], ours[:, gauge], atol=1e-9)
+        np.testing.assert_allclose(makers_volts[f"AIN{2 * gauge}"], driver_volts[:, gauge], atol=1e-9)
 
 
 def _memory(device):

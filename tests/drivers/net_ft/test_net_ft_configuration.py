@@ -36,19 +36,15 @@ def page(root="netft", extra="", **changes):
 
 
 def test_a_page_gives_identity_calibration_and_settings():
-    found = parse_configuration(page())
-    assert (found.product, found.serial, found.model, found.rate, found.streams) == (
-        "Net F/T",
-        "FT12345",
-        "SI-36-0.5",
-        200.0,
-        True,
-    )
-    calibration = found.calibration()
+    configuration = parse_configuration(page())
+    identity = (configuration.product, configuration.serial, configuration.model)
+    assert identity == ("Net F/T", "FT12345", "SI-36-0.5")
+    assert (configuration.rate, configuration.streams) == (200.0, True)
+    calibration = configuration.calibration()
     assert calibration.serial == "FT12345"
     assert calibration.rated.tolist() == [36, 36, 36, 500, 500, 500]
     assert calibration.wrench(np.array([[1e6, 0, 0, 0, 0, 2e6]]), np.zeros(6)).tolist() == [[1, 0, 0, 0, 0, 2000]]
-    assert found.settings == {
+    assert configuration.settings == {
         "configuration": "Nano43",
         "filter": "35 Hz",
         "stored bias [gauge counts]": "1 -2 3 4 5 -18343",
@@ -75,8 +71,8 @@ def test_units_are_converted(force, torque, newtons, newton_millimetres):
 
 
 def test_the_rated_range_follows_the_units():
-    found = parse_configuration(page(scfgfu="lbf", cfgmr="8;8;8;0.5;0.5;0.5"))
-    np.testing.assert_allclose(found.calibration().rated, [35.585773] * 3 + [500.0] * 3, rtol=1e-7)
+    configuration = parse_configuration(page(scfgfu="lbf", cfgmr="8;8;8;0.5;0.5;0.5"))
+    np.testing.assert_allclose(configuration.calibration().rated, [35.585773] * 3 + [500.0] * 3, rtol=1e-7)
 
 
 @pytest.mark.parametrize("text", [None, "", "1;2;3", "36;36;36;0.5;0.5;nan", "0;0;0;0;0;0"])
@@ -140,11 +136,11 @@ def test_garbage_raises_nothing_but_a_sentence(garbage):
 @given(st.dictionaries(st.sampled_from(sorted(ELEMENTS)), st.text("0123456789;.-xeN \u00e9", max_size=12)))
 def test_any_texts_give_a_configuration_that_can_be_used_or_a_sentence(changes):
     try:
-        found = parse_configuration(page(**changes))
+        configuration = parse_configuration(page(**changes))
     except SetupError:
         return
-    assert np.all(np.isfinite(found.calibration().matrix))
-    assert math.isnan(found.rate) or 1.0 <= found.rate <= 7000.0
+    assert np.all(np.isfinite(configuration.calibration().matrix))
+    assert math.isnan(configuration.rate) or 1.0 <= configuration.rate <= 7000.0
 
 
 def test_a_disabled_stream_is_seen():
@@ -157,22 +153,22 @@ def test_a_rate_that_is_not_stated_is_unknown(text):
 
 
 def test_a_tool_transform_in_force_is_recorded():
-    found = parse_configuration(page(cfgtfx="0;0;4.5;0;0;90", scfgtdu="mm", scfgtau="degrees"))
-    assert found.settings["tool transform"] == "0 0 4.5 0 0 90 [mm, degrees]"
+    configuration = parse_configuration(page(cfgtfx="0;0;4.5;0;0;90", scfgtdu="mm", scfgtau="degrees"))
+    assert configuration.settings["tool transform"] == "0 0 4.5 0 0 90 [mm, degrees]"
 
 
 @pytest.mark.parametrize("code", ["12", "13", "x", "-1"])
 def test_a_filter_is_named_or_its_code_kept(code):
-    named = parse_configuration(page(setuserfilter=code)).settings["filter"]
-    assert named == ("3000 Hz" if code == "12" else code)
+    filter_name = parse_configuration(page(setuserfilter=code)).settings["filter"]
+    assert filter_name == ("3000 Hz" if code == "12" else code)
 
 
 @pytest.mark.parametrize(
-    ("asked", "sent"), [(200, 200), (1000, 1000), (150, 7000 / 46), (99, 100), (7000, 7000), (1, 1)]
+    ("rate", "expected"), [(200, 200), (1000, 1000), (150, 7000 / 46), (99, 100), (7000, 7000), (1, 1)]
 )
-def test_rates_are_integer_fractions_of_7000_rounded_up(asked, sent):
-    assert true_rate(asked) == pytest.approx(sent, rel=1e-12)
-    assert true_rate(int(sent)) == pytest.approx(sent, rel=1e-12)
+def test_rates_are_integer_fractions_of_7000_rounded_up(rate, expected):
+    assert true_rate(rate) == pytest.approx(expected, rel=1e-12)
+    assert true_rate(int(expected)) == pytest.approx(expected, rel=1e-12)
 
 
 def test_166_rates_can_be_told_apart_by_the_whole_number_shown():

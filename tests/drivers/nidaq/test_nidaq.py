@@ -5,12 +5,12 @@ import threading
 
 import numpy as np
 import pytest
+from reading import read_until
 
 from drivers.address import parse_address
 from drivers.clock import RealClock
 from drivers.deadline import Deadline
 from drivers.nidaq import identify_nidaq, open_nidaq
-from drivers.readings import ReadingBlock
 from drivers.transducer import SetupError
 from simulators.bench import Bench, calibration_file
 from simulators.faults import Fault
@@ -34,11 +34,7 @@ def address(tmp_path):
 
 
 def readings(transducer, count):
-    blocks = []
-    while sum(map(len, blocks)) < count:
-        blocks.append(transducer.read(0.1))
-    transducer.stop()
-    return ReadingBlock.concatenate([*blocks, transducer.read(0.0)])
+    return read_until(transducer, lambda: transducer.health.received >= count)
 
 
 def test_it_says_who_it_is_and_at_which_rate_it_was_set(library, address):

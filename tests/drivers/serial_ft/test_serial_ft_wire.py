@@ -24,14 +24,14 @@ def record(form, values, error=0):
     return (str(error) + "".join(f",{value:6d}" for value in values) + "\r\n").encode()
 
 
-def course(count, seed=0, size=300.0):
+def wandering_values(count, seed=0, size=300.0):
     """Values (count, 6) that wander as those of a hand on a surface do."""
-    draw = np.random.default_rng(seed)
-    steps = draw.normal(0.0, 8.0, (count, 6))
-    return np.clip(np.rint(np.cumsum(steps, axis=0) + draw.normal(0.0, size, 6)), -32000, 32000).astype(int)
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(0.0, 8.0, (count, 6))
+    return np.clip(np.rint(np.cumsum(steps, axis=0) + rng.normal(0.0, size, 6)), -32000, 32000).astype(int)
 
 
-def decoded(form, chunks):
+def decode(form, chunks):
     decoder = DECODERS[form]()
     parts = [decoder.feed(chunk) for chunk in chunks]
     raw = np.concatenate([part.raw for part in parts] or [np.empty((0, 6))])
@@ -40,20 +40,20 @@ def decoded(form, chunks):
     return raw, status, damaged, decoder.malformed
 
 
-def sent(form, values):
+def byte_stream(form, values):
     """The bytes of all values, and enough after them that every one can be judged."""
     tail = [values[-1]] * 9 if form == "binary" else []
     return b"".join(record(form, v) for v in [*values, *tail])
 
 
 def test_the_golden_line_of_text_is_its_reading():
-    raw, status, damaged, malformed = decoded("ascii", [GOLDEN_ASCII])
+    raw, status, damaged, malformed = decode("ascii", [GOLDEN_ASCII])
     assert raw.tolist() == [list(GOLDEN)]
     assert (status, damaged, malformed) == ([0], [0], 0)
 
 
 def test_the_golden_bytes_are_signed_and_big_endian():
-    raw, status, _, malformed = decoded("binary", [GOLDEN_BINARY * 9 + bytes(12)])
+    raw, status, _, malformed = decode("binary", [GOLDEN_BINARY * 9 + bytes(12)])
     assert raw.tolist()[0] == list(GOLDEN_BINARY_VALUES)
     assert (status[0], malformed) == (0, 0)
 
@@ -66,15 +66,15 @@ def test_the_golden_answers_to_one_request_are_whole():
 
 
 @pytest.mark.parametrize("form", DECODERS)
-@given(cuts=st.lists(st.integers(0, 45 * 40), max_size=30).map(sorted), seed=st.integers(0, 20), hurt=st.booleans())
+@given(cuts=st.lists(st.integers(0, 45 * 40), max_size=30).map(sorted), seed=st.integers(0, 20), damage=st.booleans())
 @settings(max_examples=40)
-def test_readings_do_not_depend_on_how_the_stream_was_cut(form, cuts, seed, hurt):
-    stream = bytearray(sent(form, course(40, seed)))
-    if hurt:
+def test_readings_do_not_depend_on_how_the_stream_was_cut(form, cuts, seed, damage):
+    stream = bytearray(byte_stream(form, wandering_values(40, seed)))
+    if damage:
         del stream[200:205]
         stream[400:413] = b"Power on.\r\n>\xff"
     chunks = [bytes(stream[a:b]) for a, b in itertools.pairwise([0, *cuts, len(stream)])]
-    cut, whole = decoded(form, chunks), decoded(form, [bytes(stream)])
+    cut, whole = decode(form, chunks), decode(form, [bytes(stream)])
     assert cut[0].tolist() == whole[0].tolist()
     assert cut[1:] == whole[1:]
 
@@ -82,63 +82,63 @@ def test_readings_do_not_depend_on_how_the_stream_was_cut(form, cuts, seed, hurt
 @pytest.mark.parametrize("form", DECODERS)
 @given(garbage=st.lists(st.binary(max_size=200), max_size=8))
 def test_no_garbage_raises(form, garbage):
-    raw, status, damaged, malformed = decoded(form, garbage)
+    raw, status, damaged, malformed = decode(form, garbage)
     assert len(raw) == len(status) == len(damaged)
     assert malformed >= sum(damaged)
 
 
 @pytest.mark.parametrize("form", DECODERS)
-@given(lost=st.integers(1, 60), at=st.integers(300, 900), seed=st.integers(0, 50))
+@given(gap=st.integers(1, 60), at=st.integers(300, 900), seed=st.integers(0, 50))
 @settings(max_examples=40)
-def test_lost_bytes_cost_the_records_they_belonged_to_and_no_wrong_reading_comes_out(form, lost, at, seed):
-    values = course(80, seed, size=3000.0)
-    stream = sent(form, values)
-    raw, _, damaged, malformed = decoded(form, [stream[:at], stream[at + lost :]])
+def test_lost_bytes_cost_the_records_they_belonged_to_and_no_wrong_reading_comes_out(form, gap, at, seed):
+    values = wandering_values(80, seed, size=3000.0)
+    stream = byte_stream(form, values)
+    raw, _, damaged, malformed = decode(form, [stream[:at], stream[at + gap :]])
     size = 13 if form == "binary" else 45
-    assume(lost % size)  # else one reading is pieced together from two, which no reader can see
-    right = {tuple(v) for v in values.tolist()}
-    assert all(tuple(int(x) for x in v) in right for v in raw.tolist())
-    assert len(raw) >= len(values) - lost // size - 4
+    assume(gap % size)  # else one reading is pieced together from two, which no reader can see
+    true_values = {tuple(v) for v in values.tolist()}
+    assert all(tuple(int(x) for x in v) in true_values for v in raw.tolist())
+    assert len(raw) >= len(values) - gap // size - 4
     assert malformed == sum(damaged)
 
 
 def test_binary_keeps_its_place_through_a_blow_that_no_smooth_course_has():
-    values = course(60, 3)
+    values = wandering_values(60, 3)
     values[30:34] += np.array([4000, -9000, 20000, 12000, -7000, 3000])
-    raw, _, damaged, malformed = decoded("binary", [sent("binary", values)])
+    raw, _, damaged, malformed = decode("binary", [byte_stream("binary", values)])
     np.testing.assert_array_equal(raw[:60], values)
     assert malformed == sum(damaged) == 0
 
 
 def test_binary_finds_its_place_though_the_values_stand_still():
     values = [(5, -2, 0, 300, -1, 7)] * 40
-    stream = sent("binary", values)
-    raw, _, damaged, _ = decoded("binary", [stream[:201], stream[202:]])
+    stream = byte_stream("binary", values)
+    raw, _, damaged, _ = decode("binary", [stream[:201], stream[202:]])
     assert {tuple(int(x) for x in v) for v in raw.tolist()} == {values[0]}
     assert sum(damaged) == 3  # the one that lost a byte, and both beside it, which might be the ones that did
 
 
 @pytest.mark.parametrize("form", DECODERS)
 def test_an_error_digit_is_the_status_of_its_reading_which_is_kept(form):
-    values = course(6, 1)
-    stream = b"".join(record(form, v, error=int(i == 2)) for i, v in enumerate(values)) + sent(form, values[-1:])
-    raw, status, _, malformed = decoded(form, [stream])
+    values = wandering_values(6, 1)
+    stream = b"".join(record(form, v, error=int(i == 2)) for i, v in enumerate(values)) + byte_stream(form, values[-1:])
+    raw, status, _, malformed = decode(form, [stream])
     assert status[:6] == [0, 0, 1, 0, 0, 0]
     np.testing.assert_array_equal(raw[:6], values)
     assert malformed == 0
 
 
 def test_a_banner_in_mid_stream_is_broken_records_and_nothing_else():
-    values = course(30, 2)
+    values = wandering_values(30, 2)
     text = b"\r\nF/T Controller\r\nall rights reserved, ready\r\n>"
-    stream = sent("ascii", values[:15]) + text + sent("ascii", values[15:])
-    raw, _, damaged, _ = decoded("ascii", [stream])
+    stream = byte_stream("ascii", values[:15]) + text + byte_stream("ascii", values[15:])
+    raw, _, damaged, _ = decode("ascii", [stream])
     assert len(raw) >= 29
     assert sum(damaged) >= 1
-    stream = sent("binary", values[:15]) + text + sent("binary", values[15:])
-    raw, _, damaged, _ = decoded("binary", [stream])
-    right = {tuple(v) for v in values.tolist()}
-    assert all(tuple(int(x) for x in v) in right for v in raw.tolist())
+    stream = byte_stream("binary", values[:15]) + text + byte_stream("binary", values[15:])
+    raw, _, damaged, _ = decode("binary", [stream])
+    true_values = {tuple(v) for v in values.tolist()}
+    assert all(tuple(int(x) for x in v) in true_values for v in raw.tolist())
     assert sum(damaged) >= len(text) // 13
 
 
@@ -154,6 +154,6 @@ def test_a_banner_in_mid_stream_is_broken_records_and_nothing_else():
     ],
 )
 def test_a_line_of_another_form_is_a_broken_record(line):
-    raw, _, damaged, malformed = decoded("ascii", [line, GOLDEN_ASCII])
+    raw, _, damaged, malformed = decode("ascii", [line, GOLDEN_ASCII])
     assert raw.tolist() == [list(GOLDEN)]
     assert damaged[0] == malformed >= 1
