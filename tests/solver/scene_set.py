@@ -40,16 +40,16 @@ def scenes():
     for kind, counts in kinds.items():
         for kinematics, count in zip(("small", "finite"), counts, strict=True):
             for number in range(count):
-                out[f"{kinematics} {kind} {number}"] = _drawn(kind, kinematics, number)
+                out[f"{kinematics} {kind} {number}"] = _random_scene(kind, kinematics, number)
     return out
 
 
-def _drawn(kind, kinematics, number):
+def _random_scene(kind, kinematics, number):
     from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve
 
     rng = np.random.default_rng([SEED, sum(map(ord, kind + kinematics)), number])
-    softer = rng.uniform(0.7, 1.3, 3).tolist()
-    moduli = [E * s for E, s in zip((0.136, 0.08, 0.034), softer, strict=True)]
+    factors = rng.uniform(0.7, 1.3, 3).tolist()
+    moduli = [E * s for E, s in zip((0.136, 0.08, 0.034), factors, strict=True)]
     nu = float(rng.choice([0.4, 0.48, 0.48, 0.48, 0.495]))
     depth, mu, angle = float(rng.uniform(0.4, 2.0)), float(rng.uniform(0.05, 0.7)), float(rng.uniform(30.0, 75.0))
     slide = "+x" if rng.random() < 0.5 else "-x"
@@ -81,10 +81,10 @@ def _drawn(kind, kinematics, number):
     )  # fmt: skip
 
 
-def _loading(rng, kind, number, drawn):
+def _loading(rng, kind, number, sample):
     from solver import Loading
 
-    depth, slide, mu = drawn
+    depth, slide, mu = sample
     if kind == "force":
         unit = "N" if number % 5 == 0 else "N/mm"
         force = math.exp(rng.uniform(math.log(0.004), math.log(0.12)))
@@ -117,15 +117,15 @@ def outcome(scene):
     from solver import SolveFailure, solve
 
     try:
-        plain = solve(scene).to_dict()
+        numbers = solve(scene).to_dict()
     except SolveFailure as failure:
         return failure.to_dict()
     except Exception as error:  # noqa: BLE001 - a finding as well
         return {"crash": f"{type(error).__name__}: {error}"}
-    return {key: value for key, value in plain.items() if key not in SKIPPED}
+    return {key: value for key, value in numbers.items() if key not in SKIPPED}
 
 
-def _timed(name):
+def _time_outcome(name):
     start = time.perf_counter()
     return name, outcome(scenes()[name]), time.perf_counter() - start
 
@@ -133,13 +133,13 @@ def _timed(name):
 def solve_all(names=None, workers=2):
     """Return the outcomes by name; the time each took [s] beside them."""
     names = list(scenes()) if names is None else names
-    out, took = {}, {}
+    out, seconds_by_name = {}, {}
     with ProcessPoolExecutor(workers) as pool:
-        for number, (name, result, seconds) in enumerate(pool.map(_timed, names)):
-            out[name], took[name] = result, seconds
+        for number, (name, result, seconds) in enumerate(pool.map(_time_outcome, names)):
+            out[name], seconds_by_name[name] = result, seconds
             if (number + 1) % 50 == 0:
                 print(f"{number + 1} of {len(names)}", file=sys.stderr, flush=True)
-    return out, took
+    return out, seconds_by_name
 
 
 def differences(before, after, path=""):
@@ -148,8 +148,8 @@ def differences(before, after, path=""):
         for key in sorted(before.keys() | after.keys()):
             yield from differences(before.get(key), after.get(key), f"{path}.{key}")
     elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
-        for number, (one, other) in enumerate(zip(before, after, strict=True)):
-            yield from differences(one, other, f"{path}[{number}]")
+        for number, (item_before, item_after) in enumerate(zip(before, after, strict=True)):
+            yield from differences(item_before, item_after, f"{path}[{number}]")
     elif isinstance(before, int | float) and isinstance(after, int | float):
         size = max(abs(before), abs(after))
         if abs(before - after) > ABSOLUTE and size > 0.0:
@@ -160,22 +160,22 @@ def differences(before, after, path=""):
 
 def main(arguments):
     """Record the outcomes, or compare them with those recorded."""
-    what, file = arguments[0], Path(arguments[1])
-    chosen = [name for name in scenes() if len(arguments) < 3 or arguments[2] in name]
-    if what == "record":
-        out, took = solve_all(chosen)
-        file.write_text(json.dumps({"outcomes": out, "took_s": took}, indent=0))
+    command, file = arguments[0], Path(arguments[1])
+    names = [name for name in scenes() if len(arguments) < 3 or arguments[2] in name]
+    if command == "record":
+        out, seconds_by_name = solve_all(names)
+        file.write_text(json.dumps({"outcomes": out, "took_s": seconds_by_name}, indent=0))
         return 0
-    recorded = json.loads(file.read_text())["outcomes"]
-    again, _ = solve_all([name for name in chosen if name in recorded])
+    recording = json.loads(file.read_text())["outcomes"]
+    outcomes, _ = solve_all([name for name in names if name in recording])
     findings = 0
-    for name, after in again.items():
+    for name, after in outcomes.items():
         after = json.loads(json.dumps(after))
-        rows = [row for row in differences(recorded[name], after) if row[3] > AGREEMENT and ".audits" not in row[0]]
+        rows = [row for row in differences(recording[name], after) if row[3] > AGREEMENT and ".audits" not in row[0]]
         findings += bool(rows)
-        for path, one, other, apart in sorted(rows, key=lambda row: -row[3])[:6]:
-            print(f"{name}{path}: {one!s:.70} -> {other!s:.70} ({apart:.1e})")
-    print(f"{len(again)} scenes, {findings} with differences above {AGREEMENT:g}")
+        for path, value_before, value_after, difference in sorted(rows, key=lambda row: -row[3])[:6]:
+            print(f"{name}{path}: {value_before!s:.70} -> {value_after!s:.70} ({difference:.1e})")
+    print(f"{len(outcomes)} scenes, {findings} with differences above {AGREEMENT:g}")
     return int(findings > 0)
 
 

@@ -14,13 +14,18 @@ from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, l
 from solver.equilibrium.load_path import Aim, Way
 from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing, finger_mesh
-from tests.solver.oracle.active_set import Course, forced, touchable, untouched
-from tests.solver.oracle.active_set import lowered as lowered_plain
+from tests.solver.oracle.active_set import (
+    ContactSolver,
+    condense_surface,
+    lower_contact,
+    undeformed_contact,
+    under_forces,
+)
 from tests.solver.oracle.laws import frictionless
 
 TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.3)]
 LAWS = [FrictionLaw(0.0, np.inf), FrictionLaw(0.5, np.inf), FrictionLaw(0.9, 0.008), FrictionLaw(0.3, 0.0)]
-WAY = [(0.3, 0.0), (0.9, 0.0), (1.5, 0.0), (1.5, 0.05), (1.5, 0.2), (1.5, 1.0), (1.5, 3.0), (1.5, 2.9), (1.2, 1.0)]
+STEPS = [(0.3, 0.0), (0.9, 0.0), (1.5, 0.0), (1.5, 0.05), (1.5, 0.2), (1.5, 1.0), (1.5, 3.0), (1.5, 2.9), (1.2, 1.0)]
 
 
 @pytest.fixture(scope="module")
@@ -35,56 +40,56 @@ def newton(body):
 
 
 @pytest.fixture(scope="module")
-def plain(body):
-    return touchable(body.condensed)
+def surface(body):
+    return condense_surface(body.condensed)
 
 
-def agree(found, plain):
-    np.testing.assert_array_equal(found.state, plain.state)
-    rubs = plain.tangential != 0.0
-    np.testing.assert_array_equal(np.sign(found.tangential[rubs]), np.sign(plain.tangential[rubs]))
-    for one, other in ((found.normal, plain.normal), (found.tangential, plain.tangential)):
-        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-10 * max(plain.normal.max(), 1e-300))
+def assert_same_contact(compiled, expected):
+    np.testing.assert_array_equal(compiled.state, expected.state)
+    drags = expected.tangential != 0.0
+    np.testing.assert_array_equal(np.sign(compiled.tangential[drags]), np.sign(expected.tangential[drags]))
+    for forces, expected_forces in ((compiled.normal, expected.normal), (compiled.tangential, expected.tangential)):
+        np.testing.assert_allclose(forces, expected_forces, rtol=0.0, atol=1e-10 * max(expected.normal.max(), 1e-300))
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
 @pytest.mark.parametrize("direction", [1, -1])
-def test_settled_slides_are_the_plain_ones(newton, plain, law, direction):
+def test_settled_slides_are_the_plain_ones(newton, surface, law, direction):
     load = LoadState(1.5, law.mu, law.tau_max, -direction)
-    found = solve_full_slip(newton, load)
-    agree(found, Course(plain, law).sliding(1.5, direction))
-    agree(
-        solve_full_slip(newton, load._replace(depth=1.4), found),
-        Course(plain, law).sliding(1.4, direction, found.state),
+    state = solve_full_slip(newton, load)
+    assert_same_contact(state, ContactSolver(surface, law).solve_full_slip(1.5, direction))
+    assert_same_contact(
+        solve_full_slip(newton, load._replace(depth=1.4), state),
+        ContactSolver(surface, law).solve_full_slip(1.4, direction, state.state),
     )
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
-def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, plain, law):
-    course, before = Course(plain, law), untouched(plain)
-    state, met = EquilibriumState.undeformed(newton.condensed), set()
-    for depth, travel in WAY:
-        before = course.step(before, depth, travel)
+def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, surface, law):
+    contact_solver, contact = ContactSolver(surface, law), undeformed_contact(surface)
+    state, states = EquilibriumState.undeformed(newton.condensed), set()
+    for depth, travel in STEPS:
+        contact = contact_solver.step(contact, depth, travel)
         state = newton.settle(state, LoadState(depth, law.mu, law.tau_max, travel=-travel))
-        agree(state, before)
-        met |= set(state.state.tolist())
-    assert frictionless(law) or (met >= {STICK, SLIP} and (SHEAR_LIMITED in met) == np.isfinite(law.tau_max))
+        assert_same_contact(state, contact)
+        states |= set(state.state.tolist())
+    assert frictionless(law) or (states >= {STICK, SLIP} and (SHEAR_LIMITED in states) == np.isfinite(law.tau_max))
 
 
 @pytest.mark.parametrize("tau", [np.inf, 0.004])
-def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, tau):
+def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, surface, tau):
     mu = 0.4
-    state, before = (
+    state, contact = (
         replace(EquilibriumState.undeformed(newton.condensed), load=LoadState(0.0, mu, tau)),
-        untouched(plain),
+        undeformed_contact(surface),
     )
     for n in range(1, 41):
         normal, drag = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
-        course = Course(forced(plain, normal, drag), FrictionLaw(mu, tau))
-        before = course.step(lowered_plain(course.law, before), 0.0, 0.0)
+        contact_solver = ContactSolver(under_forces(surface, normal, drag), FrictionLaw(mu, tau))
+        contact = contact_solver.step(lower_contact(contact_solver.law, contact), 0.0, 0.0)
         state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), ForceLoad(normal, drag))
-        agree(state, before)
-        np.testing.assert_allclose([-state.load.depth, -state.load.travel], before.motion, atol=1e-10)
+        assert_same_contact(state, contact)
+        np.testing.assert_allclose([-state.load.depth, -state.load.travel], contact.motion, atol=1e-10)
     assert (state.state == SHEAR_LIMITED).any() == (tau < np.inf)
 
 
@@ -99,8 +104,8 @@ def test_a_way_under_given_forces_ends_with_them(newton):
 
 
 def test_a_search_that_may_not_go_on_says_so(newton):
-    nowhere = np.full(len(newton.skin_x), OPEN)
+    all_open = np.full(len(newton.skin_x), OPEN)
     with pytest.raises(ContactLost, match="after 2 systems"):
-        slide_from_guess(newton, LoadState(1.5, 0.5, sense=-1), nowhere, rounds=2)
+        slide_from_guess(newton, LoadState(1.5, 0.5, sense=-1), all_open, rounds=2)
     with pytest.raises(ContactLost, match="no unique forces"):
-        slide_from_guess(newton, LoadState(0.0, 0.5, sense=-1), nowhere, force=0.1)
+        slide_from_guess(newton, LoadState(0.0, 0.5, sense=-1), all_open, force=0.1)

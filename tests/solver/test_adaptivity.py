@@ -34,16 +34,16 @@ def test_the_adjoint_says_what_a_force_inside_the_finger_changes(scene):
     displacement = finger.displacement(state)
     dual = adjoint(finger, displacement, state)
     mesh, step = finger.geometry.mesh, 1e-7
-    inside = np.setdiff1d(np.arange(len(mesh.nodes)), np.concatenate([mesh.skin, mesh.held]))
-    for node in np.random.default_rng(1).choice(inside, 3, replace=False):
+    inner_nodes = np.setdiff1d(np.arange(len(mesh.nodes)), np.concatenate([mesh.skin, mesh.held]))
+    for node in np.random.default_rng(1).choice(inner_nodes, 3, replace=False):
         for along in (0, 1):
             load = np.zeros(mesh.nodes.shape)
             load[node, along] = step
             body, recover = finger.body.under(load)
             newton = Newton(body)
             assert newton.linearise(state, state.load, newton.skin_x + state.u[:, 0])
-            pushed = state.u + newton.steps[:, 0].reshape(-1, 2)
-            change = (finger.sed_ending(recover(pushed)) - finger.sed_ending(displacement)) / step
+            displaced = state.u + newton.steps[:, 0].reshape(-1, 2)
+            change = (finger.sed_ending(recover(displaced)) - finger.sed_ending(displacement)) / step
             assert change == pytest.approx(dual[node, along], rel=1e-4, abs=1e-4 * np.abs(dual).max())
 
 
@@ -51,17 +51,17 @@ def test_the_adjoint_says_what_a_force_inside_the_finger_changes(scene):
 def test_four_columns_made_one_have_a_far_larger_part_of_the_error(place):
     scene = SLIDES["slip"]
     lines = LinearFinger.of(scene, replace(COARSE, fineness=8.0)).geometry.lines
-    gone = int(np.searchsorted(lines.arcs, place))
-    wide = replace(lines, arcs=(*lines.arcs[: gone - 1], *lines.arcs[gone + 2 :]))
+    line = int(np.searchsorted(lines.arcs, place))
+    wide_lines = replace(lines, arcs=(*lines.arcs[: line - 1], *lines.arcs[line + 2 :]))
 
-    def columns(lines):
+    def column_errors(lines):
         finger = LinearFinger.of(scene, replace(COARSE, fineness=lines, halved=True))
         state = settled_state(scene, finger)
         return NestedGrid.of(finger).parts(finger.displacement(state), state)[0]
 
-    before, after = columns(lines), columns(wide)
-    assert after[gone - 2] > 4.0 * before[gone - 2 : gone + 2].sum()
-    assert after.sum() - after[gone - 2] < 1.5 * before.sum()
+    fine_errors, wide_errors = column_errors(lines), column_errors(wide_lines)
+    assert wide_errors[line - 2] > 4.0 * fine_errors[line - 2 : line + 2].sum()
+    assert wide_errors.sum() - wide_errors[line - 2] < 1.5 * fine_errors.sum()
 
 
 def test_dividing_what_has_the_largest_part_changes_the_sed_most():
@@ -76,8 +76,8 @@ def test_dividing_what_has_the_largest_part_changes_the_sed_most():
     def change(gap):
         halves = np.ones(len(parts), np.int64)
         halves[gap] = 2
-        divided = lines.divide(*np.split(halves, [len(lines.arcs) - 1]))
-        return abs(sed(LinearFinger.of(scene, replace(sizing, fineness=divided)), scene) - before)
+        finer_lines = lines.divide(*np.split(halves, [len(lines.arcs) - 1]))
+        return abs(sed(LinearFinger.of(scene, replace(sizing, fineness=finer_lines)), scene) - before)
 
     changes = np.array([change(gap) for gap in range(len(parts))])
     largest = np.argsort(parts)[-4:]
@@ -99,38 +99,36 @@ def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
 
 
 def test_a_contact_narrower_than_its_smallest_elements_is_solved_on_one_mesh():
-    touch, dofs = Scene(friction=Friction(0.3), loading=Loading(1e-5, "+x"), solve=Solve(evidence="quick")), []
-    answer = solve(touch, rough=lambda rough: dofs.append(rough.dofs))
-    assert dofs == [answer.dofs]
-    assert answer.error_estimate > 0.01
+    scene, dofs = Scene(friction=Friction(0.3), loading=Loading(1e-5, "+x"), solve=Solve(evidence="quick")), []
+    prediction = solve(scene, rough=lambda rough: dofs.append(rough.dofs))
+    assert dofs == [prediction.dofs]
+    assert prediction.error_estimate > 0.01
 
 
 def test_refinement_comes_to_an_end(monkeypatch):
     monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 4000)
     scene, dofs = scenes()[9], []
-    asked = replace(scene, solve=replace(scene.solve, tolerance=1e-4, evidence="quick"))
-    tight = solve(asked, rough=lambda rough: dofs.append(rough.dofs))
-    assert tight.error_estimate > 1e-4
-    assert any("above the tolerance" in warning for warning in tight.warnings)
+    strict_scene = replace(scene, solve=replace(scene.solve, tolerance=1e-4, evidence="quick"))
+    prediction = solve(strict_scene, rough=lambda rough: dofs.append(rough.dofs))
+    assert prediction.error_estimate > 1e-4
+    assert any("above the tolerance" in warning for warning in prediction.warnings)
     assert dofs[:-1] == sorted(set(dofs))  # the last is the answer, before its evidence
     assert dofs[-1] <= 4000
     # elements so small that none may be divided
     monkeypatch.setattr(adaptivity, "FINEST", 1.0)
-    assert (
-        refine_lines(tight.geometry, np.full(len(tight.geometry.lines.arcs) - 1 + tight.geometry.lines.rows, 1e9))
-        is None
-    )
+    lines = prediction.geometry.lines
+    assert refine_lines(prediction.geometry, np.full(len(lines.arcs) - 1 + lines.rows, 1e9)) is None
 
 
 def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monkeypatch):
     monkeypatch.setattr(adaptivity, "MOST_UNKNOWNS", 3000)
-    asked = Solve("finite", contrast_tolerance=0.0005)
-    surfaces = [Scene(friction=Friction(mu), loading=Loading(2.0, "+x"), solve=asked) for mu in (0.2, 0.25, 0.9)]
+    settings = Solve("finite", contrast_tolerance=0.0005)
+    surfaces = [Scene(friction=Friction(mu), loading=Loading(2.0, "+x"), solve=settings) for mu in (0.2, 0.25, 0.9)]
     rounds = []
     finer = solution._finer
-    monkeypatch.setattr(solution, "_finer", lambda *found: rounds.append(finer(*found)) or rounds[-1])
-    *answers, refused = solve_many(surfaces)
-    assert isinstance(refused, NoSteadyState)
+    monkeypatch.setattr(solution, "_finer", lambda *arguments: rounds.append(finer(*arguments)) or rounds[-1])
+    *answers, failure = solve_many(surfaces)
+    assert isinstance(failure, NoSteadyState)
     assert all(answer.dofs > 2000 for answer in answers)
     assert not rounds[-1]
     assert len(rounds) < 5
@@ -138,18 +136,18 @@ def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monke
 
 def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
     scene = Scene(friction=Friction(3.0, 0.004), loading=Loading(1.0, "+x"), solve=Solve("finite", evidence="quick"))
-    settled, tried = finite_answers.settled_state, []
+    solve_state, fingers = finite_answers.settled_state, []
 
-    def none_on_the_first(finger, *more):
-        tried.append(finger)
-        if len(tried) == 2:
+    def fail_on_second(finger, *arguments):
+        fingers.append(finger)
+        if len(fingers) == 2:
             raise NotConverged("the last node is neither open nor touching")
-        return settled(finger, *more)
+        return solve_state(finger, *arguments)
 
-    monkeypatch.setattr(finite_answers, "settled_state", none_on_the_first)
+    monkeypatch.setattr(finite_answers, "settled_state", fail_on_second)
     meshes = finite_answers.Meshes()
     low = finite_answers.coarse_solution(scene, 1.0, 4.0, meshes)
-    tried[:] = [low.finger]
+    fingers[:] = [low.finger]
     lines = refine_lines(low.finger.geometry, None)
     top = finite_answers.solution_on(scene, replace(low.sizing, fineness=lines), low, meshes)
     assert len(top.finger.geometry.lines.arcs) == 2 * len(lines.arcs) - 1
@@ -158,18 +156,18 @@ def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
 
 def test_a_tolerance_is_met_with_few_unknowns():
     scene = scenes()[9]
-    tight = solve(replace(scene, solve=replace(scene.solve, tolerance=0.0005)))
-    even = LinearFinger.of(scene, Sizing(8.0, 2.0, margin=WIDE))
-    fine = sed(LinearFinger.of(scene, Sizing(26.0, 2.0, margin=WIDE)), scene)
-    assert tight.error_estimate <= 0.0005
-    assert tight.dofs < even.body.mesh.dofs  # an even mesh whose elements are half as large as the first one's
-    assert abs(tight.sed_ending / fine - 1.0) < 0.0005
+    prediction = solve(replace(scene, solve=replace(scene.solve, tolerance=0.0005)))
+    even_finger = LinearFinger.of(scene, Sizing(8.0, 2.0, margin=WIDE))
+    fine_sed = sed(LinearFinger.of(scene, Sizing(26.0, 2.0, margin=WIDE)), scene)
+    assert prediction.error_estimate <= 0.0005
+    assert prediction.dofs < even_finger.body.mesh.dofs  # with elements half as large as the first mesh's
+    assert abs(prediction.sed_ending / fine_sed - 1.0) < 0.0005
 
 
 def test_at_finite_strain_a_tolerance_is_met_on_lines_that_were_added():
     scene = Scene(friction=Friction(0.3), loading=Loading(1.5, "+x"), solve=Solve("finite", tolerance=0.002))
-    tight = solve(scene)
+    strict = solve(scene)
     usual = solve(replace(scene, solve=Solve("finite")))
-    assert tight.error_estimate <= 0.002
-    assert min(tight.wall_s, tight.setup_s, tight.estimate_s) > 0.0
-    assert abs(tight.sed_ending / usual.sed_ending_corrected - 1.0) < 0.002 + usual.error_estimate
+    assert strict.error_estimate <= 0.002
+    assert min(strict.wall_s, strict.setup_s, strict.estimate_s) > 0.0
+    assert abs(strict.sed_ending / usual.sed_ending_corrected - 1.0) < 0.002 + usual.error_estimate

@@ -23,12 +23,12 @@ def light():
 def test_half_width_and_pressure_are_those_of_hertz(case):
     """With a/R up to 0.4 the theory is one of a half-plane under the gap of a parabola: so is the body here."""
     _, young, nu, radius, load, half_width, peak = case
-    found = contacts.hertz(young, nu, radius, load, half_width, peak)
-    assert found.load == pytest.approx(load, rel=1e-10)
-    assert found.half_width == pytest.approx(half_width, rel=1e-3)
-    assert found.touched == pytest.approx(half_width, abs=0.51 * ELEMENT["small"] * half_width)
-    assert found.peak == pytest.approx(peak, rel=1e-3)
-    assert found.worst < 2e-3
+    contact = contacts.hertz(young, nu, radius, load, half_width, peak)
+    assert contact.load == pytest.approx(load, rel=1e-10)
+    assert contact.half_width == pytest.approx(half_width, rel=1e-3)
+    assert contact.touched == pytest.approx(half_width, abs=0.51 * ELEMENT["small"] * half_width)
+    assert contact.peak == pytest.approx(peak, rel=1e-3)
+    assert contact.worst < 2e-3
 
 
 def test_a_round_body_touches_and_presses_as_hertz_says(light):
@@ -40,19 +40,19 @@ def test_a_round_body_touches_and_presses_as_hertz_says(light):
 
 def test_a_whole_cylinder_between_two_plates_approaches_them_as_in_johnson_5_57():
     """delta = P/(pi E*) [2 ln(4R/a) - 1]; a/R = 0.16, whose square is what the theory neglects."""
-    found = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
-    assert found.approach == pytest.approx(0.167860, rel=0.005)
-    assert found.load == pytest.approx(0.01, rel=1e-10)
-    assert found.half_width == pytest.approx(0.782578, rel=0.01)
-    assert found.peak == pytest.approx(0.008135, rel=0.01)
+    contact = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
+    assert contact.approach == pytest.approx(0.167860, rel=0.005)
+    assert contact.load == pytest.approx(0.01, rel=1e-10)
+    assert contact.half_width == pytest.approx(0.782578, rel=0.01)
+    assert contact.peak == pytest.approx(0.008135, rel=0.01)
 
 
 def test_pressed_to_a_third_of_its_radius_a_cylinder_differs_from_johnson_5_57_by_what_that_neglects():
-    found = contacts.whole_cylinder(0.05, 1.749897, 0.018190)
-    neglected = (1.749897 / 5.0 / 2.0) ** 2  # the next term of the circle's outline: 3 %
-    assert found.approach == pytest.approx(0.592884, rel=neglected)
-    assert found.half_width == pytest.approx(1.749897, rel=neglected)
-    assert found.peak == pytest.approx(0.018190, rel=neglected)
+    contact = contacts.whole_cylinder(0.05, 1.749897, 0.018190)
+    next_term = (1.749897 / 5.0 / 2.0) ** 2  # the next term of the circle's outline: 3 %
+    assert contact.approach == pytest.approx(0.592884, rel=next_term)
+    assert contact.half_width == pytest.approx(1.749897, rel=next_term)
+    assert contact.peak == pytest.approx(0.018190, rel=next_term)
 
 
 AXIS = np.array([0.25, 0.5, 0.786, 1.0, 1.5])
@@ -60,13 +60,13 @@ AXIS = np.array([0.25, 0.5, 0.786, 1.0, 1.5])
 
 def test_on_the_axis_the_stresses_are_those_of_hertz_and_the_largest_shear_is_below_the_surface():
     light = contacts.light(wide=300.0)
-    found = light.stress(light.press, np.stack([0 * AXIS, AXIS], axis=1))
+    stress = light.stress(light.press, np.stack([0 * AXIS, AXIS], axis=1))
     root = np.sqrt(1 + AXIS**2)
-    assert np.abs(found[:, 0, 0] + (1 + 2 * AXIS**2) / root - 2 * AXIS).max() < 0.005
-    assert np.abs(found[:, 1, 1] + 1 / root).max() < 0.005
+    assert np.abs(stress[:, 0, 0] + (1 + 2 * AXIS**2) / root - 2 * AXIS).max() < 0.005
+    assert np.abs(stress[:, 1, 1] + 1 / root).max() < 0.005
     depths = np.linspace(0.6, 1.0, 41)
-    found = light.stress(light.press, np.stack([0 * depths, depths], axis=1))
-    shear = (found[:, 0, 0] - found[:, 1, 1]) / 2
+    stress = light.stress(light.press, np.stack([0 * depths, depths], axis=1))
+    shear = (stress[:, 0, 0] - stress[:, 1, 1]) / 2
     assert shear.max() == pytest.approx(0.300, rel=0.01)
     assert np.interp(0.786, depths, shear) == pytest.approx(0.300, rel=0.01)
 
@@ -76,13 +76,13 @@ def test_below_a_sliding_cylinder_the_stresses_are_those_of_smith_and_liu(mu):
     """The surface drags the body along +x. The block is 600 half-widths wide; what that leaves out is 0.3 % of p0."""
     light = contacts.light(wide=300.0)
     table = np.array(BELOW[mu])
-    got = light.stress(light.slip(FrictionLaw(mu, np.inf), -1), table[:, :2])
-    assert np.abs(got[:, 0, 0] - table[:, 2]).max() < 0.005
-    assert np.abs(got[:, 1, 1] - table[:, 3]).max() < 0.005
-    assert np.abs(got[:, 0, 1] - table[:, 4]).max() < 0.005
-    largest = np.hypot((got[:, 0, 0] - got[:, 1, 1]) / 2, got[:, 0, 1])
-    told = np.hypot((table[:, 2] - table[:, 3]) / 2, table[:, 4])
-    assert np.abs(largest - told).max() < 0.005
+    stress = light.stress(light.slip(FrictionLaw(mu, np.inf), -1), table[:, :2])
+    assert np.abs(stress[:, 0, 0] - table[:, 2]).max() < 0.005
+    assert np.abs(stress[:, 1, 1] - table[:, 3]).max() < 0.005
+    assert np.abs(stress[:, 0, 1] - table[:, 4]).max() < 0.005
+    shear = np.hypot((stress[:, 0, 0] - stress[:, 1, 1]) / 2, stress[:, 0, 1])
+    expected = np.hypot((table[:, 2] - table[:, 3]) / 2, table[:, 4])
+    assert np.abs(shear - expected).max() < 0.005
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
@@ -92,13 +92,13 @@ def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_
     inside, outside = np.linspace(-0.9, 0.9, 7), np.array([-2.0, -1.5, -1.2, 1.2, 1.5, 2.0])
     x = np.concatenate([inside, outside])
     # Johnson 1985, sections 4.1 and 7.1: sigma_x by p0 along a surface pulled along +x, behind which it is stretched
-    closed = np.concatenate([
+    closed_form = np.concatenate([
         -np.sqrt(1.0 - inside**2) - 2.0 * mu * inside,
         -2.0 * mu * (outside - np.sign(outside) * np.sqrt(outside**2 - 1.0)),
     ])  # fmt: skip
-    got = light.stress(state, np.stack([x, 0.0 * x], axis=1))
-    np.testing.assert_allclose(got[:, 0, 0], closed, atol=0.005)
-    shear = np.hypot((got[:7, 0, 0] - got[:7, 1, 1]) / 2.0, got[:7, 0, 1])
+    stress = light.stress(state, np.stack([x, 0.0 * x], axis=1))
+    np.testing.assert_allclose(stress[:, 0, 0], closed_form, atol=0.005)
+    shear = np.hypot((stress[:7, 0, 0] - stress[:7, 1, 1]) / 2.0, stress[:7, 0, 1])
     np.testing.assert_allclose(shear, mu, atol=0.005)  # all along the contact: from 0.3 on the largest there is
 
 
@@ -106,17 +106,17 @@ def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_
 @pytest.mark.parametrize("mu", [0.01, 0.3])
 def test_partial_slip_is_that_of_cattaneo_and_mindlin(light, mu, part):
     """Stick for |x| < c = sqrt(1 - Q/(mu P)); q = mu p less mu p0 c sqrt(1 - x^2/c^2) inside."""
-    found = light.shear(mu, part)
+    state = light.shear(mu, part)
     x, c, top = light.x, np.sqrt(1 - part), mu * light.peak
-    assert -found.tangential.sum() == pytest.approx(part * mu * light.load, rel=1e-10)
-    assert light.stick_width(found, mu) == pytest.approx(c, rel=0.02)
-    traction = -found.tangential / light.length
-    closed = np.sqrt(np.clip(1 - x**2, 0, None)) - c * np.sqrt(np.clip(1 - (x / c) ** 2, 0, None))
+    assert -state.tangential.sum() == pytest.approx(part * mu * light.load, rel=1e-10)
+    assert light.stick_width(state, mu) == pytest.approx(c, rel=0.02)
+    traction = -state.tangential / light.length
+    closed_form = np.sqrt(np.clip(1 - x**2, 0, None)) - c * np.sqrt(np.clip(1 - (x / c) ** 2, 0, None))
     assert traction[len(x) // 2] == pytest.approx(top * (1 - c), rel=0.005)
     # the closed form has an upright tangent at both edges, which the elements there can only round
     element = ELEMENT["small"]
     smooth = (np.abs(x) < 1 - element) & (np.abs(np.abs(x) - c) > element)
-    assert np.abs(traction - top * closed)[smooth].max() < 0.01 * top
+    assert np.abs(traction - top * closed_form)[smooth].max() < 0.01 * top
 
 
 @pytest.mark.parametrize(("k", "force"), CAPPED)
@@ -124,12 +124,12 @@ def test_a_bound_on_a_hertz_pressure_carries_the_elementary_integral(light, k, f
     """Q/(mu P) for k = tau_max/(mu p0); the bound acts for |x| < sqrt(1 - k^2)."""
     mu = 0.3
     law = FrictionLaw(mu, k * mu * light.peak)
-    found = light.slip(law)
-    assert -found.tangential.sum() / (mu * light.load) == pytest.approx(force, rel=0.005)
-    assert light.capped_width(found, law) == pytest.approx(
+    state = light.slip(law)
+    assert -state.tangential.sum() / (mu * light.load) == pytest.approx(force, rel=0.005)
+    assert light.capped_width(state, law) == pytest.approx(
         np.sqrt(1 - k**2), rel=0.005, abs=ELEMENT["small"] if k == 1.0 else 0.0
     )
-    assert set(found.state.tolist()) <= {OPEN, SLIP, SHEAR_LIMITED}
+    assert set(state.state.tolist()) <= {OPEN, SLIP, SHEAR_LIMITED}
 
 
 def test_every_published_problem_of_the_page_is_met():

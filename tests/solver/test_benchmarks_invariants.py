@@ -26,12 +26,12 @@ def finger():
 
 
 @pytest.fixture(scope="module")
-def ways(finger):
+def histories(finger):
     loadings = {1: Loading(1.5, "+x"), -1: Loading(1.5, "-x")}
-    return {(law, way): course(finger, LAWS[law], loadings[way]) for law, way in WAYS}
+    return {(law, way): march_instants(finger, LAWS[law], loadings[way]) for law, way in WAYS}
 
 
-def course(finger, law, loading):
+def march_instants(finger, law, loading):
     bound = None if np.isinf(law.tau_max) else law.tau_max
     return march(replace(finger.scene, friction=Friction(law.mu, bound), loading=loading), finger).instants
 
@@ -46,8 +46,8 @@ def bone_force(finger, contact: EquilibriumState):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, ways, way):
-    for instant in ways[way][1:]:
+def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, histories, way):
+    for instant in histories[way][1:]:
         contact = instant.state
         bone, total = bone_force(finger, contact), contact.normal.sum()
         assert abs(bone[0] + contact.tangential.sum()) < 1e-11 * total
@@ -55,9 +55,9 @@ def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, ways, way
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_law(finger, ways, way):
+def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_law(finger, histories, way):
     law, length = LAWS[way[0]], finger.body.condensed.fixed_length
-    for instant in ways[way][1:]:
+    for instant in histories[way][1:]:
         contact = instant.state
         push = contact.normal.max()
         assert contact.place(finger.body.condensed)[:, 1].min() - instant.depth > -1e-9 * instant.depth
@@ -66,8 +66,8 @@ def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_in_steady_sliding_the_drag_is_the_law_s(finger, ways, way):
-    law, contact = LAWS[way[0]], ways[way][-1].state
+def test_in_steady_sliding_the_drag_is_the_law_s(finger, histories, way):
+    law, contact = LAWS[way[0]], histories[way][-1].state
     assert set(contact.state[contact.touching].tolist()) <= {SLIP, SHEAR_LIMITED}
     drag, force = -way[1] * contact.tangential.sum(), contact.normal.sum()
     if law.tau_max == np.inf:
@@ -80,71 +80,72 @@ def test_in_steady_sliding_the_drag_is_the_law_s(finger, ways, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(ways, way):
-    """Trapezoidal work of each step; gaps that close within a step are the rest, told as its own part."""
-    instants = ways[way]
-    stored, scale = 0.0, None
+def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(histories, way):
+    """Trapezoidal work of each step; the rest closes gaps within a step, and is computed by itself."""
+    instants = histories[way]
+    energy_before, scale = 0.0, None
     for before, after in pairwise(instants):
-        one, other = before.state, after.state
-        normal, along = (one.normal + other.normal) / 2, (one.tangential + other.tangential) / 2
-        bone = normal.sum() * (after.depth - before.depth) - along.sum() * (after.travel - before.travel)
-        moved = other.u - one.u - [before.travel - after.travel, after.depth - before.depth]  # over the surface
-        now = 0.5 * np.sum(other.reaction * other.u)
-        rubbed, closed = -along @ moved[:, 0], -normal @ moved[:, 1]
-        scale = max(now, scale or 0.0)
-        assert abs(bone - (now - stored) - rubbed - closed) < 1e-12 * scale
-        assert rubbed > -1e-12 * scale
-        stored = now
+        old, new = before.state, after.state
+        push, drag = ((old.normal + new.normal) / 2, (old.tangential + new.tangential) / 2)
+        bone_work = push.sum() * (after.depth - before.depth) - drag.sum() * (after.travel - before.travel)
+        slip = new.u - old.u - [before.travel - after.travel, after.depth - before.depth]  # over the surface
+        energy = 0.5 * np.sum(new.reaction * new.u)
+        friction_work, gap_work = -drag @ slip[:, 0], -push @ slip[:, 1]
+        scale = max(energy, scale or 0.0)
+        assert abs(bone_work - (energy - energy_before) - friction_work - gap_work) < 1e-12 * scale
+        assert friction_work > -1e-12 * scale
+        energy_before = energy
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_in_steady_sliding_all_the_bone_s_work_is_the_drag_s(ways, way):
+def test_in_steady_sliding_all_the_bone_s_work_is_the_drag_s(histories, way):
     """Dissipation rate = T V: over the last step nothing more is stored."""
-    before, after = ways[way][-2:]
+    before, after = histories[way][-2:]
     distance = after.travel - before.travel
-    rubbed = -after.state.tangential @ (after.state.u - before.state.u + distance)[:, 0]
-    assert rubbed == pytest.approx(-after.state.tangential.sum() * distance, rel=1e-10)
+    friction_work = -after.state.tangential @ (after.state.u - before.state.u + distance)[:, 0]
+    assert friction_work == pytest.approx(-after.state.tangential.sum() * distance, rel=1e-10)
 
 
 def test_speed_only_rescales_time(finger):
-    slow, fast = (course(finger, LAWS["bound"], Loading(1.5, "+x", speed)) for speed in (1.0, 40.0))
-    for one, other in zip(slow, fast, strict=True):
-        assert one.travel == other.travel
-        assert np.array_equal(one.state.normal, other.state.normal)
-        assert (one.time - 1.0) == pytest.approx(40.0 * (other.time - 1.0), rel=1e-9) or one.time <= 1.0
+    courses = (march_instants(finger, LAWS["bound"], Loading(1.5, "+x", speed)) for speed in (1.0, 40.0))
+    for slow, fast in zip(*courses, strict=True):
+        assert slow.travel == fast.travel
+        assert np.array_equal(slow.state.normal, fast.state.normal)
+        assert (slow.time - 1.0) == pytest.approx(40.0 * (fast.time - 1.0), rel=1e-9) or slow.time <= 1.0
 
 
 def test_without_friction_either_way_is_the_static_answer(finger):
-    there, back = (solve_full_slip(finger.newton, LoadState(1.5, 0.0, sense=way)) for way in (-1, 1))
-    assert np.array_equal(there.normal, back.normal)
-    static = course(finger, FrictionLaw(0.0, np.inf), Loading(1.5, "none"))[-1].state
-    assert np.abs(static.normal - there.normal).max() < 1e-13 * there.normal.max()
+    forwards, backwards = (solve_full_slip(finger.newton, LoadState(1.5, 0.0, sense=way)) for way in (-1, 1))
+    assert np.array_equal(forwards.normal, backwards.normal)
+    static = march_instants(finger, FrictionLaw(0.0, np.inf), Loading(1.5, "none"))[-1].state
+    assert np.abs(static.normal - forwards.normal).max() < 1e-13 * forwards.normal.max()
 
 
 @pytest.mark.parametrize("factor", [1e-3, 7.0, 1e6])
 def test_stiffer_everything_scales_forces_and_energy_and_moves_nothing(finger, factor):
-    m = Materials()
-    stiff = Materials(*(Material(factor * t.E, t.nu) for t in (m.epidermis, m.dermis, m.fat, m.bone)))
-    asked = Scene(friction=Friction(0.0), loading=Loading(1.5), materials=stiff)
-    other = LinearFinger.of(asked, Sizing(8, 1.5))
+    soft = Materials()
+    materials = Materials(*(Material(factor * t.E, t.nu) for t in (soft.epidermis, soft.dermis, soft.fat, soft.bone)))
+    stiff_scene = Scene(friction=Friction(0.0), loading=Loading(1.5), materials=materials)
+    stiff_finger = LinearFinger.of(stiff_scene, Sizing(8, 1.5))
     load = load_of(LAWS["bound"])._replace(depth=1.5, sense=-1)
-    one, two = solve_full_slip(finger.newton, load), solve_full_slip(other.newton, load._replace(tau=factor * load.tau))
-    assert np.array_equal(one.state, two.state)
-    assert np.abs(two.normal / factor - one.normal).max() < 1e-11 * one.normal.max()
-    moved, same = finger.displacement(one), other.displacement(two)
-    assert np.abs(moved - same).max() < 1e-11
-    assert other.sed_ending(same) == pytest.approx(factor * finger.sed_ending(moved), rel=1e-10)
+    state = solve_full_slip(finger.newton, load)
+    stiff_state = solve_full_slip(stiff_finger.newton, load._replace(tau=factor * load.tau))
+    assert np.array_equal(state.state, stiff_state.state)
+    assert np.abs(stiff_state.normal / factor - state.normal).max() < 1e-11 * state.normal.max()
+    u, stiff_u = finger.displacement(state), stiff_finger.displacement(stiff_state)
+    assert np.abs(u - stiff_u).max() < 1e-11
+    assert stiff_finger.sed_ending(stiff_u) == pytest.approx(factor * finger.sed_ending(u), rel=1e-10)
 
 
 @pytest.mark.parametrize("surface", [STICKINESS[0], STICKINESS[4], SLIPPERINESS[4]])
 def test_three_meshes_come_closer_and_closer_to_one_answer(surface):
     """Each mesh has elements half as long; the last two differ by less than a third of a percent."""
-    asked = scene(surface)
+    published_scene = scene(surface)
     seds = []
     for fineness in (6, 12, 24):
-        model = LinearFinger.of(asked, Sizing(fineness, asked.loading.indentation))
-        contact = solve_full_slip(model.newton, sliding_load(asked))
-        seds.append(model.sed_ending(model.displacement(contact)))
+        finger = LinearFinger.of(published_scene, Sizing(fineness, published_scene.loading.indentation))
+        contact = solve_full_slip(finger.newton, sliding_load(published_scene))
+        seds.append(finger.sed_ending(finger.displacement(contact)))
     first, last = abs(seds[1] - seds[0]), abs(seds[2] - seds[1])
     assert last < 0.003 * seds[2]
     assert last < 0.5 * first

@@ -24,10 +24,10 @@ def test_even_two_elements_across_the_wall_of_a_cylinder_do_not_lock(nu):
 @pytest.mark.parametrize("case", COOK, ids=lambda case: case[0])
 def test_cook_s_membrane_rises_by_what_others_found(case):
     _, _, young, nu, force, middle, corner = case
-    risen, at_corner = cook(young, nu, force, 32)
-    assert risen == pytest.approx(middle, rel=0.002)
+    middle_rise, corner_rise = cook(young, nu, force, 32)
+    assert middle_rise == pytest.approx(middle, rel=0.002)
     if corner is not None:
-        assert at_corner == pytest.approx(corner, rel=0.002)
+        assert corner_rise == pytest.approx(corner, rel=0.002)
 
 
 def test_even_four_elements_along_cook_s_membrane_do_not_lock():

@@ -12,13 +12,13 @@ from solver._kernels import compiling
 CODE = "import solver._kernels.compiling, os; print(os.environ['NUMBA_CACHE_DIR'])"
 
 
-def used(folder, umask=-1):
+def cache_folder_of(folder, umask=-1):
     """Return the folder that a process with a `umask` uses whose environment names `folder`."""
-    told = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
-    done = subprocess.run(
-        [sys.executable, "-c", CODE], env=told, capture_output=True, text=True, check=True, umask=umask
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+    process = subprocess.run(
+        [sys.executable, "-c", CODE], env=environment, capture_output=True, text=True, check=True, umask=umask
     )
-    return Path(done.stdout.strip())
+    return Path(process.stdout.strip())
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owners here")
@@ -27,13 +27,13 @@ def test_machine_code_in_a_folder_that_others_may_write_is_not_loaded(tmp_path, 
     folder = tmp_path / "shared"
     folder.mkdir()
     folder.chmod(mode)
-    assert folder not in used(folder).parents
+    assert folder not in cache_folder_of(folder).parents
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owners here")
 def test_machine_code_is_kept_where_new_folders_are_open_to_the_users_group(tmp_path):
     folder = tmp_path / "caches" / "new"
-    assert used(folder, 0o002).parent == folder
+    assert cache_folder_of(folder, 0o002).parent == folder
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the user's caches lie elsewhere here")
@@ -52,7 +52,7 @@ def test_the_users_own_cache_that_is_open_to_a_group_is_closed_and_used(tmp_path
 def test_machine_code_in_a_folder_of_ones_own_is_kept_there(tmp_path):
     folder = tmp_path / "mine"
     folder.mkdir(mode=0o700)
-    assert used(folder).parent == folder
+    assert cache_folder_of(folder).parent == folder
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root can give files away")
@@ -60,4 +60,4 @@ def test_machine_code_in_a_folder_of_somebody_else_is_not_loaded(tmp_path):
     folder = tmp_path / "theirs"
     folder.mkdir(mode=0o700)
     os.chown(folder, 12345, 12345)
-    assert folder not in used(folder).parents
+    assert folder not in cache_folder_of(folder).parents

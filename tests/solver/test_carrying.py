@@ -10,7 +10,7 @@ from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
 
-PULL = LoadState(1.0, 0.28, 0.008033, -1)
+LOAD = LoadState(1.0, 0.28, 0.008033, -1)
 
 
 def places(fineness):
@@ -21,21 +21,21 @@ def places(fineness):
 
 def test_a_mesh_carries_a_state_to_itself_unchanged():
     newton, _, _ = finger(5)
-    shape = solve_full_slip(newton, PULL)
-    same = MeshTransfer.of(places(5), places(5)).transfer_state(shape)
-    np.testing.assert_allclose(same.u, shape.u, atol=1e-13)
-    np.testing.assert_array_equal(same.touching, shape.touching)
-    np.testing.assert_allclose(same.pressure, shape.pressure, atol=1e-7)
+    state = solve_full_slip(newton, LOAD)
+    transferred_state = MeshTransfer.of(places(5), places(5)).transfer_state(state)
+    np.testing.assert_allclose(transferred_state.u, state.u, atol=1e-13)
+    np.testing.assert_array_equal(transferred_state.touching, state.touching)
+    np.testing.assert_allclose(transferred_state.pressure, state.pressure, atol=1e-7)
 
 
 def test_a_linear_pressure_and_a_displacement_of_the_whole_are_the_same_on_another_mesh():
     old, new = places(5), places(8)
     pressures = [
-        np.einsum("eq,eqm,eq->em", one.body.elements.weight, one.body.elements.modes, 1.0 + one.points @ [2.0, -3.0])
-        for one in (old, new)
+        np.einsum("eq,eqm,eq->em", mesh.body.elements.weight, mesh.body.elements.modes, 1.0 + mesh.points @ [2.0, -3.0])
+        for mesh in (old, new)
     ]
-    everywhere = np.tile([0.3, -0.2], (len(old.body.mesh.nodes), 1))
-    u, pressure = MeshTransfer.of(old, new).fields(everywhere, pressures[0])
+    uniform_shift = np.tile([0.3, -0.2], (len(old.body.mesh.nodes), 1))
+    u, pressure = MeshTransfer.of(old, new).fields(uniform_shift, pressures[0])
     np.testing.assert_allclose(pressure, pressures[1], rtol=1e-10, atol=1e-12)
     held = new.body.mesh.driven
     np.testing.assert_allclose(u, np.where(held, 0.0, [0.3, -0.2]), rtol=1e-13)
@@ -45,7 +45,7 @@ def test_a_linear_pressure_and_a_displacement_of_the_whole_are_the_same_on_anoth
 def test_a_carried_state_is_a_few_iterations_from_the_finer_meshs_own(fineness):
     coarse, _, _ = finger(5)
     fine, _, _ = finger(fineness)
-    start = MeshTransfer.of(places(5), places(fineness)).transfer_state(solve_full_slip(coarse, PULL))
-    found, direct = solve_full_slip(fine, PULL, start), solve_full_slip(fine, PULL)
-    assert found.iterations - start.iterations <= 5
-    np.testing.assert_allclose(found.u, direct.u, atol=1e-9)
+    start = MeshTransfer.of(places(5), places(fineness)).transfer_state(solve_full_slip(coarse, LOAD))
+    transferred, direct = solve_full_slip(fine, LOAD, start), solve_full_slip(fine, LOAD)
+    assert transferred.iterations - start.iterations <= 5
+    np.testing.assert_allclose(transferred.u, direct.u, atol=1e-9)

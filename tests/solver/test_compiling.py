@@ -1,4 +1,4 @@
-"""Loops are compiled once on a machine, whoever comes first, and Ctrl-C is heard meanwhile."""
+"""Loops are compiled once on a machine, whoever comes first, and Ctrl-C stops a compilation."""
 
 import json
 import os
@@ -31,23 +31,23 @@ COMPILED = "compiling tributary, loop number 1, once on this machine"
 LENGTHS = "0.5 2.0 0.5"  # Simpson's rule
 
 
-def started(folder):
+def start_process(folder):
     return subprocess.Popen(
         [sys.executable, "-c", SCRIPT], env=os.environ | {"NUMBA_CACHE_DIR": str(folder)}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 
 
-def said(process):
+def read_lines(process):
     return process.communicate(timeout=300)[0].splitlines()
 
 
 def test_processes_that_start_together_compile_a_loop_and_those_after_them_find_it(tmp_path):
-    first = [started(tmp_path) for _ in range(2)]
-    for lines in [said(process) for process in first]:
+    processes = [start_process(tmp_path) for _ in range(2)]
+    for lines in [read_lines(process) for process in processes]:
         assert lines[-1] == LENGTHS
         assert lines[0] in (COMPILED, LENGTHS)
-    assert said(started(tmp_path)) == [LENGTHS]
+    assert read_lines(start_process(tmp_path)) == [LENGTHS]
 
 
 @pytest.mark.slow
@@ -59,16 +59,16 @@ def test_the_process_that_compiles_the_loops_gives_the_bits_of_those_that_find_t
         encoding="utf-8",
     )
 
-    def solved():
+    def solve_in_process():
         command = [sys.executable, "-m", "daq_app", "solve", "--json", str(scene)]
-        one = subprocess.run(
+        process = subprocess.run(
             command, env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True
         )
-        numbers = json.loads(one.stdout)
+        numbers = json.loads(process.stdout)
         durations = [name for name in numbers if name.endswith("_s")]
-        return "once on this machine" in one.stderr, {k: v for k, v in numbers.items() if k not in durations}
+        return "once on this machine" in process.stderr, {k: v for k, v in numbers.items() if k not in durations}
 
-    (compiling_it, first), (compiling_again, second) = solved(), solved()
+    (compiling_it, first), (compiling_again, second) = solve_in_process(), solve_in_process()
     assert (compiling_it, compiling_again) == (True, False)
     assert first == second
 
@@ -78,13 +78,13 @@ def test_code_of_other_sources_is_not_taken(tmp_path, monkeypatch):
     monkeypatch.setattr(compiling, "_FOLDER", tmp_path)
     loop = tmp_path / "loop.py"
     loop.write_text("one", encoding="utf-8")
-    one = compiling._cache_folder()
+    first_folder = compiling._cache_folder()
     loop.write_text("two", encoding="utf-8")
-    two = compiling._cache_folder()
-    assert one.parent == two.parent == tmp_path
-    assert one != two
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(two))  # a process that this one started
-    assert compiling._cache_folder() == two
+    second_folder = compiling._cache_folder()
+    assert first_folder.parent == second_folder.parent == tmp_path
+    assert first_folder != second_folder
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(second_folder))  # a process that this one started
+    assert compiling._cache_folder() == second_folder
 
 
 def test_code_lies_beside_the_sources_only_where_nobody_else_may_write(tmp_path, monkeypatch):
@@ -98,7 +98,7 @@ def test_code_lies_beside_the_sources_only_where_nobody_else_may_write(tmp_path,
 
 @pytest.fixture
 def ctrl_c():
-    """Let this process hear Ctrl-C: one begun in the background by a shell was told not to."""
+    """Let Ctrl-C reach this process, which a shell that starts it in the background prevents."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield lambda: os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -107,15 +107,15 @@ def ctrl_c():
 
 def test_ctrl_c_that_is_lost_in_llvm_stops_when_the_loop_is_compiled(ctrl_c):
     watch, event = _kernels._Compilation(), SimpleNamespace(data={"dispatcher": skin_loops.tributary})
-    heard = []
-    with listening(lambda doing, _: heard.append(doing)):
+    messages = []
+    with listening(lambda doing, _: messages.append(doing)):
         report_progress("solving")
         watch.on_start(event)
         with pytest.raises(KeyboardInterrupt):  # which LLVM would print and lose
             ctrl_c()
         with pytest.raises(KeyboardInterrupt):
             watch.on_end(event)
-    assert heard == ["solving", COMPILED, "solving"]
+    assert messages == ["solving", COMPILED, "solving"]
 
 
 def test_ctrl_c_ends_a_first_compilation(tmp_path):
@@ -129,9 +129,9 @@ def test_ctrl_c_ends_a_first_compilation(tmp_path):
         [sys.executable, "-c", program, "solve", str(scene)], env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
-    said = b""
-    while b"Compiling the loops" not in said:
-        said += process.stderr.read1()
+    stderr = b""
+    while b"Compiling the loops" not in stderr:
+        stderr += process.stderr.read1()
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)  # one loop's time on a busy machine
     assert process.returncode == 130

@@ -41,12 +41,12 @@ def start_state(body, half_width=0.7):
 
 
 def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(pressed):
-    body, found = pressed
+    body, state = pressed
     x = body.mesh.nodes[body.mesh.skin, 0]
-    assert found.normal.sum() == pytest.approx(0.01, rel=1e-12)
-    touching = x[found.touching]
+    assert state.normal.sum() == pytest.approx(0.01, rel=1e-12)
+    touching = x[state.touching]
     assert np.ptp(touching) / 2 == pytest.approx(0.782578, abs=0.031)  # half an element
-    pressure = found.normal / body.condensed.fixed_length
+    pressure = state.normal / body.condensed.fixed_length
     inside = np.abs(x) < 0.7
     hertz = 0.008135 * np.sqrt(1 - (x[inside] / 0.782578) ** 2)
     assert np.abs(pressure[inside] - hertz).max() < 0.02 * 0.008135
@@ -59,39 +59,39 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
     body, frictionless = pressed
     mu = 0.02  # so small that the drag does not move the pressure
     load = LoadState(0.0, mu, k * mu * 0.008135, -1)
-    found = slide_from_guess(Newton(body.condensed), load, frictionless.state, 0.01)
+    state = slide_from_guess(Newton(body.condensed), load, frictionless.state, 0.01)
     exact = {0.8: 0.895912, 0.6: 0.715243, 0.4: 0.495368}[k]
-    assert -found.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
+    assert -state.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
     x = body.mesh.nodes[body.mesh.skin, 0]
-    capped = x[found.state == SHEAR_LIMITED]
-    assert np.ptp(capped) / 2 == pytest.approx(0.782578 * np.sqrt(1 - k**2), abs=0.035)
+    bounded = x[state.state == SHEAR_LIMITED]
+    assert np.ptp(bounded) / 2 == pytest.approx(0.782578 * np.sqrt(1 - k**2), abs=0.035)
 
 
 @pytest.mark.parametrize("tau_max", [np.inf, 1e-4, 0.0])
 def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(pressed, tau_max):
     newton, load = Newton(pressed[0].condensed), LoadState(0.01, 0.4, tau_max, -1)
-    far = np.where(pressed[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
-    short, long = solve_full_slip(newton, load), slide_from_guess(newton, load, far)
-    assert np.array_equal(short.state, long.state)
-    assert (short.state == SHEAR_LIMITED).any() == (tau_max < np.inf)
+    guess = np.where(pressed[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
+    direct, stepwise = solve_full_slip(newton, load), slide_from_guess(newton, load, guess)
+    assert np.array_equal(direct.state, stepwise.state)
+    assert (direct.state == SHEAR_LIMITED).any() == (tau_max < np.inf)
     for name in ("normal", "tangential", "u"):
-        mine, other = getattr(short, name), getattr(long, name)
-        np.testing.assert_allclose(mine, other, rtol=0.0, atol=1e-12 * np.abs(other).max() + 1e-300)
+        numbers, expected = getattr(direct, name), getattr(stepwise, name)
+        np.testing.assert_allclose(numbers, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max() + 1e-300)
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.4])
 def test_what_slides_without_a_bound_drags_by_mu_times_the_normal_force(mu):
     body = cylinder(4.5, 0.2)
-    found = solve_full_slip(Newton(body.condensed), LoadState(0.1, mu, sense=-1))
-    assert -found.tangential.sum() / found.normal.sum() == pytest.approx(mu, rel=1e-13)
+    state = solve_full_slip(Newton(body.condensed), LoadState(0.1, mu, sense=-1))
+    assert -state.tangential.sum() / state.normal.sum() == pytest.approx(mu, rel=1e-13)
 
 
 def test_sliding_the_other_way_mirrors_the_forces_of_a_mirrored_body():
     body = cylinder(4.5, 0.2)
-    one = solve_full_slip(Newton(body.condensed), LoadState(0.1, 0.3, sense=-1))
-    other = solve_full_slip(Newton(body.condensed), LoadState(0.1, 0.3, sense=1))
-    assert np.allclose(one.normal, other.normal[::-1], atol=1e-15)
-    assert np.allclose(one.tangential, -other.tangential[::-1], atol=1e-15)
+    forwards = solve_full_slip(Newton(body.condensed), LoadState(0.1, 0.3, sense=-1))
+    backwards = solve_full_slip(Newton(body.condensed), LoadState(0.1, 0.3, sense=1))
+    assert np.allclose(forwards.normal, backwards.normal[::-1], atol=1e-15)
+    assert np.allclose(forwards.tangential, -backwards.tangential[::-1], atol=1e-15)
 
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
@@ -106,18 +106,19 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
     p0 = 2 * load / (np.pi * a)
     body = cylinder(4.5, 0.02, nu, zone=0.3)
     newton = Newton(body.condensed)
-    now = slide_from_guess(newton, LoadState(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
+    state = slide_from_guess(newton, LoadState(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
     # all that touches sticks where it is; then the drive moves along until the drag is the part asked for
-    now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int32), load=LoadState(now.load.depth, mu))
+    sticking = np.where(state.touching, STICK, OPEN).astype(np.int32)
+    state = replace(state, state=sticking, load=LoadState(state.load.depth, mu))
     travel = 0.0
-    while -now.force[0] < part * mu * load:
+    while -state.force[0] < part * mu * load:
         travel -= 2e-6
-        now = solve_under_forces(newton, now, ForceLoad(load, None, travel))
-    reached = -now.tangential.sum() / (mu * load)
+        state = solve_under_forces(newton, state, ForceLoad(load, None, travel))
+    drag_ratio = -state.tangential.sum() / (mu * load)
     x = body.mesh.nodes[body.mesh.skin, 0]
-    assert np.ptp(x[now.state == STICK]) / 2 == pytest.approx(a * np.sqrt(1 - reached), abs=0.02)
-    traction = -(now.tangential / body.condensed.fixed_length)[np.abs(x) < 0.03].mean()
-    assert traction == pytest.approx(mu * p0 * (1 - np.sqrt(1 - reached)), rel=0.02)
+    assert np.ptp(x[state.state == STICK]) / 2 == pytest.approx(a * np.sqrt(1 - drag_ratio), abs=0.02)
+    traction = -(state.tangential / body.condensed.fixed_length)[np.abs(x) < 0.03].mean()
+    assert traction == pytest.approx(mu * p0 * (1 - np.sqrt(1 - drag_ratio)), rel=0.02)
 
 
 def test_a_tyre_that_cannot_slide_is_reported_lost():

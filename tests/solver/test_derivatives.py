@@ -13,9 +13,9 @@ from solver.body.finite import FiniteBody, FinitePatches
 from solver.constitutive import NeoHooke, Ogden
 from solver.constitutive import shape as grown
 from solver.continuation.small_states import settled_state
-from solver.equilibrium import LoadState, Newton, load_stepping
-from solver.equilibrium import load_stepping as sliding
+from solver.equilibrium import ForceLoad, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
+from solver.equilibrium.load_stepping import solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
 from solver.response.nearby import of_skin, of_slide, slope
@@ -28,7 +28,7 @@ def scene(mu, tau_max, loading, kinematics="small"):
     return Scene(friction=Friction(mu, tau_max), loading=loading, solve=Solve(kinematics))
 
 
-def moved(scene, name, by):
+def vary(scene, name, by):
     """Return the scene with one parameter changed by so much; "press" is the depth, or the force where that drives."""
     friction, loading = scene.friction, scene.loading
     if name == "press" and loading.normal_force is None:
@@ -38,24 +38,24 @@ def moved(scene, name, by):
     return replace(scene, friction=replace(friction, **{name: getattr(friction, name) + by}))
 
 
-def told(found):
+def derivative_table(slopes):
     """Return derivatives as a table: SED, normal force, drag, depth, then each quantity, by mu, tau_max and press."""
-    rows = (found.sed, found.normal, found.tangential, found.indentation, *found.responses.values())
-    return np.array([[one for one in by if one is not None] for by in rows])
+    rows = (slopes.sed, slopes.normal, slopes.tangential, slopes.indentation, *slopes.responses.values())
+    return np.array([[number for number in row if number is not None] for row in rows])
 
 
 def differences(numbers, scene, steps):
     """Return the same table from central differences of solves; `numbers` gives its rows' numbers of a scene."""
     none = np.zeros(4 + len(QUANTITIES))
-    columns = [(numbers(moved(scene, n, h)) - numbers(moved(scene, n, -h))) / (2 * h) if h else none
+    columns = [(numbers(vary(scene, n, h)) - numbers(vary(scene, n, -h))) / (2 * h) if h else none
                for n, h in zip(NAMES, steps, strict=True)]  # fmt: skip
     return np.stack(columns, axis=1)
 
 
-def assert_alike(found, expected, scale):
+def assert_tables_agree(table, expected, scale):
     """Assert that tables agree to 1e-6 of each entry; `scale` are the numbers, to whose round-off 0 is known."""
-    for row, other, number in zip(found, expected, scale, strict=True):
-        np.testing.assert_allclose(row, other, rtol=1e-6, atol=1e-8 * abs(number))
+    for row, expected_row, number in zip(table, expected, scale, strict=True):
+        np.testing.assert_allclose(row, expected_row, rtol=1e-6, atol=1e-8 * abs(number))
 
 
 # Small strain
@@ -86,32 +86,33 @@ SMALL = {
 
 @pytest.mark.parametrize("name", SMALL)
 def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_states(small, name):
-    here = SMALL[name]
-    contact = settled_state(here, small)
+    slide = SMALL[name]
+    contact = settled_state(slide, small)
     assert ("at the bound" in name) == (contact.state == SHEAR_LIMITED).any()
 
-    def numbers(one):
-        return small_numbers(small, one, contact.state)
+    def numbers(changed_scene):
+        return small_numbers(small, changed_scene, contact.state)
 
-    steps = (2e-5, 2e-7 if here.friction.tau_max else 0.0, 2e-5)
-    assert_alike(told(of_slide(small, here, contact)), differences(numbers, here, steps), numbers(here))
+    steps = (2e-5, 2e-7 if slide.friction.tau_max else 0.0, 2e-5)
+    table = derivative_table(of_slide(small, slide, contact))
+    assert_tables_agree(table, differences(numbers, slide, steps), numbers(slide))
 
 
 def test_between_changes_of_state_forces_are_straight_in_the_depth_and_the_sed_a_parabola(small):
     # Closed form: a slope of a straight line and of a parabola are those of their chords, however long.
-    here = SMALL["beside its limit"]
-    contact = settled_state(here, small)
-    found = of_slide(small, here, contact)
-    wide = [small_numbers(small, moved(here, "press", by), contact.state) for by in (-5e-3, 5e-3)]
-    assert (wide[1] - wide[0])[:3] / 1e-2 == pytest.approx(told(found)[:3, 2], rel=1e-9)
+    slide = SMALL["beside its limit"]
+    contact = settled_state(slide, small)
+    derivatives = of_slide(small, slide, contact)
+    chord_ends = [small_numbers(small, vary(slide, "press", by), contact.state) for by in (-5e-3, 5e-3)]
+    assert (chord_ends[1] - chord_ends[0])[:3] / 1e-2 == pytest.approx(derivative_table(derivatives)[:3, 2], rel=1e-9)
 
 
 def test_a_given_force_drags_with_mu_times_it(small):
-    here = SMALL["under a force"]
-    found = of_slide(small, here, settled_state(here, small))
-    assert found.tangential.mu == pytest.approx(0.12, rel=1e-12)
-    assert found.tangential.normal_force == pytest.approx(0.4, rel=1e-12)
-    assert found.normal == (0.0, 0.0, None, 1.0)
+    slide = SMALL["under a force"]
+    derivatives = of_slide(small, slide, settled_state(slide, small))
+    assert derivatives.tangential.mu == pytest.approx(0.12, rel=1e-12)
+    assert derivatives.tangential.normal_force == pytest.approx(0.4, rel=1e-12)
+    assert derivatives.normal == (0.0, 0.0, None, 1.0)
 
 
 def springs(coupling):
@@ -125,47 +126,47 @@ def test_one_point_on_springs_answers_as_its_formula_says():
     """N = d / (3 + s mu b), and at the bound N = (d - s b tau L) / 3, with s = -1 for a slide along +x."""
     d, b, mu, tau, length = 0.6, 0.8, 0.5, 0.04, 0.7
     newton, load = springs(b), LoadState(d, mu, sense=-1)
-    along, up = newton.follows(of_skin(newton, sliding.solve_full_slip(newton, load)))
+    along, up = newton.follows(of_skin(newton, solve_full_slip(newton, load)))
     soft = 3.0 - mu * b
     assert up == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
     assert along == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
-    capped = sliding.solve_full_slip(newton, load._replace(tau=tau))
-    assert capped.state.tolist() == [SHEAR_LIMITED, OPEN]
-    along, up = newton.follows(of_skin(newton, capped))
+    bounded = solve_full_slip(newton, load._replace(tau=tau))
+    assert bounded.state.tolist() == [SHEAR_LIMITED, OPEN]
+    along, up = newton.follows(of_skin(newton, bounded))
     assert up == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
     assert along == pytest.approx([0.0, -length, 0.0], rel=1e-13)
 
 
 def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
     # A depth at which one more point comes to touch, found by halving.
-    here = SMALL["without a bound"]
+    slide = SMALL["without a bound"]
 
-    def at(depth):
-        return settled_state(moved(here, "press", depth - 1.2), small)
+    def solve_at(depth):
+        return settled_state(vary(slide, "press", depth - 1.2), small)
 
     low, high = 1.2, 1.3
-    assert at(low).touching.sum() < at(high).touching.sum()
+    assert solve_at(low).touching.sum() < solve_at(high).touching.sum()
     while high - low > 1e-11:
         middle = (low + high) / 2.0
-        low, high = (middle, high) if at(middle).touching.sum() == at(1.2).touching.sum() else (low, middle)
+        low, high = (middle, high) if solve_at(middle).touching.sum() == solve_at(1.2).touching.sum() else (low, middle)
     slopes = []
     for side, depth in ((-1.0, low), (1.0, high)):
-        far, near = (small.numbers([at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
-        begun, ended = (
-            of_slide(small, moved(here, "press", one - 1.2), at(one)).sed.indentation
-            for one in (depth, depth + side * 1e-3)
+        far, near = (small.numbers([solve_at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
+        slope, far_slope = (
+            of_slide(small, vary(slide, "press", touch_depth - 1.2), solve_at(touch_depth)).sed.indentation
+            for touch_depth in (depth, depth + side * 1e-3)
         )
-        assert side * (far - near) / 1e-3 == pytest.approx((begun + ended) / 2.0, rel=1e-6)  # a parabola's chord
-        slopes.append(begun)
+        assert side * (far - near) / 1e-3 == pytest.approx((slope + far_slope) / 2.0, rel=1e-6)  # a parabola's chord
+        slopes.append(slope)
     assert abs(slopes[1] / slopes[0] - 1.0) > 1e-4
-    assert small.numbers([at(low)])[0, 0] == pytest.approx(small.numbers([at(high)])[0, 0], rel=1e-9)
+    assert small.numbers([solve_at(low)])[0, 0] == pytest.approx(small.numbers([solve_at(high)])[0, 0], rel=1e-9)
 
 
 def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
     contact = settled_state(SMALL["without a bound"], small)
-    stuck = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
+    sticking_state = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
     with pytest.raises(ValueError, match="depends on the way"):
-        of_slide(small, SMALL["without a bound"], stuck)
+        of_slide(small, SMALL["without a bound"], sticking_state)
 
 
 # Finite strain
@@ -182,19 +183,17 @@ def load_of(scene, depth):
 
 def slip(finger, scene, start=None):
     depth = scene.loading.indentation or 0.6
-    shape = sliding.solve_full_slip(finger.newton, load_of(scene, depth), start, 1e-12)
+    state = solve_full_slip(finger.newton, load_of(scene, depth), start, 1e-12)
     if scene.normal_force is None:
-        return shape
-    return load_stepping.solve_under_forces(
-        finger.newton, shape, load_stepping.ForceLoad(scene.normal_force, None), 1e-12
-    )
+        return state
+    return solve_under_forces(finger.newton, state, ForceLoad(scene.normal_force, None), 1e-12)
 
 
-def finite_numbers(finger, scene, here):
-    shape = slip(finger, scene, replace(here, load=load_of(scene, here.load.depth)))
-    assert (shape.state == here.state).all()
-    sed, normal, tangential, *rest = finger.all_numbers([shape])[0]
-    return np.array([sed, normal, -scene.loading.direction * tangential, shape.load.depth, *rest[-len(QUANTITIES) :]])
+def finite_numbers(finger, scene, start):
+    state = slip(finger, scene, replace(start, load=load_of(scene, start.load.depth)))
+    assert (state.state == start.state).all()
+    sed, normal, tangential, *rest = finger.all_numbers([state])[0]
+    return np.array([sed, normal, -scene.loading.direction * tangential, state.load.depth, *rest[-len(QUANTITIES) :]])
 
 
 FINITE = {
@@ -206,16 +205,16 @@ FINITE = {
 
 @pytest.mark.parametrize("name", FINITE)
 def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_states(finite, name):
-    here = FINITE[name]
-    shape = slip(finite, here)
-    assert ("at the bound" in name) == (shape.state == SHEAR_LIMITED).any()
+    slide = FINITE[name]
+    state = slip(finite, slide)
+    assert ("at the bound" in name) == (state.state == SHEAR_LIMITED).any()
 
-    def numbers(one):
-        return finite_numbers(finite, one, shape)
+    def numbers(changed_scene):
+        return finite_numbers(finite, changed_scene, state)
 
-    steps = (1e-5, 1e-7 if here.friction.tau_max else 0.0, 1e-5)
-    found = told(of_slide(finite, here, shape))
-    assert_alike(found, differences(numbers, here, steps), numbers(here))
+    steps = (1e-5, 1e-7 if slide.friction.tau_max else 0.0, 1e-5)
+    table = derivative_table(of_slide(finite, slide, state))
+    assert_tables_agree(table, differences(numbers, slide, steps), numbers(slide))
 
 
 @pytest.mark.parametrize("law", [NeoHooke(0.08, 0.48), Ogden(0.08, 0.48)], ids=str)
@@ -229,27 +228,27 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     probes = FinitePatches(
         body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1)))
     )
-    draw = np.random.default_rng(2)
-    u, steps = draw.uniform(-0.015, 0.015, mesh.nodes.shape), draw.normal(size=(*mesh.nodes.shape, 2))
-    found = slope(probes, u, steps)[0]
+    rng = np.random.default_rng(2)
+    u, steps = rng.uniform(-0.015, 0.015, mesh.nodes.shape), rng.normal(size=(*mesh.nodes.shape, 2))
+    slopes = slope(probes, u, steps)[0]
     for column in range(2):
         expected = average(body, probes, u + 1e-30j * steps[..., column])
         assert np.real(expected) == pytest.approx(probes.average(u), rel=1e-12)
-        assert found[:, column] == pytest.approx(np.imag(expected) / 1e-30, rel=1e-12)
+        assert slopes[:, column] == pytest.approx(np.imag(expected) / 1e-30, rel=1e-12)
 
 
 def average(body, probes, u):
     """Return the SED of patches as `FinitePatches.average` does, of displacements that may be complex."""
-    inside = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
-    log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.elements.nodes], inside)))
+    gradients = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
+    log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.elements.nodes], gradients)))
     volume = np.einsum("eq,eqm,eq->em", body.elements.weight, body.elements.modes, log)
-    at = probes.endings.probes
-    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.elements.nodes[at.element]], at.gradient)
+    places = probes.endings.probes
+    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.elements.nodes[places.element]], places.gradient)
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(determinant(F))
-    shear, lame = body.elements.shear[at.element], body.elements.lame[at.element]
-    stretched = Q if body.elements.stiffening[0] == 2.0 else grown(body.elements.stiffening[at.element], Q)
-    modes = np.einsum("pml,pl->pm", body.combination[at.element], at.modes)
-    energy = shear / 2.0 * stretched + lame / 2.0 * np.sum(modes * volume[at.element], axis=1) ** 2
+    shear, lame = body.elements.shear[places.element], body.elements.lame[places.element]
+    stretch_energy = Q if body.elements.stiffening[0] == 2.0 else grown(body.elements.stiffening[places.element], Q)
+    modes = np.einsum("pml,pl->pm", body.combination[places.element], places.modes)
+    energy = shear / 2.0 * stretch_energy + lame / 2.0 * np.sum(modes * volume[places.element], axis=1) ** 2
     totals = [np.sum((energy * probes.endings.weights)[probes.endings.patch == n]) for n in range(3)]
     return np.array(totals) / np.bincount(probes.endings.patch, probes.endings.weights)
 
@@ -259,7 +258,7 @@ def determinant(f):
 
 
 def test_a_state_that_is_no_slide_has_no_derivatives_of_its_own(finite):
-    here = FINITE["without a bound"]
-    shape = slip(finite, here)
+    slide = FINITE["without a bound"]
+    state = slip(finite, slide)
     with pytest.raises(ValueError, match="depends on the way"):
-        of_slide(finite, here, replace(shape, load=shape.load._replace(sense=0)))
+        of_slide(finite, slide, replace(state, load=state.load._replace(sense=0)))

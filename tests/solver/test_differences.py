@@ -1,4 +1,4 @@
-"""Differences between surfaces that are solved together: how good they are, and what is said where they are not."""
+"""Differences between surfaces that are solved together: their errors, and the warnings where these are large."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -13,43 +13,43 @@ from solver.scene.published import STICKINESS, scene
 
 def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
     names = ("sed_ending", "normal_force", "tangential_force", "indentation")
-    known = SimpleNamespace(numbers=np.array(nested), of_edges=np.array([edges]))
-    return SimpleNamespace(nested=known, **dict(zip(names, numbers, strict=True)))
+    nested_numbers = SimpleNamespace(numbers=np.array(nested), of_edges=np.array([edges]))
+    return SimpleNamespace(nested=nested_numbers, **dict(zip(names, numbers, strict=True)))
 
 
 def test_what_halving_the_elements_changes_alike_in_all_surfaces_falls_out_of_their_differences():
-    one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
-    alike = [surface(each, np.array(each) + 0.3) for each in (one, other)]
-    assert contrast_error(alike).share == pytest.approx(0.0, abs=1e-12)
+    first, second = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
+    surfaces = [surface(numbers, np.array(numbers) + 0.3) for numbers in (first, second)]
+    assert contrast_error(surfaces).share == pytest.approx(0.0, abs=1e-12)
     # four thirds of what it changes in their difference, by their range
-    changed = [alike[0], surface(other, np.add(other, [0.33, 0.3, 0.3, 0.3]))]
-    assert contrast_error(changed).share == pytest.approx(4.0 / 3.0 * 0.03 / 0.2)
+    changed_surfaces = [surfaces[0], surface(second, np.add(second, [0.33, 0.3, 0.3, 0.3]))]
+    assert contrast_error(changed_surfaces).share == pytest.approx(4.0 / 3.0 * 0.03 / 0.2)
 
 
 def test_edges_of_contact_put_differences_off_by_a_third_of_what_a_node_changes_in_each_surface():
-    one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
-    found = [surface(one, one, (0.03, 0.0, 0.0, 0.0)), surface(other, other, (0.04, 0.0, 0.0, 0.0))]
-    assert contrast_error(found).share == pytest.approx(0.05 / 3.0 / 0.2)
+    first, second = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
+    surfaces = [surface(first, first, (0.03, 0.0, 0.0, 0.0)), surface(second, second, (0.04, 0.0, 0.0, 0.0))]
+    assert contrast_error(surfaces).share == pytest.approx(0.05 / 3.0 / 0.2)
 
 
-@pytest.mark.parametrize(("changed", "warned"), [(0.004, True), (0.0005, False)])
-def test_of_forces_only_what_a_sensor_could_tell_is_warned_of(changed, warned):
-    one, other = (1.0, 1.0, 0.3, 2.0), (1.1, 1.01, 0.3, 2.0)
-    found = contrast_error([surface(one, one), surface(other, np.add(other, [0.0, changed, 0.0, 0.0]))])
-    assert ("Differences in normal force" in found.warning) == warned
+@pytest.mark.parametrize(("change", "warns"), [(0.004, True), (0.0005, False)])
+def test_of_forces_only_what_a_sensor_could_tell_is_warned_of(change, warns):
+    first, second = (1.0, 1.0, 0.3, 2.0), (1.1, 1.01, 0.3, 2.0)
+    error = contrast_error([surface(first, first), surface(second, np.add(second, [0.0, change, 0.0, 0.0]))])
+    assert ("Differences in normal force" in error.warning) == warns
 
 
 def test_variants_of_one_surface_and_surfaces_pressed_otherwise_are_not_told_apart():
-    one, other = scene(STICKINESS[0]), scene(STICKINESS[2])
-    deeper = replace(other, loading=Loading(1.0, "+x"))
-    variant = replace(other, solve=Solve(evidence="quick"))
-    assert compared_sets([one, deeper, variant, other]) == [[0, 3]]
-    assert compared_sets([one, deeper, variant, one]) == []
+    first, second = scene(STICKINESS[0]), scene(STICKINESS[2])
+    deeper = replace(second, loading=Loading(1.0, "+x"))
+    variant = replace(second, solve=Solve(evidence="quick"))
+    assert compared_sets([first, deeper, variant, second]) == [[0, 3]]
+    assert compared_sets([first, deeper, variant, first]) == []
 
 
 # Three surfaces for one finger, whose normal forces (finite strain) or SED (small) differ by 2 and 0.6 %: indentation,
 # contact angle, moduli, and for each surface mu, bound and the mean of three solves on far finer meshes.
-HARDLY_DIFFERENT = {
+SURFACES_ALIKE = {
     "finite": (
         1.9453824434540352,
         52.768285531663444,
@@ -73,45 +73,45 @@ HARDLY_DIFFERENT = {
 }
 
 
-def hardly_different(kinematics, tolerance, course="steady", contrast=None):
+def surfaces_alike(kinematics, tolerance, course="steady", contrast=None):
     """Return the surfaces, and the truth (3, 3) of them."""
-    depth, angle, moduli, surfaces = HARDLY_DIFFERENT[kinematics]
-    asked = Scene(
+    depth, angle, moduli, surfaces = SURFACES_ALIKE[kinematics]
+    base = Scene(
         finger=Finger(contact_angle=angle),
         materials=Materials(*(Material(modulus, 0.48) for modulus in moduli)),
         friction=Friction(0.0),
         loading=Loading(depth, "+x"),
         solve=Solve(kinematics, course, tolerance=tolerance, contrast_tolerance=contrast),
     )
-    return [replace(asked, friction=Friction(mu, bound)) for mu, bound, _ in surfaces], np.array(
+    return [replace(base, friction=Friction(mu, bound)) for mu, bound, _ in surfaces], np.array(
         [truth for _, _, truth in surfaces]
     )
 
 
-@pytest.mark.parametrize("kinematics", HARDLY_DIFFERENT)
+@pytest.mark.parametrize("kinematics", SURFACES_ALIKE)
 def test_differences_in_sed_between_surfaces_that_hardly_differ_are_as_good_as_is_asked_for(kinematics):
-    asked, true = hardly_different(kinematics, 0.01, contrast=0.03)
-    together = solve_many(asked)
-    found = np.array([p.sed_ending for p in together])
-    assert np.ptp(found - true[:, 0]) < 0.03 * np.ptp(true[:, 0])
+    surfaces, truth = surfaces_alike(kinematics, 0.01, contrast=0.03)
+    predictions = solve_many(surfaces)
+    seds = np.array([p.sed_ending for p in predictions])
+    assert np.ptp(seds - truth[:, 0]) < 0.03 * np.ptp(truth[:, 0])
 
 
 def test_surfaces_that_nobody_asked_to_tell_apart_say_in_what_and_by_how_much_they_may_be_off():
-    asked, true = hardly_different("small", 0.01)
-    found = solve_many(asked)
-    seds = np.array([p.sed_ending for p in found])
-    wrong = np.ptp(seds - true[:, 0]) / np.ptp(true[:, 0])
-    (told,) = {w for p in found for w in p.warnings if w.startswith("Differences in")}
-    assert "more than all" in told or 100.0 * wrong < float(told.split(" may be off by ")[1].split(" %")[0])
-    quick = solve_many([replace(s, solve=Solve(evidence="quick")) for s in asked])
+    surfaces, truth = surfaces_alike("small", 0.01)
+    predictions = solve_many(surfaces)
+    seds = np.array([p.sed_ending for p in predictions])
+    error = np.ptp(seds - truth[:, 0]) / np.ptp(truth[:, 0])
+    (warning,) = {w for p in predictions for w in p.warnings if w.startswith("Differences in")}
+    assert "more than all" in warning or 100.0 * error < float(warning.split(" may be off by ")[1].split(" %")[0])
+    quick = solve_many([replace(s, solve=Solve(evidence="quick")) for s in surfaces])
     assert not [w for p in quick for w in p.warnings if w.startswith("Differences")]
 
 
 @pytest.mark.slow
 def test_courses_of_surfaces_that_hardly_differ_are_marched_and_told_once_on_a_mesh_that_tells_them_apart():
-    asked, true = hardly_different("small", None, "history", 0.05)
-    told = []
-    together = solve_many(asked, watch=lambda number, *_: told.append(number))
-    assert told == [0, 1, 2]
-    found = np.array([p.sed_ending for p in together])
-    assert np.ptp(found - true[:, 0]) < 0.05 * np.ptp(true[:, 0])
+    surfaces, truth = surfaces_alike("small", None, "history", 0.05)
+    numbers = []
+    predictions = solve_many(surfaces, watch=lambda number, *_: numbers.append(number))
+    assert numbers == [0, 1, 2]
+    seds = np.array([p.sed_ending for p in predictions])
+    assert np.ptp(seds - truth[:, 0]) < 0.05 * np.ptp(truth[:, 0])

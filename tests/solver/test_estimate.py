@@ -15,39 +15,39 @@ from solver.prediction import COUNT, NestedNumbers
 from solver.scene.published import STICKINESS, scene
 from solver.verification.fine_meshes import fine_numbers, numbers_on_mesh
 from solver.verification.random_scenes import random_scene
-from tests.solver.drawn_scenes import DECEIVING, DRAWN, HELD_OUT
+from tests.solver.drawn_scenes import DECEIVING, HELD_OUT, RANDOM
 
 
-def drawn(depth, mu, bound, slide, angle, moduli, solving=None):
-    """Return a drawn scene: indentation [mm], friction, its bound, the slide, the angle and the three moduli [MPa]."""
+def scene_of(depth, mu, bound, slide, angle, moduli, settings=None):
+    """Return the scene of an indentation [mm], friction, its bound, a slide, an angle and three moduli [MPa]."""
     return Scene(
         finger=Finger(contact_angle=angle),
         materials=Materials(*(Material(modulus, 0.48) for modulus in moduli)),
         friction=Friction(mu, bound),
         loading=Loading(depth, slide),
-        solve=solving or Solve(),
+        solve=settings or Solve(),
     )
 
 
-def off(found, truth):
+def errors_and_estimates(prediction, truth):
     """Return the relative errors of SED and forces, and their estimates (3,)."""
-    numbers = np.array([found.sed_ending, found.normal_force, found.tangential_force])
-    estimates = np.array([found.error_estimate, found.normal_force_error, found.tangential_force_error])
+    numbers = np.array([prediction.sed_ending, prediction.normal_force, prediction.tangential_force])
+    estimates = np.array([prediction.error_estimate, prediction.normal_force_error, prediction.tangential_force_error])
     return np.abs(numbers / truth - 1.0), estimates
 
 
-def closeness(asked, truth):
+def solve_and_judge(scene, truth):
     """Solve a scene whose estimates must hold; return of each number whether its estimate is below ten errors."""
-    there, estimates = off(solve(asked), truth)
-    assert np.all(there <= estimates)
-    return (estimates < 10.0 * np.maximum(there, 2e-4)).tolist()
+    true_errors, estimates = errors_and_estimates(solve(scene), truth)
+    assert np.all(true_errors <= estimates)
+    return (estimates < 10.0 * np.maximum(true_errors, 2e-4)).tolist()
 
 
 @pytest.mark.slow
 def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_below_ten_times_them():
     close: list[bool] = []
-    for *numbers, truth in DRAWN:
-        close += closeness(drawn(*numbers), truth)
+    for *numbers, truth in RANDOM:
+        close += solve_and_judge(scene_of(*numbers), truth)
     assert np.mean(close) >= 0.75
 
 
@@ -59,65 +59,65 @@ def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_bel
     ],
 )
 def test_an_ending_that_is_hardly_more_than_a_point_is_as_true_as_any_and_its_estimate_lies_above(depth, ending, truth):
-    asked = Solve(evidence="quick")
-    found = solve(Scene(friction=Friction(0.6), loading=Loading(1.0), receptor=Receptor(depth, ending), solve=asked))
-    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate <= 0.003
+    scene = Scene(friction=Friction(0.6), loading=Loading(1.0), receptor=Receptor(depth, ending))
+    prediction = solve(replace(scene, solve=Solve(evidence="quick")))
+    assert abs(prediction.sed_ending / truth - 1.0) <= prediction.error_estimate <= 0.003
 
 
 def test_a_drag_that_cannot_be_is_exactly_none():
-    found = solve(Scene(friction=Friction(0.0), loading=Loading(1.0, "+x")))
-    assert found.tangential_force == 0.0
-    assert found.tangential_force_error == 0.0
-    assert 0.0 < found.normal_force_error < 0.01
+    prediction = solve(Scene(friction=Friction(0.0), loading=Loading(1.0, "+x")))
+    assert prediction.tangential_force == 0.0
+    assert prediction.tangential_force_error == 0.0
+    assert 0.0 < prediction.normal_force_error < 0.01
 
 
 @pytest.mark.parametrize("tolerance", [0.01, 0.003, 0.001])
 def test_the_tolerance_is_met_with_no_more_work_than_it_needs(tolerance):
-    asked = replace(scene(STICKINESS[4]), solve=Solve(tolerance=tolerance))
-    found = solve(asked)
-    assert found.error_estimate <= tolerance
-    assert abs(found.sed_ending / 0.009553 - 1.0) < max(tolerance, 0.0015)  # the reference is good to 0.1 %
-    assert found.dofs < {0.01: 2500, 0.003: 8000, 0.001: 30000}[tolerance]
+    strict_scene = replace(scene(STICKINESS[4]), solve=Solve(tolerance=tolerance))
+    prediction = solve(strict_scene)
+    assert prediction.error_estimate <= tolerance
+    assert abs(prediction.sed_ending / 0.009553 - 1.0) < max(tolerance, 0.0015)  # the reference is good to 0.1 %
+    assert prediction.dofs < {0.01: 2500, 0.003: 8000, 0.001: 30000}[tolerance]
 
 
 def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_add_a_third_of_what_a_node_changes():
-    asked = Scene(friction=Friction(0.3), loading=Loading(1.0))
+    sliding = Scene(friction=Friction(0.3), loading=Loading(1.0))
     truth, error = np.ones(COUNT), 0.04
     none, edges = np.zeros((1, COUNT)), np.full((2, COUNT), 0.005)
     nested = NestedNumbers(truth * (1.0 + error / 4.0), none, none, none)
-    found = errors(asked, truth * (1.0 + error), nested, None)
-    assert found.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
-    more = errors(asked, truth * (1.0 + error), replace(nested, of_edges=edges), None)
-    assert more.sed - found.sed == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
-    assert more.width - found.width == pytest.approx(0.005 / 1.04, rel=1e-12)  # it follows an edge by a line
-    assert more.responses - found.responses == pytest.approx(0.01 / 3.0, rel=1e-12)
+    estimate = errors(sliding, truth * (1.0 + error), nested, None)
+    assert estimate.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
+    with_edges = errors(sliding, truth * (1.0 + error), replace(nested, of_edges=edges), None)
+    assert with_edges.sed - estimate.sed == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
+    assert with_edges.width - estimate.width == pytest.approx(0.005 / 1.04, rel=1e-12)  # it follows an edge by a line
+    assert with_edges.responses - estimate.responses == pytest.approx(0.01 / 3.0, rel=1e-12)
 
 
 def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_half_a_node():
     """The states of contact are changed by hand, and the linearised body solved under each; no estimate has a part."""
     ratios, places = [], []
     for number in range(40, 52):
-        asked = random_scene("axis", number, "small")
-        finger = LinearFinger.of(asked, Sizing(8.0, expected_depth(asked), margin=4.0))
-        state, newton = nearest(asked, finger), finger.newton
+        sample = random_scene("axis", number, "small")
+        finger = LinearFinger.of(sample, Sizing(8.0, expected_depth(sample), margin=4.0))
+        state, newton = nearest(sample, finger), finger.newton
         x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
         newton.linearise(state, state.load, x, 0, None)
 
-        def changed(edge, nodes, state=state, newton=newton, x=x, finger=finger):
+        def sed_change(edge, nodes, state=state, newton=newton, x=x, finger=finger):
             contact, sense = state.state.copy(), state.sense.copy()
-            taken, of = (
+            moved_nodes, source = (
                 (slice(edge + 1, edge + 1 + nodes), edge)
                 if nodes > 0
                 else (slice(edge + 1 + nodes, edge + 1), edge + 1)
             )
-            contact[taken], sense[taken] = contact[of], sense[of]
-            begin = replace(state, state=contact, sense=sense)
-            assert newton.solve_contact(begin, state.load, x, 0, None) >= 0
-            after = newton.apply_step(begin, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
-            return finger.numbers([after])[0, 0] - finger.numbers([state])[0, 0]
+            contact[moved_nodes], sense[moved_nodes] = contact[source], sense[source]
+            guess = replace(state, state=contact, sense=sense)
+            assert newton.solve_contact(guess, state.load, x, 0, None) >= 0
+            new_state = newton.apply_step(guess, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+            return finger.numbers([new_state])[0, 0] - finger.numbers([state])[0, 0]
 
         for edge in np.flatnonzero(np.diff(state.touching.astype(int))).tolist():
-            two_back, back, on, two_on = (changed(edge, nodes) for nodes in (-2, -1, 1, 2))
+            two_back, back, on, two_on = (sed_change(edge, nodes) for nodes in (-2, -1, 1, 2))
             ratios.append((two_back + two_on) / (back + on))
             places.append((back - on) / (2.0 * (back + on)))
     assert len(ratios) >= 20
@@ -126,51 +126,51 @@ def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_h
 
 
 def test_estimates_of_the_row_lie_above_its_errors_beneath_the_edges_of_contact_too():
-    asked = Scene(friction=Friction(0.35), loading=Loading(1.3, "+x"), finger=Finger(contact_angle=52.0))
-    found = solve(replace(asked, solve=Solve(tolerance=0.02, evidence="quick")))
-    fine = LinearFinger.of(asked, Sizing(24.0, 1.3, margin=4.0))
-    true = fine.row.average(fine.displacement(settled_state(asked, fine)))
-    known = np.isfinite(true)
+    sliding = Scene(friction=Friction(0.35), loading=Loading(1.3, "+x"), finger=Finger(contact_angle=52.0))
+    prediction = solve(replace(sliding, solve=Solve(tolerance=0.02, evidence="quick")))
+    fine = LinearFinger.of(sliding, Sizing(24.0, 1.3, margin=4.0))
+    truth = fine.row.average(fine.displacement(settled_state(sliding, fine)))
+    known = np.isfinite(truth)
     assert known.sum() >= 40
-    errors_of_row = np.abs(found.row.sed - true)[known]
-    assert np.mean(errors_of_row <= (found.row.error * found.row.sed)[known]) >= 0.95
+    row_errors = np.abs(prediction.row.sed - truth)[known]
+    assert np.mean(row_errors <= (prediction.row.error * prediction.row.sed)[known]) >= 0.95
     # What halving changes would not do: it says nothing of where contact ends.
-    assert np.mean(errors_of_row <= (4 / 3 * np.abs(found.nested.row - found.row.sed))[known]) < 0.95
+    assert np.mean(row_errors <= (4 / 3 * np.abs(prediction.nested.row - prediction.row.sed))[known]) < 0.95
 
 
 def test_where_the_nested_mesh_has_no_state_nothing_is_known():
-    found = errors(Scene(friction=Friction(0.3), loading=Loading(1.0)), np.ones(7), None, None)
-    assert (found.sed, found.normal, found.tangential) == (1.0, 1.0, 1.0)
+    estimate = errors(Scene(friction=Friction(0.3), loading=Loading(1.0)), np.ones(7), None, None)
+    assert (estimate.sed, estimate.normal, estimate.tangential) == (1.0, 1.0, 1.0)
 
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_the_nested_value_is_nearer_the_truth_than_the_meshs_own(kinematics):
-    given = replace(scene(STICKINESS[0]), solve=Solve(kinematics))
-    truth = STICKS_LEAST if kinematics == "finite" else float(numbers_on_mesh([given], 26.0, shift=False)[0, 0])
-    answers = [solve(replace(given, solve=Solve(kinematics, tolerance=t))) for t in (0.02, 0.01, 0.005, 0.003)]
-    nearer = [abs(p.sed_ending_corrected / truth - 1.0) / abs(p.sed_ending / truth - 1.0) for p in answers]
-    assert np.median(nearer) < 0.5
-    assert max(nearer) < 1.0
+    sticky = replace(scene(STICKINESS[0]), solve=Solve(kinematics))
+    truth = STICKS_LEAST if kinematics == "finite" else float(numbers_on_mesh([sticky], 26.0, shift=False)[0, 0])
+    predictions = [solve(replace(sticky, solve=Solve(kinematics, tolerance=t))) for t in (0.02, 0.01, 0.005, 0.003)]
+    ratios = [abs(p.sed_ending_corrected / truth - 1.0) / abs(p.sed_ending / truth - 1.0) for p in predictions]
+    assert np.median(ratios) < 0.5
+    assert max(ratios) < 1.0
 
 
 @pytest.mark.parametrize("tolerance", [pytest.param(0.01, marks=pytest.mark.slow), None])
 @pytest.mark.parametrize("case", DECEIVING, ids=["layers", "bound"])
 def test_at_finite_strain_estimates_see_layers_in_the_fat_and_the_bound_at_the_edges_of_contact(case, tolerance):
     *numbers, truth = case
-    found = solve(drawn(*numbers, Solve("finite", tolerance=tolerance)))
-    there, estimates = off(found, truth)
-    assert np.all(there <= estimates)
-    assert tolerance is None or found.error_estimate <= tolerance
+    prediction = solve(scene_of(*numbers, Solve("finite", tolerance=tolerance)))
+    true_errors, estimates = errors_and_estimates(prediction, truth)
+    assert np.all(true_errors <= estimates)
+    assert tolerance is None or prediction.error_estimate <= tolerance
 
 
 STICKS_LEAST = 0.0096274  # SED of stickiness 0, on meshes of 17, 23 and 26 with lines at the edges of contact
 
 
 def test_a_bound_far_from_the_edges_of_contact_keeps_no_tolerance_from_being_met():
-    found = solve(replace(scene(STICKINESS[0]), solve=Solve("finite", tolerance=0.003)))
-    assert found.error_estimate <= 0.003
-    assert found.dofs < 11000  # half of the finest mesh's
-    assert found.sed_ending == pytest.approx(STICKS_LEAST, rel=0.003)
+    prediction = solve(replace(scene(STICKINESS[0]), solve=Solve("finite", tolerance=0.003)))
+    assert prediction.error_estimate <= 0.003
+    assert prediction.dofs < 11000  # half of the finest mesh's
+    assert prediction.sed_ending == pytest.approx(STICKS_LEAST, rel=0.003)
 
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
@@ -180,18 +180,18 @@ def test_estimates_lie_above_the_errors_of_scenes_that_nothing_was_chosen_on_and
     close: list[bool] = []
     for kind, *numbers, truth in HELD_OUT:
         if kind == kinematics:
-            close += closeness(drawn(*numbers, Solve(kind)), truth)
+            close += solve_and_judge(scene_of(*numbers, Solve(kind)), truth)
     assert np.mean(close) >= 0.75
 
 
 def test_skin_so_stiff_that_one_node_touches_is_estimated_by_contact_that_grows_not_by_contact_lost():
     skin = Materials(Material(640.0, 0.48), Material(4.0, 0.48), Material(0.034, 0.48))
     scene = Scene(materials=skin, friction=Friction(0.3), loading=Loading(0.6, "+x"), solve=Solve(tolerance=0.5))
-    found = solve(scene)
-    assert sum(state != "open" for state in found.skin.state) == 1
+    prediction = solve(scene)
+    assert sum(state != "open" for state in prediction.skin.state) == 1
     truth = fine_numbers([scene])[:, 0, 0]
-    off = abs(found.sed_ending / truth.mean() - 1.0)
-    assert off <= found.error_estimate < 10.0 * max(off, 2e-4)
+    true_error = abs(prediction.sed_ending / truth.mean() - 1.0)
+    assert true_error <= prediction.error_estimate < 10.0 * max(true_error, 2e-4)
 
 
 @pytest.mark.parametrize(
@@ -200,10 +200,10 @@ def test_skin_so_stiff_that_one_node_touches_is_estimated_by_contact_that_grows_
 )
 def test_an_answer_warns_where_no_trial_of_the_estimates_had_tissues_so_different(dermis, words):
     materials = Materials(dermis=Material(dermis, 0.48))
-    found = solve(Scene(materials=materials, friction=Friction(0.3), loading=Loading(0.5, "+x")))
-    said = [warning for warning in found.warnings if "times as stiff" in warning]
-    assert len(said) == bool(words)
-    assert words in "".join(said)
+    prediction = solve(Scene(materials=materials, friction=Friction(0.3), loading=Loading(0.5, "+x")))
+    warnings = [warning for warning in prediction.warnings if "times as stiff" in warning]
+    assert len(warnings) == bool(words)
+    assert words in "".join(warnings)
 
 
 def test_tissues_that_relax_warn_of_a_difference_in_stiffness_as_the_elastic_ones_that_they_relax_to():
@@ -211,7 +211,7 @@ def test_tissues_that_relax_warn_of_a_difference_in_stiffness_as_the_elastic_one
     relaxing = Material(9.0 * 0.08 * 0.1 / 0.38, 0.14 / 0.76, prony=(Relaxation(0.5, 1.0),))
     elastic = Material(9.0 * 0.04 * 0.1 / 0.34, 0.22 / 0.68)
     scenes = [
-        Scene(materials=Materials(Material(12.0, 0.3), one), friction=Friction(0.3), loading=Loading(0.5, "+x"))
-        for one in (relaxing, elastic)
+        Scene(materials=Materials(Material(12.0, 0.3), dermis), friction=Friction(0.3), loading=Loading(0.5, "+x"))
+        for dermis in (relaxing, elastic)
     ]
     assert stiffness_warning(scenes[0]) == stiffness_warning(scenes[1]) != ""

@@ -16,7 +16,7 @@ TOWARDS_TIP = -1
 SLOW = pytest.mark.slow
 
 
-def refined(scene, depth, fineness):
+def refine_from_coarse(scene, depth, fineness):
     """Return the state of a scene on a mesh of `fineness`, begun on a coarse one."""
     meshes = Meshes()
     return refine(scene, fineness, coarse_solution(scene, depth, fineness, meshes), meshes).top
@@ -43,8 +43,8 @@ def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusa
 def test_a_sound_state_is_the_direct_one():
     finger = published(5)
     load = LoadState(1.5, 0.44, 0.03009, 1)
-    shape = steady(finger, load)
-    np.testing.assert_array_equal(shape.u, solve_full_slip(finger.newton, load).u)
+    state = steady(finger, load)
+    np.testing.assert_array_equal(state.u, solve_full_slip(finger.newton, load).u)
 
 
 def test_friction_without_measure_is_the_bound_alone():
@@ -65,22 +65,22 @@ def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coef
 @pytest.mark.parametrize(("depth", "tau", "sense"), [(0.01, 0.003, -1), (1e-6, 0.005, -1), (0.1, 0.01, 1)])
 def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_that_touches(depth, tau, sense, fineness):
     finger = published(fineness, depth)
-    shape = steady(finger, LoadState(depth, 1000.0, tau, sense))
-    on = np.flatnonzero(shape.touching)
-    x = shape.place(finger.newton.condensed)[:, 0]
-    widest = x[min(on[-1] + 1, len(x) - 1)] - x[max(on[0] - 1, 0)]  # to the neighbours that do not touch
-    assert tau * (x[on[-1]] - x[on[0]]) * 0.99 <= sense * shape.force[0] <= tau * widest * 1.01
+    state = steady(finger, LoadState(depth, 1000.0, tau, sense))
+    touching = np.flatnonzero(state.touching)
+    x = state.place(finger.newton.condensed)[:, 0]
+    longest = x[min(touching[-1] + 1, len(x) - 1)] - x[max(touching[0] - 1, 0)]  # to the neighbours that do not touch
+    assert tau * (x[touching[-1]] - x[touching[0]]) * 0.99 <= sense * state.force[0] <= tau * longest * 1.01
 
 
 @pytest.mark.parametrize("depth", [1e-6, 1e-4, 1e-2])
 def test_a_finger_that_barely_touches_has_an_answer(depth):
-    shape = steady(published(5), LoadState(depth, 0.5, 0.01, 1))
-    assert shape.touching.any()
-    assert shape.force[1] > 0.0
+    state = steady(published(5), LoadState(depth, 0.5, 0.01, 1))
+    assert state.touching.any()
+    assert state.force[1] > 0.0
 
 
-def drawn(mu, tolerance=None):
-    """Return a scene drawn at random, whose skin folds at mu = 0.74 (`test_limit`)."""
+def folding_scene(mu, tolerance=None):
+    """Return a random scene whose skin folds at mu = 0.74 (`test_limit`)."""
     return Scene(
         finger=Finger(contact_angle=69.4),
         materials=Materials(*(Material(modulus, 0.48) for modulus in (0.1525, 0.0775, 0.0303))),
@@ -95,21 +95,21 @@ def drawn(mu, tolerance=None):
 @pytest.mark.parametrize("mu", [0.8, 0.85, 0.9])
 def test_beyond_the_fold_every_mesh_refuses_also_where_it_has_a_creased_state(mu, fineness):
     with pytest.raises(NoSteadyState):
-        refined(drawn(mu), 1.8, fineness)
+        refine_from_coarse(folding_scene(mu), 1.8, fineness)
 
 
 @SLOW
 def test_every_mesh_has_the_state_below_the_fold_on_the_same_branch():
-    found = [refined(drawn(0.71), 1.8, fineness) for fineness in (7.0, 10.0, 14.0, 20.0)]
-    np.testing.assert_allclose([top.finger.sed_ending(top.state.u) for top in found], 0.00286, rtol=0.01)
+    solutions = [refine_from_coarse(folding_scene(0.71), 1.8, fineness) for fineness in (7.0, 10.0, 14.0, 20.0)]
+    np.testing.assert_allclose([s.finger.sed_ending(s.state.u) for s in solutions], 0.00286, rtol=0.01)
 
 
 @SLOW
 def test_answers_near_the_largest_friction_say_so_and_refusals_name_it():
-    assert any("squeezed" in told for told in solve(drawn(0.735)).warnings)
-    assert not any("squeezed" in told for told in solve(drawn(0.6)).warnings)
+    assert any("squeezed" in warning for warning in solve(folding_scene(0.735)).warnings)
+    assert not any("squeezed" in warning for warning in solve(folding_scene(0.6)).warnings)
     with pytest.raises(NoSteadyState, match="folds") as refusal:
-        solve(drawn(0.76))
+        solve(folding_scene(0.76))
     assert refusal.value.limit_mu == pytest.approx(0.735, rel=0.03)  # on a mesh of half the size
 
 
@@ -131,7 +131,7 @@ def test_a_fold_that_lies_where_meshes_are_coarse_is_seen_by_all_of_them(finenes
     )
     tissues = Materials(Material(0.17512, 0.48), Material(0.09348, 0.48), Material(0.03503, 0.48))
 
-    def at(mu):
+    def scene_at(mu):
         return Scene(
             finger=finger,
             materials=tissues,
@@ -141,7 +141,7 @@ def test_a_fold_that_lies_where_meshes_are_coarse_is_seen_by_all_of_them(finenes
             solve=Solve("finite"),
         )
 
-    assert refined(at(0.84), 1.0997, fineness).state.touching.any()
-    with pytest.raises(NoSteadyState) as refused:
-        refined(at(0.91), 1.0997, fineness)
-    assert refused.value.limit_mu == pytest.approx(0.88, rel=0.03)
+    assert refine_from_coarse(scene_at(0.84), 1.0997, fineness).state.touching.any()
+    with pytest.raises(NoSteadyState) as refusal:
+        refine_from_coarse(scene_at(0.91), 1.0997, fineness)
+    assert refusal.value.limit_mu == pytest.approx(0.88, rel=0.03)

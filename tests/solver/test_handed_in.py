@@ -16,7 +16,7 @@ from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
 from solver.mesh import Mesh, MeshError, block
 
 MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
-ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))
+QUAD = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))
 NOT_HELD = replace(MESH, held=np.empty(0, np.int64))
 NAN = np.full(MESH.nodes.shape, np.nan)
 STRAY = replace(MESH, nodes=np.append(MESH.nodes, [[9.0, 9.0]], axis=0))
@@ -27,19 +27,19 @@ TISSUE, SKIN = [Hooke(0.08, 0.48)], [NeoHooke(0.08, 0.48)]
 linear = LinearBody.of
 
 
-def relaxes(g, tau):
+def relaxing_law(g, tau):
     return Prony(0.08, 0.48, ((g, tau),))
 
 
-def as_handed_in(mesh, whole, lengths):
+def as_other_program_gives(mesh, integers, floats):
     """The mesh as another program may give it: numbers of other widths, every second one of a longer array."""
     parts = {f.name: getattr(mesh, f.name) for f in fields(mesh)}
-    nodes = np.repeat(parts.pop("nodes").astype(lengths), 2, axis=0)[::2]
-    return Mesh(nodes, **{name: np.repeat(part.astype(whole), 2, axis=0)[::2] for name, part in parts.items()})
+    nodes = np.repeat(parts.pop("nodes").astype(floats), 2, axis=0)[::2]
+    return Mesh(nodes, **{name: np.repeat(part.astype(integers), 2, axis=0)[::2] for name, part in parts.items()})
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "sentence"),
     [
         (lambda: linear(NOT_HELD, TISSUE), "nothing holds the body"),
         (lambda: linear(MESH, TISSUE, NAN), "row 0 of loads is not finite"),
@@ -77,7 +77,7 @@ def as_handed_in(mesh, whole, lengths):
         ),
         (lambda: FiniteBody.of(replace(MESH, skin=MESH.skin[:4]), [NeoHooke(0.08, 0.48)]), "mesh.skin has 4 nodes"),
         (
-            lambda: LinearBody.of(replace(ONE, skin=ONE.elements[0][[0, 4, 1, 5, 2, 6, 3, 7, 0]]), TISSUE),
+            lambda: LinearBody.of(replace(QUAD, skin=QUAD.elements[0][[0, 4, 1, 5, 2, 6, 3, 7, 0]]), TISSUE),
             "a node twice",
         ),
         (
@@ -97,14 +97,14 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, 0.0)]), "exponent 0; it must lie between 2 and 14"),
         (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, 50.0)]), "exponent 50; it must"),
         (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, np.nan)]), "exponent nan; it must"),
-        (lambda: RelaxingBody(replace(MESH, nodes=NAN), [relaxes(0.3, 1.0)]), "node 0 of the mesh"),
-        (lambda: RelaxingBody(NOT_HELD, [relaxes(0.3, 1.0)]), "nothing holds the body"),
+        (lambda: RelaxingBody(replace(MESH, nodes=NAN), [relaxing_law(0.3, 1.0)]), "node 0 of the mesh"),
+        (lambda: RelaxingBody(NOT_HELD, [relaxing_law(0.3, 1.0)]), "nothing holds the body"),
         (lambda: RelaxingBody(MESH, [Prony(0.08, 0.5)]), "nu = 0.5"),
-        (lambda: RelaxingBody(replace(MESH, region=MESH.region + 1), [relaxes(0.3, 1.0)]), "has no material"),
-        (lambda: RelaxingBody(MESH, [relaxes(1.2, 1.0)]), "terms that cannot relax"),
-        (lambda: RelaxingBody(MESH, [relaxes(-0.1, 1.0)]), "terms that cannot relax"),
-        (lambda: RelaxingBody(MESH, [relaxes(0.3, -1.0)]), "terms that cannot relax"),
-        (lambda: CondensedRelaxing(FiniteBody.of(MESH, SKIN), [relaxes(0.3, np.nan)]), "terms that cannot relax"),
+        (lambda: RelaxingBody(replace(MESH, region=MESH.region + 1), [relaxing_law(0.3, 1.0)]), "has no material"),
+        (lambda: RelaxingBody(MESH, [relaxing_law(1.2, 1.0)]), "terms that cannot relax"),
+        (lambda: RelaxingBody(MESH, [relaxing_law(-0.1, 1.0)]), "terms that cannot relax"),
+        (lambda: RelaxingBody(MESH, [relaxing_law(0.3, -1.0)]), "terms that cannot relax"),
+        (lambda: CondensedRelaxing(FiniteBody.of(MESH, SKIN), [relaxing_law(0.3, np.nan)]), "terms that cannot relax"),
         (
             lambda: solve_full_slip(Newton(FiniteBody.of(MESH, SKIN).condensed), LoadState(0.1, -1.0, sense=-1)),
             "mu = -1.0",
@@ -139,8 +139,8 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: FrictionLaw(0.3, np.nan), "tau_max = nan"),
     ],
 )
-def test_a_body_that_cannot_be_solved_is_refused_at_the_door_in_one_sentence(make, told):
-    with pytest.raises((BodyError, ValueError), match=told):
+def test_a_body_that_cannot_be_solved_is_refused_at_the_door_in_one_sentence(make, sentence):
+    with pytest.raises((BodyError, ValueError), match=sentence):
         make()
 
 
@@ -161,21 +161,21 @@ def test_held_unknowns_and_nodes_of_no_element_are_no_unknowns():
 
 def test_an_element_turned_inside_out_is_refused_at_the_door():
     nodes = MESH.nodes * np.array([-1.0, 1.0])
-    for make in (lambda mesh: linear(mesh, TISSUE), lambda mesh: FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])):
+    for build in (lambda mesh: linear(mesh, TISSUE), lambda mesh: FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])):
         with pytest.raises(MeshError, match="folded"):
-            make(replace(MESH, nodes=nodes))
+            build(replace(MESH, nodes=nodes))
 
 
-@pytest.mark.parametrize("whole", [np.uint8, np.int16, np.int32, np.uint64, np.int64])
-@pytest.mark.parametrize("lengths", [np.float32, np.float64])
-def test_a_mesh_of_numbers_of_any_width_gives_the_forces_of_the_closed_form(whole, lengths):
+@pytest.mark.parametrize("integers", [np.uint8, np.int16, np.int32, np.uint64, np.int64])
+@pytest.mark.parametrize("floats", [np.float32, np.float64])
+def test_a_mesh_of_numbers_of_any_width_gives_the_forces_of_the_closed_form(integers, floats):
     # a block of 2 x 1 mm on the flat, its top lowered by rollers: Hooke's E/(1 - nu^2) times the strain, and the
     # neo-Hookean nominal stress at a stretch of 0.9 whose sides are free, 0.012098 MPa
     top, middle = MESH.held, np.flatnonzero(MESH.nodes[:, 0] == 0.0)
     rolls = replace(MESH, held=top[:0], held_y=top, held_x=middle)
-    mesh = as_handed_in(rolls, whole, lengths)
-    found = solve_full_slip(Newton(LinearBody.of(mesh, TISSUE).condensed), LoadState(np.float32(0.125), 0, sense=1))
-    assert found.force[1] == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
+    mesh = as_other_program_gives(rolls, integers, floats)
+    state = solve_full_slip(Newton(LinearBody.of(mesh, TISSUE).condensed), LoadState(np.float32(0.125), 0, sense=1))
+    assert state.force[1] == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
     force = solve_full_slip(Newton(FiniteBody.of(mesh, SKIN).condensed), LoadState(0.1, 0, sense=1)).force
     assert force[1] == pytest.approx(2.0 * 0.012098, rel=1e-4)
 
@@ -188,6 +188,6 @@ def test_pulls_and_forces_of_whole_numbers_reach_the_loops_as_the_floats_they_ar
     assert type(FrictionLaw(1, 2).mu) is float
     loads = np.zeros(MESH.nodes.shape, np.int32)
     loads[MESH.skin[2], 1] = 1  # on the middle of the foot
-    one, other = (LinearBody.of(MESH, TISSUE, of, MESH.nodes * 0.0) for of in (loads, loads.astype(float)))
-    assert np.array_equal(one.condensed.load, other.condensed.load)
-    assert one.condensed.free_displacement()[2, 1] > 0.0
+    body, float_body = (LinearBody.of(MESH, TISSUE, pull, MESH.nodes * 0.0) for pull in (loads, loads.astype(float)))
+    assert np.array_equal(body.condensed.load, float_body.condensed.load)
+    assert body.condensed.free_displacement()[2, 1] > 0.0

@@ -29,13 +29,13 @@ from solver.verification.request import Request
 SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for case in cases(kind)}
 
 
-def shown(case: Case):
+def case_param(case: Case):
     """`make test` runs those that tell most, `make test-long` all."""
     slow = case.slow or case.name not in TELLING
     return pytest.param(case, id=f"{case.kinematics}: {case.name}", marks=[pytest.mark.slow] if slow else [])
 
 
-@pytest.mark.parametrize("case", [shown(case) for case in SUITE.values()])
+@pytest.mark.parametrize("case", [case_param(case) for case in SUITE.values()])
 def test_a_hard_case_ends_as_it_must(case):
     neighbour = SUITE[case.kinematics, case.same_as].run() if case.same_as else None
     assert judge(case, neighbour).flaw == ""
@@ -44,12 +44,12 @@ def test_a_hard_case_ends_as_it_must(case):
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_what_has_to_answer_does_at_both_kinematics(kinematics):
     """A refusal counts only where no state exists: these exist."""
-    must = {name for (kind, name), case in SUITE.items() if kind == kinematics and case.must == "answer"}
-    named = ["nu 0.4999999", "bone 1e10 times stiffer than fat", "a part 1e+10 times stiffer", "mu 0", "tau_max 0 MPa"]
-    named += ["tau_max 1e+09 MPa", "depth 1e-06 mm without friction", "depth 2 mm without friction"]
-    named += ["direction reversal", "elements distorted to 0.45 of an edge"]
-    named += [f"angle {angle} degrees{way}" for angle in (30, 45, 60, 75) for way in ("", ", backwards")]
-    assert set(named) <= must
+    must_answer = {name for (kind, name), case in SUITE.items() if kind == kinematics and case.must == "answer"}
+    names = ["nu 0.4999999", "bone 1e10 times stiffer than fat", "a part 1e+10 times stiffer", "mu 0", "tau_max 0 MPa"]
+    names += ["tau_max 1e+09 MPa", "depth 1e-06 mm without friction", "depth 2 mm without friction"]
+    names += ["direction reversal", "elements distorted to 0.45 of an edge"]
+    names += [f"angle {angle} degrees{way}" for angle in (30, 45, 60, 75) for way in ("", ", backwards")]
+    assert set(names) <= must_answer
 
 
 @pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
@@ -57,20 +57,20 @@ def test_near_incompressibility_costs_no_more_linear_systems(kinematics):
     def systems(nu):
         return int(SUITE[kinematics, f"nu {nu}"].run().summary.split("; ")[1].split()[0])
 
-    usual = systems(0.48)
-    assert all(systems(nu) <= usual + (0 if kinematics == "small" else 2) for nu in (0.499, 0.4999, 0.4999999))
+    usual_count = systems(0.48)
+    assert all(systems(nu) <= usual_count + (0 if kinematics == "small" else 2) for nu in (0.499, 0.4999, 0.4999999))
 
 
 def test_a_case_that_fails_is_told_as_one():
     """The suite can find fault: a refusal where there must be an answer, and a number that is not its neighbour's."""
-    hopeless = of_scene(Scene(friction=Friction(2.0), loading=Loading(2.0, "+x")))
-    assert not hopeless.answered
-    assert hopeless.numbers == ()
-    refused = Case("small", "refused", "answer", lambda: hopeless)
-    assert judge(refused).flaw == "no answer"
-    one, other = SUITE["small", "mu 0"].run(), SUITE["small", "mu 0.44"]
-    apart = Case("small", "apart", "answer", other.run, "mu 0", 1e-3)
-    assert judge(apart, one).flaw.endswith("from mu 0, not 0.001")
+    refusal = of_scene(Scene(friction=Friction(2.0), loading=Loading(2.0, "+x")))
+    assert not refusal.answered
+    assert refusal.numbers == ()
+    refused_case = Case("small", "refused", "answer", lambda: refusal)
+    assert judge(refused_case).flaw == "no answer"
+    neighbour, other_case = SUITE["small", "mu 0"].run(), SUITE["small", "mu 0.44"]
+    distant_case = Case("small", "apart", "answer", other_case.run, "mu 0", 1e-3)
+    assert judge(distant_case, neighbour).flaw.endswith("from mu 0, not 0.001")
 
 
 def test_the_suite_compares_a_case_with_its_neighbour_wherever_that_stands(monkeypatch):
@@ -83,8 +83,9 @@ def test_the_suite_compares_a_case_with_its_neighbour_wherever_that_stands(monke
 
 
 def test_a_touch_that_is_not_hertz_s_is_told_as_one():
-    deep = Scene(friction=Friction(0.3), loading=Loading(0.1, "+x"))  # its contact is as wide as the epidermis is thick
-    assert "from Hertz's" in of_light_touch(deep).flaw
+    # its contact is as wide as the epidermis is thick
+    scene = Scene(friction=Friction(0.3), loading=Loading(0.1, "+x"))
+    assert "from Hertz's" in of_light_touch(scene).flaw
 
 
 young = st.floats(-2.5, 0.5).map(lambda power: 10**power)
@@ -109,10 +110,10 @@ scene_parts = {
 }
 
 
-def ended(kinematics, finger, tissues, depth, mu, bound, slide, course):
+def solve_and_check(kinematics, finger, tissues, depth, mu, bound, slide, course):
     """Solve a scene and check all that must hold however it ends."""
     outline = Finger(**finger)
-    asked = Scene(
+    scene = Scene(
         finger=outline,
         materials=Materials(*tissues),
         friction=Friction(mu, bound),
@@ -120,21 +121,21 @@ def ended(kinematics, finger, tissues, depth, mu, bound, slide, course):
         receptor=Receptor(outline.epidermis + outline.dermis - 0.03, (0.05, 0.5)),
         solve=Solve(kinematics, course),
     )
-    (found,) = solve_many([asked])
-    json.dumps(found.to_dict(), allow_nan=False)
-    if isinstance(found, SolveFailure):
-        assert str(found).endswith(".")
-        assert "nan" not in str(found)
-        return found
-    assert found.sed_ending > 0.0
-    assert 0.0 < found.error_estimate < math.inf
-    assert found.normal_force > 0.0
+    (result,) = solve_many([scene])
+    json.dumps(result.to_dict(), allow_nan=False)
+    if isinstance(result, SolveFailure):
+        assert str(result).endswith(".")
+        assert "nan" not in str(result)
+        return result
+    assert result.sed_ending > 0.0
+    assert 0.0 < result.error_estimate < math.inf
+    assert result.normal_force > 0.0
     for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"):
-        assert found.audits.get(name, 0.0) < 1e-4
-    doubted = any("round-off" in told for told in found.warnings)
+        assert result.audits.get(name, 0.0) < 1e-4
+    in_doubt = any("round-off" in warning for warning in result.warnings)
     for name in ("penetration", "tension", "cone_violation"):
-        assert found.audits[name] < (1e-4 if doubted else 1e-7)  # 1e-4: from where an answer is refused
-    return found
+        assert result.audits[name] < (1e-4 if in_doubt else 1e-7)  # 1e-4: from where an answer is refused
+    return result
 
 
 @pytest.mark.slow
@@ -143,9 +144,9 @@ def ended(kinematics, finger, tissues, depth, mu, bound, slide, course):
 def test_any_scene_at_small_strain_ends_in_an_answer_or_in_one_sentence(
     finger, tissues, depth, mu, bound, slide, course
 ):
-    found = ended("small", finger, tissues, depth, mu, bound, slide, course)
-    if isinstance(found, SolveFailure):
-        assert mu > 0.5 or "round-off" in str(found), f"refused at mu {mu:g}: {found}"
+    result = solve_and_check("small", finger, tissues, depth, mu, bound, slide, course)
+    if isinstance(result, SolveFailure):
+        assert mu > 0.5 or "round-off" in str(result), f"refused at mu {mu:g}: {result}"
 
 
 @pytest.mark.slow
@@ -154,11 +155,11 @@ def test_any_scene_at_small_strain_ends_in_an_answer_or_in_one_sentence(
 def test_any_scene_at_finite_strain_ends_in_an_answer_or_in_one_sentence(
     finger, tissues, depth, mu, bound, slide, course
 ):
-    ended("finite", finger, tissues, depth, mu, bound, slide, course)
+    solve_and_check("finite", finger, tissues, depth, mu, bound, slide, course)
 
 
 def test_skin_that_round_off_pressed_through_the_surface_is_laid_on_it_again():
     soft = Materials(*(Material(modulus, 0.4999999) for modulus in (0.136, 0.08, 0.034)))
-    found = solve(Scene(materials=soft, friction=Friction(1.0), loading=Loading(1e-5, "+x")))
-    assert found.audits["penetration"] < 1e-7
-    assert not any("too low" in told for told in found.warnings)
+    prediction = solve(Scene(materials=soft, friction=Friction(1.0), loading=Loading(1e-5, "+x")))
+    assert prediction.audits["penetration"] < 1e-7
+    assert not any("too low" in warning for warning in prediction.warnings)

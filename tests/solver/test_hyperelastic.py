@@ -19,21 +19,17 @@ gradients = st.tuples(entries, entries, entries, entries).map(lambda g: np.eye(2
 @pytest.mark.parametrize("law", MEMBERS, ids=lambda law: law.name)
 @given(F=gradients, direction=gradients)
 def test_stress_is_the_derivative_of_the_energy_and_the_tangent_that_of_the_stress(law, F, direction):
-    if np.linalg.det(F) < 0.2:
-        return
     complex_step = 1e-30
-    stepped = F + 1j * complex_step * direction
-    slope = energy(law, stepped).imag / complex_step
+    complex_F = F + 1j * complex_step * direction
+    slope = energy(law, complex_F).imag / complex_step
     np.testing.assert_allclose(np.sum(stress(law, F) * direction), slope, rtol=1e-10, atol=1e-12)
-    bend = stress(law, stepped).imag / complex_step
+    bend = stress(law, complex_F).imag / complex_step
     np.testing.assert_allclose(np.einsum("aAbB,bB->aA", tangent(law, F), direction), bend, rtol=1e-9, atol=1e-11)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=lambda law: law.name)
 @given(F=gradients, angle=st.floats(-4.0, 4.0))
 def test_turning_the_body_costs_nothing_and_turns_the_stress(law, F, angle):
-    if np.linalg.det(F) < 0.2:
-        return
     R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     np.testing.assert_allclose(energy(law, R @ F), energy(law, F), rtol=1e-11, atol=1e-14)
     np.testing.assert_allclose(stress(law, R @ F), R @ stress(law, F), rtol=1e-10, atol=1e-13)
@@ -53,7 +49,7 @@ def test_the_stiffening_law_becomes_the_neo_hookean_one_without_stiffening():
 
 
 @pytest.mark.parametrize(
-    ("law", "stretch", "cauchy", "stored"),
+    ("law", "stretch", "cauchy", "density"),
     [  # sides held: recomputed closed forms of W = G/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2, sigma = dW/dL
         (DERMIS, 0.9, -0.081641, 0.003880),
         (DERMIS, 0.8, -0.193089, 0.017315),
@@ -67,26 +63,26 @@ def test_the_stiffening_law_becomes_the_neo_hookean_one_without_stiffening():
         (EPIDERMIS, 1.2, 0.184386, 0.020059),
     ],
 )
-def test_a_block_held_at_its_sides_has_the_closed_form_stress(law, stretch, cauchy, stored):
+def test_a_block_held_at_its_sides_has_the_closed_form_stress(law, stretch, cauchy, density):
     F = np.diag([1.0, stretch])
     np.testing.assert_allclose((stress(law, F) @ F.T / stretch)[1, 1], cauchy, atol=6e-7)
-    np.testing.assert_allclose(energy(law, F), stored, atol=6e-7)
+    np.testing.assert_allclose(energy(law, F), density, atol=6e-7)
 
 
 @pytest.mark.parametrize(
-    ("stretch", "across", "cauchy", "nominal", "stored"),
+    ("stretch", "across", "cauchy", "nominal", "density"),
     [
         (0.9, 1.101300, -0.010985, -0.012098, 0.000574),
         (0.8, 1.224285, -0.023700, -0.029016, 0.002579),
         (0.7, 1.376321, -0.039394, -0.054219, 0.006650),
     ],
 )
-def test_a_block_with_free_sides_has_the_closed_form_stress(stretch, across, cauchy, nominal, stored):
+def test_a_block_with_free_sides_has_the_closed_form_stress(stretch, across, cauchy, nominal, density):
     F = np.diag([across, stretch])
     P = stress(DERMIS, F)
-    true = P @ F.T / np.linalg.det(F)
-    np.testing.assert_allclose([P[0, 0], P[1, 1], true[1, 1]], [0.0, nominal, cauchy], atol=2e-6)
-    np.testing.assert_allclose(energy(DERMIS, F), stored, atol=6e-7)
+    sigma = P @ F.T / np.linalg.det(F)
+    np.testing.assert_allclose([P[0, 0], P[1, 1], sigma[1, 1]], [0.0, nominal, cauchy], atol=2e-6)
+    np.testing.assert_allclose(energy(DERMIS, F), density, atol=6e-7)
 
 
 def test_simple_shear_has_the_closed_form_stress():

@@ -18,20 +18,20 @@ from solver.constitutive import LAWS, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
-from tests.solver.oracle.skin import crosses_itself, pinched
+from tests.solver.oracle.skin import crosses_itself, measure_compression
 
 
-def distorted(law, seed=1):
+def distorted_body(law, seed=1):
     body = FiniteBody.of(block(distortion=0.06, seed=seed), [law])
     u = np.random.default_rng(seed).uniform(-0.015, 0.015, body.mesh.nodes.shape)
     u[body.mesh.held] = 0.0
     return body, u
 
 
-def assembled(body, u, pressure):
+def assemble(body, u, pressure):
     condensed = CondensedFinite(body)
-    least = element_loops.assemble(u, pressure, True, body.elements, condensed.system)
-    return condensed, least
+    least_det = element_loops.assemble(u, pressure, True, body.elements, condensed.system)
+    return condensed, least_det
 
 
 MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999)]
@@ -39,59 +39,59 @@ MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999)]
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_compiled_forces_and_tangent_agree_with_the_plain_ones(law):
-    body, u = distorted(law)
+    body, u = distorted_body(law)
     pressure = np.random.default_rng(2).normal(0.0, 0.01, (len(body.elements.nodes), 3))
-    condensed, least = assembled(body, u, pressure)
+    condensed, least_det = assemble(body, u, pressure)
     force, _ = oracle.system(body, u, pressure)
-    _, tangent = oracle.without_centres(body, u, pressure)
+    _, tangent = oracle.condense_centres(body, u, pressure)
     np.testing.assert_allclose(condensed.all_forces, force, atol=1e-13 * np.abs(tangent).max())
     np.testing.assert_allclose(np.tril(condensed.system.tangent), np.tril(tangent), atol=1e-12 * np.abs(tangent).max())
-    assert least == pytest.approx(np.linalg.det(oracle.deformation(body, u)).min(), rel=1e-12)
+    assert least_det == pytest.approx(np.linalg.det(oracle.deformation(body, u)).min(), rel=1e-12)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(law):
-    body, u = distorted(law)
-    condensed, _ = assembled(body, u, newton_pressure(body, u))
-    _, tangent = oracle.forces_and_tangents(body, u, newton_pressure(body, u))
-    other = distorted(law, seed=5)[1]
-    least = element_loops.assemble(other, newton_pressure(body, other), False, body.elements, condensed.system)
-    force, _ = oracle.forces_and_tangents(body, other, newton_pressure(body, other))
+    body, u = distorted_body(law)
+    condensed, _ = assemble(body, u, oracle.pressure(body, u))
+    _, tangent = oracle.forces_and_tangents(body, u, oracle.pressure(body, u))
+    other_u = distorted_body(law, seed=5)[1]
+    least_det = element_loops.assemble(other_u, oracle.pressure(body, other_u), False, body.elements, condensed.system)
+    force, _ = oracle.forces_and_tangents(body, other_u, oracle.pressure(body, other_u))
     centre = np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])
     expected, free = np.zeros(body.size), body.elements.unknown.reshape(-1, 16) >= 0
-    left = force[:, :16] - (tangent[:, :16, 16:] @ centre)[:, :, 0]
-    np.add.at(expected, body.elements.unknown.reshape(-1, 16)[free], left[free])
+    condensed_force = force[:, :16] - (tangent[:, :16, 16:] @ centre)[:, :, 0]
+    np.add.at(expected, body.elements.unknown.reshape(-1, 16)[free], condensed_force[free])
     np.testing.assert_allclose(condensed.all_forces, expected, atol=1e-13 * np.abs(tangent).max())
     np.testing.assert_allclose(condensed.system.recovery_matrix[:, :, 16], centre[:, :, 0], atol=1e-12)
-    assert least == pytest.approx(np.linalg.det(oracle.deformation(body, other)).min(), rel=1e-12)
+    assert least_det == pytest.approx(np.linalg.det(oracle.deformation(body, other_u)).min(), rel=1e-12)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_forces_of_a_strain_that_is_nearly_nothing_keep_their_own_digits(law):
     """They are those of the undeformed body's stiffness, but for the strain itself: stiff bone has such."""
-    body, u = distorted(law)
+    body, u = distorted_body(law)
     small = 1e-12 * u
-    _, tangent = oracle.without_centres(body, np.zeros_like(u), np.zeros((len(body.elements.nodes), 3)))
-    condensed, _ = assembled(body, small, newton_pressure(body, small))
-    at = body.elements.unknown.reshape(-1, 16)
-    moved = np.where(at >= 0, small[body.elements.nodes[:, :8]].reshape(-1, 16), 0.0)
+    _, tangent = oracle.condense_centres(body, np.zeros_like(u), np.zeros((len(body.elements.nodes), 3)))
+    condensed, _ = assemble(body, small, oracle.pressure(body, small))
+    unknown = body.elements.unknown.reshape(-1, 16)
+    local_u = np.where(unknown >= 0, small[body.elements.nodes[:, :8]].reshape(-1, 16), 0.0)
     expected = np.zeros(body.size)
-    np.add.at(expected, at[at >= 0], (tangent @ moved[:, :, None])[:, :, 0][at >= 0])
+    np.add.at(expected, unknown[unknown >= 0], (tangent @ local_u[:, :, None])[:, :, 0][unknown >= 0])
     np.testing.assert_allclose(condensed.all_forces, expected, atol=1e-10 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_forces(law):
-    body, u = distorted(law)
-    way = np.random.default_rng(3).normal(size=u.shape)
-    pressure = newton_pressure(body, u)
+    body, u = distorted_body(law)
+    direction = np.random.default_rng(3).normal(size=u.shape)
+    pressure = oracle.pressure(body, u)
     force, tangent = oracle.forces_and_tangents(body, u, pressure)
-    local = way[body.elements.nodes].reshape(len(body.elements.nodes), 18)
+    local = direction[body.elements.nodes].reshape(len(body.elements.nodes), 18)
     h = 1e-6
-    slope = (oracle.energy(body, u + h * way) - oracle.energy(body, u - h * way)) / (2 * h)
+    slope = (oracle.energy(body, u + h * direction) - oracle.energy(body, u - h * direction)) / (2 * h)
     assert np.sum(force * local) == pytest.approx(slope, rel=1e-7)
-    ahead = oracle.forces_and_tangents(body, u + h * way, pressure)[0]
-    behind = oracle.forces_and_tangents(body, u - h * way, pressure)[0]
+    ahead = oracle.forces_and_tangents(body, u + h * direction, pressure)[0]
+    behind = oracle.forces_and_tangents(body, u - h * direction, pressure)[0]
     change = np.einsum("eij,ej->ei", tangent, local)
     np.testing.assert_allclose((ahead - behind) / (2 * h), change, atol=1e-7 * np.abs(change).max())
 
@@ -101,20 +101,20 @@ def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_for
 def test_the_body_eliminated_part_by_part_is_the_body_solved_at_once(columns, held):
     body = FiniteBody.of(block(columns=columns, rows=3, distortion=0.1, held=held), [NeoHooke(0.08, 0.48)])
     u = np.zeros(body.mesh.nodes.shape)
-    condensed, _ = assembled(body, u, np.zeros((len(body.elements.nodes), 3)))
+    condensed, _ = assemble(body, u, np.zeros((len(body.elements.nodes), 3)))
     _, tangent = oracle.system(body, u, np.zeros((len(body.elements.nodes), 3)))
     force = np.random.default_rng(0).normal(size=body.size)
     skin = np.random.default_rng(1).normal(size=2 * len(body.mesh.skin))
-    felt, stiffness = oracle.reduced(force, tangent, len(skin))
+    skin_force, stiffness = oracle.condense_to_skin(force, tangent, len(skin))
     assert condensed.inside.factorise(condensed.system.tangent)
-    carried = force.copy()
-    np.testing.assert_allclose(condensed.inside.condense(carried), felt, rtol=1e-9, atol=1e-9)
+    condensed_force = force.copy()
+    np.testing.assert_allclose(condensed.inside.condense(condensed_force), skin_force, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(condensed.inside.stiffness, stiffness, rtol=1e-9, atol=1e-12 * np.abs(stiffness).max())
     inside = body.size - len(skin)
-    for known, load in ((carried, force), (np.zeros(body.size), np.zeros(body.size))):
+    for force_inside, load in ((condensed_force, force), (np.zeros(body.size), np.zeros(body.size))):
         expected = np.linalg.solve(tangent[:inside, :inside], -load[:inside] - tangent[:inside, inside:] @ skin)
-        found = condensed.inside.back_substitute(known, skin)
-        np.testing.assert_allclose(found, np.r_[expected, skin], rtol=1e-9, atol=1e-9)
+        unknowns = condensed.inside.back_substitute(force_inside, skin)
+        np.testing.assert_allclose(unknowns, np.r_[expected, skin], rtol=1e-9, atol=1e-9)
 
 
 def test_a_tangent_without_stiffness_cannot_be_eliminated():
@@ -123,7 +123,7 @@ def test_a_tangent_without_stiffness_cannot_be_eliminated():
 
 
 @compile_loop
-def solved(matrix, right, size):
+def solve_system(matrix, right, size):
     return contact_system.solve(matrix, right, size)
 
 
@@ -132,9 +132,9 @@ def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
     for size in range(1, 12):
         matrix, right = rng.normal(size=(size, size)) + 4.0 * np.eye(size), rng.normal(size=(size, 4))
         solution = right.copy()
-        assert solved(np.r_[matrix.ravel(), 7.0], solution, size)
+        assert solve_system(np.r_[matrix.ravel(), 7.0], solution, size)
         np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
-    assert not solved(np.zeros(4), np.ones((2, 4)), 2)
+    assert not solve_system(np.zeros(4), np.ones((2, 4)), 2)
 
 
 def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
@@ -146,7 +146,7 @@ def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
 
 
 def test_contact_rows_are_the_derivatives_of_their_conditions():
-    body, u = distorted(NeoHooke(0.08, 0.48))
+    body, u = distorted_body(NeoHooke(0.08, 0.48))
     newton = Newton(body.condensed)
     start = EquilibriumState.undeformed(newton.condensed)
     state = np.array([STICK, SLIP, SHEAR_LIMITED, SHEAR_LIMITED, SHEAR_LIMITED, SLIP, OPEN], np.int32)
@@ -155,10 +155,10 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
     anchor = newton.skin_x + 0.01
 
     def conditions(u):
-        pressure = newton_pressure(body, u)
-        at = EquilibriumState(u, pressure, state, sense, start.reaction, load, 0)
+        pressure = oracle.pressure(body, u)
+        equilibrium = EquilibriumState(u, pressure, state, sense, start.reaction, load, 0)
         force = oracle.system(body, u, pressure)[0]
-        place = at.place(newton.condensed)
+        place = equilibrium.place(newton.condensed)
         length = oracle.tributary(place[:, 0])
         out = force.copy()
         for i in range(len(body.mesh.skin)):
@@ -172,32 +172,25 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
                 out[x] = force[x] - sense[i] * load.mu * force[y]
             elif state[i] == SHEAR_LIMITED:
                 out[x] = force[x] - sense[i] * load.tau * length[i]
-        return out, at
+        return out, equilibrium
 
     # the centres must be in equilibrium, since the condensed force is that of a body whose centres are
-    u = equilibrated(body, u)
-    here, shape = conditions(u)
-    assert newton.linearise(shape, load, anchor)
-    found = []
+    u = relax_centres(body, u)
+    residual, start_state = conditions(u)
+    assert newton.linearise(start_state, load, anchor)
+    residuals = []
     for part in (1e-4, -1e-4):
-        moved, largest, _ = newton.apply_step(shape, load, newton.steps[:, 0], anchor, part)
-        assert largest == pytest.approx(np.abs(moved.u - u).max() / abs(part), rel=1e-6)
-        found.append(conditions(equilibrated(body, moved.u))[0])
-    ahead, behind = found
-    np.testing.assert_allclose((ahead - behind) / 2e-4, -here, atol=1e-7 * np.abs(here).max())
+        stepped, largest, _ = newton.apply_step(start_state, load, newton.steps[:, 0], anchor, part)
+        assert largest == pytest.approx(np.abs(stepped.u - u).max() / abs(part), rel=1e-6)
+        residuals.append(conditions(relax_centres(body, stepped.u))[0])
+    ahead, behind = residuals
+    np.testing.assert_allclose((ahead - behind) / 2e-4, -residual, atol=1e-7 * np.abs(residual).max())
 
 
-def newton_pressure(body, u):
-    J = np.linalg.det(oracle.deformation(body, u))
-    return body.elements.lame[:, None] * np.einsum(
-        "eq,eqm,eq->em", body.elements.weight, body.elements.modes, np.log(J)
-    )
-
-
-def equilibrated(body, u):
+def relax_centres(body, u):
     u = u.copy()
     for _ in range(8):
-        force, tangent = oracle.forces_and_tangents(body, u, newton_pressure(body, u))
+        force, tangent = oracle.forces_and_tangents(body, u, oracle.pressure(body, u))
         u[body.elements.nodes[:, 8]] -= np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])[:, :, 0]
     return u
 
@@ -213,30 +206,30 @@ def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
 
 
 def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one_is():
-    draw, seen = np.random.default_rng(5), set()
+    rng, crossings = np.random.default_rng(5), set()
     for spread in np.geomspace(0.01, 1.0, 40):
         nodes = np.stack([np.linspace(0.0, 3.0, 24), np.zeros(24)], axis=1)
-        u = spread * draw.normal(size=nodes.shape)
+        u = spread * rng.normal(size=nodes.shape)
         outline = np.arange(2, 23)
-        loose, touching = draw.random(10) < 0.8, draw.random(21) < 0.3
+        loose, touching = rng.random(10) < 0.8, rng.random(21) < 0.3
         before, after = nodes[outline], (nodes + u)[outline]
         first, state = 5, touching[5:18].astype(np.int32)
         touching[:5] = touching[18:] = False  # skin that may not touch
         assert skin_loops.measure_compression(nodes, u, outline, loose, state, first) == pytest.approx(
-            pinched(before, after, loose, touching), rel=1e-12
+            measure_compression(before, after, loose, touching), rel=1e-12
         )
         assert skin_loops.crosses(nodes, u, outline) == crosses_itself(after)
-        seen.add(skin_loops.crosses(nodes, u, outline))
-    assert seen == {True, False}
+        crossings.add(skin_loops.crosses(nodes, u, outline))
+    assert crossings == {True, False}
 
 
 @given(
     st.floats(0.0, np.pi), st.lists(st.floats(0.01, 1.0), min_size=4, max_size=40), st.floats(-20.0, 20.0),
     st.floats(0.0, 1e-15),
 )  # fmt: skip
-def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, pieces, away, noise):
-    way = np.concatenate([[0.0], np.cumsum(pieces)])
-    nodes = away + np.stack([way * np.cos(angle), way * np.sin(angle)], axis=1)
+def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, pieces, offset, noise):
+    arc = np.concatenate([[0.0], np.cumsum(pieces)])
+    nodes = offset + np.stack([arc * np.cos(angle), arc * np.sin(angle)], axis=1)
     u = noise * np.random.default_rng(len(pieces)).normal(size=nodes.shape)
     assert not crosses_itself(nodes + u)
     assert not skin_loops.crosses(nodes, u, np.arange(len(nodes)))
@@ -244,16 +237,16 @@ def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, piec
 
 @pytest.mark.slow
 def test_no_bit_depends_on_which_loops_a_process_called_before():
-    solved = (
+    solving = (
         "from dataclasses import replace\n"
         "from solver.scene.published import SLIPPERINESS, scene\n"
         "from solver.response.solution import solve\n"
-        "asked = scene(SLIPPERINESS[0])\n"
-        "asked = replace(asked, solve=replace(asked.solve, kinematics='finite'))\n"
-        "found = solve(asked)\n"
-        "print(found.sed_ending.hex(), found.error_estimate.hex(), found.normal_force.hex())\n"
+        "slippery = scene(SLIPPERINESS[0])\n"
+        "slippery = replace(slippery, solve=replace(slippery.solve, kinematics='finite'))\n"
+        "prediction = solve(slippery)\n"
+        "print(prediction.sed_ending.hex(), prediction.error_estimate.hex(), prediction.normal_force.hex())\n"
     )
-    before = (
+    other_loops = (
         "import numpy as np\n"
         "from solver._kernels import active_set, contact_system, skin as skin_loops\n"
         "from solver.arrays import ContactStates, LoadArguments, Skin, SkinPosition\n"
@@ -264,8 +257,8 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
         "states = ContactStates(state, state.copy(), np.zeros((3, 2)))\n"
         "active_set.update_contact_states(states, SkinPosition(zero, zero, zero), load, skin, zero.copy())\n"
     )
-    first, then = (
+    alone, after_other_loops = (
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-        for script in (solved, before + solved)
+        for script in (solving, other_loops + solving)
     )
-    assert first == then
+    assert alone == after_other_loops

@@ -9,7 +9,6 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
 from solver.continuation import continue_branch, existence, finite_states, folds_at
-from solver.continuation import existence as reach
 from solver.equilibrium import BY_FRICTION, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -21,7 +20,7 @@ TOWARDS_TIP = -1  # the bone goes along +x, so the surface pulls the skin along 
 SQUEEZED = [(1.8, 69.4, (0.1525, 0.0775, 0.0303)), (1.73, 65.9, (0.1198, 0.0576, 0.0306))]  # drawn at random
 
 
-def squeezed(depth, angle, tissues):
+def squeezed_scene(depth, angle, tissues):
     """Return a scene whose branch ends because the skin is squeezed at one place, far from a limit point."""
     return Scene(
         finger=Finger(contact_angle=angle),
@@ -37,11 +36,11 @@ def squeezed(depth, angle, tissues):
     [pytest.param(1.0, 0.987, marks=SLOW), (1.5, 0.609), (2.0, 0.373), pytest.param(2.5, 0.233, marks=SLOW)],
 )
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
-    found = reach.of_friction(
+    reach = existence.of_friction(
         Scene(friction=Friction(0.0), loading=Loading(depth)), LoadState(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
     )
-    assert found.limited
-    assert found.value == pytest.approx(largest, rel=0.03)
+    assert reach.limited
+    assert reach.value == pytest.approx(largest, rel=0.03)
 
 
 @pytest.mark.parametrize(
@@ -54,9 +53,9 @@ def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_f
     ],
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
-    found = reach.of_depth(Scene(friction=Friction(mu), loading=Loading(2.0)), LoadState(2.0, mu, tau, TOWARDS_TIP))
-    assert found.limited
-    assert found.value == pytest.approx(largest, rel=0.03)
+    reach = existence.of_depth(Scene(friction=Friction(mu), loading=Loading(2.0)), LoadState(2.0, mu, tau, TOWARDS_TIP))
+    assert reach.limited
+    assert reach.value == pytest.approx(largest, rel=0.03)
 
 
 @SLOW
@@ -64,15 +63,15 @@ def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
 def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_the_size(
     depth, angle, tissues, monkeypatch
 ):
-    scene = squeezed(depth, angle, tissues)
+    scene = squeezed_scene(depth, angle, tissues)
     load = LoadState(depth, 0.85, np.inf, TOWARDS_TIP)
-    mu, deepest = reach.of_friction(scene, load, 2.0), reach.of_depth(scene, load)
-    monkeypatch.setattr(reach, "FINENESS", 2.0 * reach.FINENESS)
+    mu, deepest = existence.of_friction(scene, load, 2.0), existence.of_depth(scene, load)
+    monkeypatch.setattr(existence, "FINENESS", 2.0 * existence.FINENESS)
     monkeypatch.setattr(mesher, "FOLD", tuple(size / 2.0 for size in mesher.FOLD))
-    finer = squeezed(depth + 1e-9, angle, tissues)  # what was answered is not asked again
+    finer = squeezed_scene(depth + 1e-9, angle, tissues)  # what was answered is not asked again
     load = load._replace(depth=depth + 1e-9)
-    assert mu.value == pytest.approx(reach.of_friction(finer, load, 2.0).value, rel=0.015)
-    assert deepest.value == pytest.approx(reach.of_depth(finer, load).value, rel=0.01)
+    assert mu.value == pytest.approx(existence.of_friction(finer, load, 2.0).value, rel=0.015)
+    assert deepest.value == pytest.approx(existence.of_depth(finer, load).value, rel=0.01)
 
 
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
@@ -90,7 +89,7 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
 def test_every_friction_beyond_the_end_of_a_branch_has_the_same_limit():
     scene, load = Scene(friction=Friction(0.0), loading=Loading(2.2)), LoadState(2.2, 0.0, np.inf, TOWARDS_TIP)
     targets = (1.1, 0.33, 0.7)  # in pieces of the branch that are traced one after another
-    assert len({reach.of_friction(scene, load, target).value for target in targets}) == 1
+    assert len({existence.of_friction(scene, load, target).value for target in targets}) == 1
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
@@ -113,9 +112,9 @@ def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_anothe
     mesh = FiniteFinger.of(scene, mesher.Sizing(11.0, 2.0, margin=6.0)).geometry.mesh
     newton = Newton(FiniteBody.of(mesh, laws).condensed)
     load = LoadState(2.0, 0.5, np.inf, TOWARDS_TIP)
-    with pytest.raises(NoSteadyState) as refused:
+    with pytest.raises(NoSteadyState) as refusal:
         finite_states.steady_body(newton.condensed.body, load, laws[mesher.EPIDERMIS])
-    assert refused.value.limit_mu == pytest.approx(0.373, rel=0.03)
+    assert refusal.value.limit_mu == pytest.approx(0.373, rel=0.03)
     below = finite_states.steady_body(newton.condensed.body, load._replace(mu=0.3), laws[mesher.EPIDERMIS])
     np.testing.assert_allclose(below.u, solve_full_slip(newton, load._replace(mu=0.3)).u, atol=1e-6)
 
@@ -137,17 +136,18 @@ def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_m
 def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monkeypatch):
     scene = Scene(friction=Friction(0.6), loading=Loading(2.0, "-x"), solve=Solve("finite"))
     load = LoadState(2.0, 0.6, np.inf, TOWARDS_TIP)
-    ends = reach.Reach(0.373, limited=True, lost=False, least=0.55, folds=0.54, numbers=np.ones(3))
+    branch_end = existence.Reach(0.373, limited=True, lost=False, least=0.55, folds=0.54, numbers=np.ones(3))
 
-    def by_depth(_scene, asked):
-        return replace(ends, value=1.5, limited=asked.mu == load.mu)  # with a little less friction 2 mm are reached
+    def by_depth(_scene, target):
+        # with a little less friction 2 mm are reached
+        return replace(branch_end, value=1.5, limited=target.mu == load.mu)
 
     monkeypatch.setattr(existence, "_direct_states", lambda *_: iter(()))
-    monkeypatch.setattr(reach, "of_friction", lambda *_: ends)
-    monkeypatch.setattr(reach, "of_depth", by_depth)
+    monkeypatch.setattr(existence, "of_friction", lambda *_: branch_end)
+    monkeypatch.setattr(existence, "of_depth", by_depth)
     with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):
         existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
-    monkeypatch.setattr(reach, "of_depth", lambda *_: replace(ends, value=1.5))
-    with pytest.raises(NoSteadyState) as refused:
+    monkeypatch.setattr(existence, "of_depth", lambda *_: replace(branch_end, value=1.5))
+    with pytest.raises(NoSteadyState) as refusal:
         existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
-    assert (refused.value.limit_mu, refused.value.limit_indentation) == (0.373, 1.5)
+    assert (refusal.value.limit_mu, refusal.value.limit_indentation) == (0.373, 1.5)

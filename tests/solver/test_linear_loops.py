@@ -21,22 +21,22 @@ def mesh():
     return finger_mesh(Finger(), Receptor(), Sizing(3, 2.0)).mesh
 
 
-def off(found, expected):
-    return np.abs(found - expected).max() / max(np.abs(expected).max(), np.finfo(float).tiny)
+def error(values, expected):
+    return np.abs(values - expected).max() / max(np.abs(expected).max(), np.finfo(float).tiny)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.48, 0.4999999])
 def test_the_stiffness_of_elements_is_the_plain_one(mesh, nu):
     tissues = [Hooke(E, nu) for E in (0.136, 0.08, 0.034)]
-    plain, found = oracle.elastic(mesh, tissues), LinearElimination(mesh, tissues)
+    expected, elimination = oracle.elastic(mesh, tissues), LinearElimination(mesh, tissues)
     for name in ("shear", "lame"):
-        assert off(getattr(found.elastic.elements, name), getattr(plain, name)) < CLOSE
-    dilatation = np.swapaxes(found.elastic.combination, 1, 2) @ found.elastic.divergence
-    assert off(dilatation, plain.dilatation) < CLOSE
-    assert off(found.elastic.centre, plain.centre) < 1e-14
-    moved = np.random.default_rng(2).normal(size=(len(mesh.elements), 9, 2))
-    forces = plain.stiffness @ moved.reshape(-1, 18, 1)
-    assert off(found.elastic.forces(moved).reshape(forces.shape), forces) < CLOSE
+        assert error(getattr(elimination.elastic.elements, name), getattr(expected, name)) < CLOSE
+    dilatation = np.swapaxes(elimination.elastic.combination, 1, 2) @ elimination.elastic.divergence
+    assert error(dilatation, expected.dilatation) < CLOSE
+    assert error(elimination.elastic.centre, expected.centre) < 1e-14
+    displacement = np.random.default_rng(2).normal(size=(len(mesh.elements), 9, 2))
+    forces = expected.stiffness @ displacement.reshape(-1, 18, 1)
+    assert error(elimination.elastic.forces(displacement).reshape(forces.shape), forces) < CLOSE
 
 
 def test_a_body_eliminated_in_loops_is_the_plain_one(mesh):
@@ -44,17 +44,17 @@ def test_a_body_eliminated_in_loops_is_the_plain_one(mesh):
     rng = np.random.default_rng(1)
     load = rng.normal(size=mesh.nodes.shape)
     load[mesh.held] = 0.0
-    plain = oracle.Reduced(mesh, oracle.elastic(mesh, TISSUES).stiffness, load.reshape(-1, 1))
-    found = LinearElimination(mesh, TISSUES)
-    carried = found.condense(load)
-    assert off(found.stiffness, plain.stiffness) < CLOSE
-    assert off(found.skin_load(carried)[:, None], plain.load) < CLOSE
+    expected = oracle.CondensedBody(mesh, oracle.elastic(mesh, TISSUES).stiffness, load.reshape(-1, 1))
+    body = LinearElimination(mesh, TISSUES)
+    condensed_load = body.condense(load)
+    assert error(body.stiffness, expected.stiffness) < CLOSE
+    assert error(body.skin_load(condensed_load)[:, None], expected.load) < CLOSE
     skin = rng.normal(size=(2 * len(mesh.skin), 2))
-    whole = plain.all_unknowns(skin, load.reshape(-1, 1)).reshape(*mesh.nodes.shape, 2)
-    assert off(found.displacement(skin, carried), whole) < CLOSE
-    assert off(found.displacement(skin, found.unloaded), plain.all_unknowns(skin).reshape(whole.shape)) < CLOSE
-    some = mesh.elements[40]
-    assert off(found.displacement(skin, carried, only=some)[some], whole[some]) < CLOSE
+    u = expected.all_unknowns(skin, load.reshape(-1, 1)).reshape(*mesh.nodes.shape, 2)
+    assert error(body.displacement(skin, condensed_load), u) < CLOSE
+    assert error(body.displacement(skin, body.unloaded), expected.all_unknowns(skin).reshape(u.shape)) < CLOSE
+    nodes = mesh.elements[40]
+    assert error(body.displacement(skin, condensed_load, only=nodes)[nodes], u[nodes]) < CLOSE
 
 
 def test_what_no_stable_body_is_made_of_is_refused(mesh):
@@ -73,7 +73,7 @@ def test_the_same_question_is_answered_bit_by_bit_the_same_again():
     scenes = [scene(surface) for surface in SLIPPERINESS]
     first = solve_many(scenes)
     again = solve_many(scenes)
-    for one, other in zip(first, again, strict=True):
-        assert (one.sed_ending, one.error_estimate) == (other.sed_ending, other.error_estimate)
-        np.testing.assert_array_equal(one.displacement, other.displacement)
+    for prediction, repeated in zip(first, again, strict=True):
+        assert (prediction.sed_ending, prediction.error_estimate) == (repeated.sed_ending, repeated.error_estimate)
+        np.testing.assert_array_equal(prediction.displacement, repeated.displacement)
     assert solve(scenes[0]).sed_ending == solve(scenes[0]).sed_ending

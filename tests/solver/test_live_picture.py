@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene
+from solver.body import Probes
 from solver.equilibrium import EquilibriumState, LoadState
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
@@ -25,18 +26,16 @@ def state(finger):
 
 def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(finger, state):
     picture = LivePicture(finger)
-    moved = finger.displacement(state)
+    displacement = finger.displacement(state)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
-    assert picture.nodes(state) == pytest.approx(mesh.nodes + moved - [0.0, 1.5], abs=1e-9)
+    assert picture.nodes(state) == pytest.approx(mesh.nodes + displacement - [0.0, 1.5], abs=1e-9)
 
-    from solver.body import Probes
-
-    third = 7  # an element; its quarters' middles are probed by the solver's own energy
+    element = 7  # an element; its quarters' middles are probed by the solver's own energy
     probes = Probes.at(
-        mesh, elastic.centre, np.full(4, third), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+        mesh, elastic.centre, np.full(4, element), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
     )
-    expected = elastic.energy(probes, moved[:, :, None])[:, 0]
-    assert picture.sed(state)[4 * third : 4 * third + 4] == pytest.approx(expected, rel=1e-9)
+    expected = elastic.energy(probes, displacement[:, :, None])[:, 0]
+    assert picture.sed(state)[4 * element : 4 * element + 4] == pytest.approx(expected, rel=1e-9)
 
 
 def test_faces_cover_the_tissue_once(finger):
@@ -44,8 +43,8 @@ def test_faces_cover_the_tissue_once(finger):
     corners = picture.nodes(EquilibriumState.undeformed(finger.body.condensed))[picture.faces]
     x, y = corners[..., 0], corners[..., 1]
     area = 0.5 * np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y, axis=1)
-    whole = finger.geometry.mesh.nodes[finger.geometry.mesh.elements[:, :4]]
-    x, y = whole[..., 0], whole[..., 1]
+    element_corners = finger.geometry.mesh.nodes[finger.geometry.mesh.elements[:, :4]]
+    x, y = element_corners[..., 0], element_corners[..., 1]
     by_elements = 0.5 * np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y)
     assert (area > 0).all()
     assert area.sum() == pytest.approx(by_elements, rel=0.05)  # corners alone cut the round outline off

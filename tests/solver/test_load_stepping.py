@@ -7,39 +7,39 @@ from solver.equilibrium.load_stepping import StepControl, advance
 from solver.progress import interruptible
 
 
-def brought_on(longest, control, wall=2.0):
+def advance_up_to(longest, control, wall=2.0):
     """Bring on a load that takes steps up to `longest` and does not go beyond `wall`; return where it went."""
-    reached, failed = [0.0], []
+    positions, failures = [0.0], []
 
     def step(part):
-        if part - reached[-1] > longest or part > wall:
-            failed.append(part)
+        if part - positions[-1] > longest or part > wall:
+            failures.append(part)
             raise NotConverged("too far")
-        reached.append(part)
+        positions.append(part)
 
-    advance(step, lambda done, part, why: NotConverged(f"{done} {part} {why}"), control)
-    return reached[1:], failed
+    advance(step, lambda position, part, reason: NotConverged(f"{position} {part} {reason}"), control)
+    return positions[1:], failures
 
 
 def test_a_path_that_goes_at_once_is_one_step():
-    assert brought_on(1.0, StepControl()) == ([1.0], [])
+    assert advance_up_to(1.0, StepControl()) == ([1.0], [])
 
 
 def test_a_step_that_fails_is_halved_and_the_rest_goes_in_steps_of_that_size():
-    assert brought_on(0.3, StepControl()) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5])
+    assert advance_up_to(0.3, StepControl()) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5])
 
 
 def test_steps_grow_again_where_they_are_told_to():
-    assert brought_on(0.3, StepControl(growth=2.0)) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5, 0.75, 1.0])
+    assert advance_up_to(0.3, StepControl(growth=2.0)) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5, 0.75, 1.0])
 
 
 def test_what_the_smallest_step_does_not_pass_is_refused_with_where_it_began():
     with pytest.raises(NotConverged, match=r"0\.5 0\.125 too far"):
-        brought_on(1.0, StepControl(smallest=0.25), wall=0.6)
+        advance_up_to(1.0, StepControl(smallest=0.25), wall=0.6)
 
 
 def test_a_path_stops_between_two_steps():
-    taken = []
-    with pytest.raises(Cancelled), interruptible(lambda part: part < 2, lambda: len(taken)):
-        advance(taken.append, lambda *_: NotConverged(""), StepControl(first=0.25))
-    assert taken == [0.25, 0.5]
+    steps = []
+    with pytest.raises(Cancelled), interruptible(lambda part: part < 2, lambda: len(steps)):
+        advance(steps.append, lambda *_: NotConverged(""), StepControl(first=0.25))
+    assert steps == [0.25, 0.5]

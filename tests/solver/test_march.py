@@ -25,53 +25,54 @@ def test_sliding_far_ends_in_the_state_that_is_solved_directly(depth, mu, tau, d
 
 
 @pytest.fixture(scope="module")
-def marched():
+def histories():
     """Courses of one finger in steps, and in steps half as long."""
     newton, _, _ = finger(4)
     courses = [press_and_slide(1.0, 0.4, 0.02, 1, press=8 * n, slides=16 * n, distance=2.0) for n in (1, 2)]
     return newton, [list(march(newton, course)) for course in courses]
 
 
-def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes(marched):
-    newton, (_, fine) = marched
-    body, before, work, lost = newton.condensed.body, fine[0], 0.0, 0.0
-    for shape in fine[1:]:
-        push = (shape.reaction + before.reaction) / 2.0
-        work += push[:, 1].sum() * (shape.load.depth - before.load.depth)
-        work += push[:, 0].sum() * (shape.load.travel - before.load.travel)
-        slip = np.diff([s.place(newton.condensed)[:, 0] - s.load.travel for s in (before, shape)], axis=0)[0]
-        assert (shape.reaction[:, 0] * slip).max() < 1e-12
-        lost -= float(push[:, 0] @ slip)
-        before = shape
-    stored = [oracle.energy(body, shape.u) for shape in (fine[0], fine[-1])]
-    assert lost > 0.1 * work
-    assert work == pytest.approx(stored[1] - stored[0] + lost, rel=3e-3)
+def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes(histories):
+    newton, (_, fine) = histories
+    body, last_state, work, friction_work = newton.condensed.body, fine[0], 0.0, 0.0
+    for state in fine[1:]:
+        push = (state.reaction + last_state.reaction) / 2.0
+        work += push[:, 1].sum() * (state.load.depth - last_state.load.depth)
+        work += push[:, 0].sum() * (state.load.travel - last_state.load.travel)
+        slip = np.diff([s.place(newton.condensed)[:, 0] - s.load.travel for s in (last_state, state)], axis=0)[0]
+        assert (state.reaction[:, 0] * slip).max() < 1e-12
+        friction_work -= float(push[:, 0] @ slip)
+        last_state = state
+    energies = [oracle.energy(body, state.u) for state in (fine[0], fine[-1])]
+    assert friction_work > 0.1 * work
+    assert work == pytest.approx(energies[1] - energies[0] + friction_work, rel=3e-3)
     assert course_audits(newton, from_rest(newton, fine))["course_least_dissipation"] > -1e-14
 
 
-def test_shorter_steps_leave_less_of_the_bones_work_over_and_simpsons_rule_next_to_nothing(marched):
-    newton, ways = marched
-    coarse, fine = (course_audits(newton, from_rest(newton, way)) for way in ways)
+def test_shorter_steps_leave_less_of_the_bones_work_over_and_simpsons_rule_next_to_nothing(histories):
+    newton, courses = histories
+    coarse, fine = (course_audits(newton, from_rest(newton, course)) for course in courses)
     assert fine["course_step_work"] < coarse["course_step_work"] / 2.0 < 0.005
     assert fine["course_work_balance"] < coarse["course_work_balance"] / 8.0 < 1e-4
 
 
-def test_forces_told_one_percent_too_large_are_out_of_balance_with_what_is_stored(marched):
-    newton, (_, fine) = marched
-    wrong = course_audits(newton, from_rest(newton, [replace(shape, reaction=1.01 * shape.reaction) for shape in fine]))
-    assert wrong["course_step_work"] > 0.005
-    assert wrong["course_work_balance"] > 0.002
+def test_forces_told_one_percent_too_large_are_out_of_balance_with_what_is_stored(histories):
+    newton, (_, fine) = histories
+    scaled = [replace(state, reaction=1.01 * state.reaction) for state in fine]
+    audits = course_audits(newton, from_rest(newton, scaled))
+    assert audits["course_step_work"] > 0.005
+    assert audits["course_work_balance"] > 0.002
 
 
 def test_points_stick_before_they_slip_and_turn_round_with_the_bone():
     newton, probes, _ = finger(5)
-    there = press_and_slide(1.5, 0.44, 0.03009, -1, press=6, slides=20, distance=6.0)
-    back = [load._replace(travel=6.0 - 0.5 * i) for i, load in enumerate([there[-1]] * 22, start=1)]
-    shapes = list(march(newton, there + back))
-    early, settled_one, last = shapes[5], shapes[25], shapes[-1]
+    forwards = press_and_slide(1.5, 0.44, 0.03009, -1, press=6, slides=20, distance=6.0)
+    backwards = [load._replace(travel=6.0 - 0.5 * i) for i, load in enumerate([forwards[-1]] * 22, start=1)]
+    states = list(march(newton, forwards + backwards))
+    early, settled, last = states[5], states[25], states[-1]
     assert (early.state == STICK).any()
-    assert (settled_one.state[settled_one.touching] >= SLIP).all()
-    assert (settled_one.sense[settled_one.touching] == 1).all()
+    assert (settled.state[settled.touching] >= SLIP).all()
+    assert (settled.sense[settled.touching] == 1).all()
     assert (last.sense[last.touching] == -1).all()
     opposite = solve_full_slip(newton, LoadState(1.5, 0.44, 0.03009, -1))
     assert probes.average(last.u)[0] == pytest.approx(probes.average(opposite.u)[0], rel=1e-9)

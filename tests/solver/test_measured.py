@@ -1,4 +1,4 @@
-"""Evidence for what was left out can be measured, and scenes that need more than was asked are told so."""
+"""Omitted effects can be measured, and a prediction warns where one of them matters."""
 
 import json
 from dataclasses import replace
@@ -12,67 +12,67 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 
 @pytest.fixture(scope="module")
-def measured():
+def measured_prediction():
     return solve(replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5, evidence="measured")))
 
 
-def entry(found, name):
-    return found.model["left_out"][name]
+def entry(prediction, name):
+    return prediction.model["left_out"][name]
 
 
 @pytest.mark.slow
-def test_measured_differences_are_those_of_two_solves(measured):
-    plain = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
-    base = solve(plain).sed_ending
-    with_bone = solve(replace(plain, finger=replace(plain.finger, bone="meshed"))).sed_ending
-    assert entry(measured, "bone compliance")["estimate"] == pytest.approx(abs(with_bone / base - 1.0))
-    finite = solve(replace(plain, solve=Solve("finite", tolerance=0.5))).sed_ending
-    assert entry(measured, "finite strain")["estimate"] == pytest.approx(abs(finite / base - 1.0))
-    assert entry(measured, "history")["estimate"] < 1e-9  # a settled slide has none left
-    assert 0.0 < entry(measured, "viscosity")["estimate"] < 1.0
-    assert measured.sed_ending == base
+def test_measured_differences_are_those_of_two_solves(measured_prediction):
+    without_evidence = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
+    base = solve(without_evidence).sed_ending
+    with_bone = solve(replace(without_evidence, finger=replace(without_evidence.finger, bone="meshed"))).sed_ending
+    assert entry(measured_prediction, "bone compliance")["estimate"] == pytest.approx(abs(with_bone / base - 1.0))
+    finite = solve(replace(without_evidence, solve=Solve("finite", tolerance=0.5))).sed_ending
+    assert entry(measured_prediction, "finite strain")["estimate"] == pytest.approx(abs(finite / base - 1.0))
+    assert entry(measured_prediction, "history")["estimate"] < 1e-9  # a settled slide has none left
+    assert 0.0 < entry(measured_prediction, "viscosity")["estimate"] < 1.0
+    assert measured_prediction.sed_ending == base
 
 
 @pytest.mark.slow
-def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(measured):
-    assert "measured" in entry(measured, "bone compliance")["how"]
-    assert entry(measured, "bone compliance")["estimated"] > 0.0
-    assert measured.evidence_s > 0.0
-    printed = json.loads(json.dumps(measured.to_dict()))
-    assert printed["evidence_s"] == measured.evidence_s
-    assert any("finite strain" in told and "%" in told for told in measured.warnings)
+def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(measured_prediction):
+    assert "measured" in entry(measured_prediction, "bone compliance")["how"]
+    assert entry(measured_prediction, "bone compliance")["estimated"] > 0.0
+    assert measured_prediction.evidence_s > 0.0
+    document = json.loads(json.dumps(measured_prediction.to_dict()))
+    assert document["evidence_s"] == measured_prediction.evidence_s
+    assert any("finite strain" in warning and "%" in warning for warning in measured_prediction.warnings)
 
 
 def test_a_difference_that_two_meshes_explain_is_not_told_as_one_of_the_kinematics():
-    touch = Scene(loading=Loading(1e-6, "none"), friction=Friction(0.0), solve=Solve(evidence="measured"))
-    found = solve(touch)
-    told = entry(found, "finite strain")
-    assert told["estimate"] == told["estimated"] < 1e-3  # as small as its strains
-    assert "the estimate stands" in told["how"]
-    assert not any("finite strain" in warning for warning in found.warnings)
+    scene = Scene(loading=Loading(1e-6, "none"), friction=Friction(0.0), solve=Solve(evidence="measured"))
+    prediction = solve(scene)
+    effect = entry(prediction, "finite strain")
+    assert effect["estimate"] == effect["estimated"] < 1e-3  # as small as its strains
+    assert "the estimate stands" in effect["how"]
+    assert not any("finite strain" in warning for warning in prediction.warnings)
 
 
 def test_without_being_asked_nothing_is_measured_but_what_tissues_still_hold_and_that_took_time():
-    found = solve(replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5)))
-    assert found.evidence_s > 0.0
-    assert all("measured" not in told["how"] for told in found.model["left_out"].values())
-    assert "marched" in entry(found, "viscosity")["how"]
+    prediction = solve(replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5)))
+    assert prediction.evidence_s > 0.0
+    assert all("measured" not in effect["how"] for effect in prediction.model["left_out"].values())
+    assert "marched" in entry(prediction, "viscosity")["how"]
 
 
 def test_a_bone_too_soft_to_count_as_rigid_is_told():
-    given = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
-    soft = replace(given, materials=replace(given.materials, bone=Material(1.0, 0.3)))
-    assert any('finger.bone = "meshed"' in told for told in solve(soft).warnings)
+    slippery = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
+    soft = replace(slippery, materials=replace(slippery.materials, bone=Material(1.0, 0.3)))
+    assert any('finger.bone = "meshed"' in warning for warning in solve(soft).warnings)
     meshed = replace(soft, finger=replace(soft.finger, bone="meshed"))
-    assert not any("bone" in told for told in solve(meshed).warnings)
+    assert not any("bone" in warning for warning in solve(meshed).warnings)
 
 
 @pytest.mark.slow
 def test_a_scene_that_folds_at_finite_strain_is_told_at_small_strain():
-    found = solve(replace(scene(STICKINESS[4]), solve=Solve(tolerance=0.5, evidence="measured")))
-    assert entry(found, "finite strain")["estimate"] is None
-    assert 0.3 < entry(found, "finite strain")["from"]["limit_mu"] < 0.5
-    assert any("no settled state" in told for told in found.warnings)
+    prediction = solve(replace(scene(STICKINESS[4]), solve=Solve(tolerance=0.5, evidence="measured")))
+    assert entry(prediction, "finite strain")["estimate"] is None
+    assert 0.3 < entry(prediction, "finite strain")["from"]["limit_mu"] < 0.5
+    assert any("no settled state" in warning for warning in prediction.warnings)
 
 
 def test_evidence_of_another_kind_is_refused():
@@ -87,10 +87,10 @@ def still_held(settled, marched):
 
 
 def test_a_relaxing_finger_solved_as_settled_is_told_what_it_still_holds_and_one_marched_holds_nothing():
-    given = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
-    dermis = replace(given.materials.dermis, prony=(Relaxation(0.3, 1.0),))
-    settled = solve(replace(given, materials=replace(given.materials, dermis=dermis)))
-    assert any("viscosity" in told and "history" in told for told in settled.warnings)
+    slippery = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
+    dermis = replace(slippery.materials.dermis, prony=(Relaxation(0.3, 1.0),))
+    settled = solve(replace(slippery, materials=replace(slippery.materials, dermis=dermis)))
+    assert any("viscosity" in warning and "history" in warning for warning in settled.warnings)
     marched = solve(replace(settled.scene, solve=Solve("small", "history", 0.5)))
     assert entry(marched, "viscosity")["estimate"] == 0.0
     assert entry(settled, "viscosity")["estimate"] == pytest.approx(still_held(settled, marched), rel=0.1)
@@ -110,15 +110,15 @@ def test_what_tissues_would_still_hold_is_what_a_course_in_small_steps_on_a_fine
 def test_a_rigid_bone_too_stiff_to_be_meshed_with_the_tissues_leaves_the_estimate_with_the_reason():
     usual = scene(SLIPPERINESS[4])
     stiff = replace(usual.materials, bone=Material(1e12, 0.3))
-    found = solve(replace(usual, materials=stiff, solve=Solve(tolerance=0.5, evidence="measured")))
-    told = entry(found, "bone compliance")
-    assert told["estimate"] == told["estimated"]
-    assert "was to be measured, but: materials.bone.E" in told["how"]
+    prediction = solve(replace(usual, materials=stiff, solve=Solve(tolerance=0.5, evidence="measured")))
+    effect = entry(prediction, "bone compliance")
+    assert effect["estimate"] == effect["estimated"]
+    assert "was to be measured, but: materials.bone.E" in effect["how"]
 
 
 def test_tissues_that_would_be_too_stiff_at_once_have_no_relaxing_scene():
     stiff = Material(9e11, 0.3)
     tissues = Materials(stiff, stiff, stiff)
-    pressed = Scene(materials=tissues, friction=Friction(0.3), loading=Loading(1.0), solve=Solve(tolerance=0.5))
-    assert relaxing_scene(pressed) is None
-    assert solve(pressed).sed_ending > 0.0
+    scene = Scene(materials=tissues, friction=Friction(0.3), loading=Loading(1.0), solve=Solve(tolerance=0.5))
+    assert relaxing_scene(scene) is None
+    assert solve(scene).sed_ending > 0.0

@@ -5,7 +5,7 @@ import pytest
 from solver.verification import orders
 
 
-def held(rows):
+def orders_hold(rows):
     """Every row's order is at least what theory leads one to expect."""
     return {f"{row.problem}, {row.quantity}": row.order for row in rows if not row.order > row.least} == {}
 
@@ -13,7 +13,7 @@ def held(rows):
 def test_displacements_converge_with_order_3_stresses_with_2_and_energy_with_4():
     rows = list(orders.cylinders(quick=False))
     assert [row.quantity for row in rows] == ["displacement", "stress", "energy"] * 2
-    assert held(rows)
+    assert orders_hold(rows)
 
 
 def test_at_the_singular_corner_of_cook_s_membrane_the_order_is_that_of_the_singularity():
@@ -26,7 +26,7 @@ def test_at_the_singular_corner_of_cook_s_membrane_the_order_is_that_of_the_sing
 def test_the_force_of_a_contact_whose_edge_falls_anywhere_converges_with_order_2():
     """The root mean square over meshes of nearly one size, since a single one may be right by chance."""
     (row,) = orders.press_orders(quick=False)
-    assert held([row])
+    assert orders_hold([row])
     assert row.errors[-1] < 1e-4
 
 
@@ -34,14 +34,14 @@ def test_the_finger_s_energy_at_the_ending_converges_with_order_2():
     """The root mean square over shifted meshes of nearly one size, as for any contact whose edge falls anywhere."""
     rows = list(orders.fingers(quick=False, kinematics="small"))
     assert len(rows) == 2
-    assert held(rows)
+    assert orders_hold(rows)
     assert all(row.errors[-1] < 5e-4 for row in rows)
 
 
 @pytest.mark.slow
 def test_at_finite_strain_it_converges_with_order_2_too():
     (row,) = orders.fingers(quick=False, kinematics="finite")
-    assert held([row])
+    assert orders_hold([row])
     assert row.errors[-1] < 2e-3
 
 

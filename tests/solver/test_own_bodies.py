@@ -13,7 +13,7 @@ from solver.equilibrium import ForceLoad, LoadState, Newton
 from solver.equilibrium.load_stepping import march, slide_under, solve_full_slip
 from solver.mesh import HalvedMesh, block, quality
 
-SLIDES = LoadState(0.15, 0.3, sense=-1)
+SLIDE = LoadState(0.15, 0.3, sense=-1)
 
 
 def foot(columns, rows=None):
@@ -37,10 +37,10 @@ def test_a_halved_mesh_is_the_same_body_and_has_what_the_coarse_one_could_do():
     mesh = replace(block(np.array([-2.0, -1.0, 2.0]), np.array([0.0, 0.5, 2.0])), region=np.array([0, 1, 0, 1]))
     halved = HalvedMesh.of(mesh)
     laws = [Hooke(0.08, 0.0), Hooke(0.3, 0.0)]  # without pressure modes, which the finer mesh has more of
-    moved = np.random.default_rng(1).normal(size=mesh.nodes.shape)
+    displacement = np.random.default_rng(1).normal(size=mesh.nodes.shape)
     energies = []
-    for one, u in ((mesh, moved), (halved.mesh, halved.between(moved))):
-        energies.append(np.sum(u[one.elements] * Elastic.of(one, laws).forces(u[one.elements])))
+    for some_mesh, u in ((mesh, displacement), (halved.mesh, halved.between(displacement))):
+        energies.append(np.sum(u[some_mesh.elements] * Elastic.of(some_mesh, laws).forces(u[some_mesh.elements])))
     assert energies[1] == pytest.approx(energies[0], rel=1e-12)
     assert quality(halved.mesh)["jacobian_ratio"] == pytest.approx(1.0)
     assert len(halved.mesh.nodes) == 81
@@ -64,40 +64,40 @@ def test_a_pressure_along_a_chain_of_edges_amounts_to_the_same_force_on_both_mes
     mesh = foot(6)
     halved = HalvedMesh.of(mesh)
     forces = [
-        edge_load(one, chain, np.ones((len(chain), 2))).sum(axis=0)
-        for one, chain in ((mesh, mesh.skin), (halved.mesh, halved.chain(mesh.skin)))
+        edge_load(some_mesh, chain, np.ones((len(chain), 2))).sum(axis=0)
+        for some_mesh, chain in ((mesh, mesh.skin), (halved.mesh, halved.chain(mesh.skin)))
     ]
     assert forces[1] == pytest.approx(forces[0], rel=1e-4)  # the length of a curved edge, by quadrature
 
 
-@pytest.mark.parametrize("made", [small, finite])
+@pytest.mark.parametrize("newton_of", [small, finite])
 @pytest.mark.parametrize("columns", [10, 12, 16, 20])
-def test_errors_of_the_forces_on_a_round_foot_lie_above_the_true_ones_and_below_ten_times_them(made, columns):
-    fine = [solve_full_slip(made(foot(n)), SLIDES).force for n in (64, 72)]
+def test_errors_of_the_forces_on_a_round_foot_lie_above_the_true_ones_and_below_ten_times_them(newton_of, columns):
+    fine = [solve_full_slip(newton_of(foot(n)), SLIDE).force for n in (64, 72)]
     mesh = foot(columns)
-    newton, nested = made(mesh), made(HalvedMesh.of(mesh).mesh)
-    found = estimate_errors(force, newton, solve_full_slip(newton, SLIDES), (nested, solve_full_slip(nested, SLIDES)))
-    true = np.abs(found.value - fine[1])
-    assert np.all(np.abs(fine[1] - fine[0]) < found.error / 3.0)
-    assert np.all(true <= found.error)
-    assert np.all(found.error < 10.0 * np.maximum(true, 2e-4 * np.abs(fine[1])))
+    newton, nested = newton_of(mesh), newton_of(HalvedMesh.of(mesh).mesh)
+    estimate = estimate_errors(force, newton, solve_full_slip(newton, SLIDE), (nested, solve_full_slip(nested, SLIDE)))
+    true_error = np.abs(estimate.value - fine[1])
+    assert np.all(np.abs(fine[1] - fine[0]) < estimate.error / 3.0)
+    assert np.all(true_error <= estimate.error)
+    assert np.all(estimate.error < 10.0 * np.maximum(true_error, 2e-4 * np.abs(fine[1])))
 
 
 def test_under_a_given_force_the_depth_has_an_error():
     mesh = foot(12)
     newton, nested = small(mesh), small(HalvedMesh.of(mesh).mesh)
-    states = [slide_under(one, LoadState(0.0, 0.3, sense=-1), 0.02) for one in (newton, nested, small(foot(72)))]
+    states = [slide_under(model, LoadState(0.0, 0.3, sense=-1), 0.02) for model in (newton, nested, small(foot(72)))]
 
     def depth(_, state):
         return np.array([state.load.depth])
 
-    found = estimate_errors(depth, newton, states[0], (nested, states[1]), ForceLoad(0.02, None))
-    assert abs(found.value - states[2].load.depth) <= found.error
-    assert found.error < 0.02 * found.value
+    estimate = estimate_errors(depth, newton, states[0], (nested, states[1]), ForceLoad(0.02, None))
+    assert abs(estimate.value - states[2].load.depth) <= estimate.error
+    assert estimate.error < 0.02 * estimate.value
 
 
 def test_a_press_with_friction_errs_by_its_load_steps_too():
-    def pressed(newton, steps):
+    def press(newton, steps):
         *_, last = march(newton, [LoadState(0.2 * (n + 1) / steps, 0.5) for n in range(steps)])
         return last
 
@@ -106,12 +106,12 @@ def test_a_press_with_friction_errs_by_its_load_steps_too():
 
     mesh = foot(12)
     newton, nested = small(mesh), small(HalvedMesh.of(mesh).mesh)
-    usual, finer = pressed(newton, 25), pressed(nested, 25)
-    true = drag_of_half(None, pressed(small(foot(48)), 400))
-    fewer = [pressed(newton, round(25 * part)) for part in PARTS]
-    found = estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer)
+    usual, finer = press(newton, 25), press(nested, 25)
+    truth = drag_of_half(None, press(small(foot(48)), 400))
+    fewer = [press(newton, round(25 * part)) for part in PARTS]
+    estimate = estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer)
     without = estimate_errors(drag_of_half, newton, usual, (nested, finer))
-    assert abs(found.value - true) <= found.error
-    assert found.error > without.error
+    assert abs(estimate.value - truth) <= estimate.error
+    assert estimate.error > without.error
     with pytest.raises(ValueError, match="fewer has 1 states"):
         estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer[:1])

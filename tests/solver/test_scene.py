@@ -70,37 +70,37 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
     ],
 )
 def test_what_cannot_be_run_is_refused_in_one_sentence_that_names_key_value_and_what_is_allowed(make, key):
-    with pytest.raises(SceneError) as refused:
+    with pytest.raises(SceneError) as refusal:
         make()
-    assert refused.value.key == key
-    message = str(refused.value)
+    assert refusal.value.key == key
+    message = str(refusal.value)
     assert message.startswith(f"{key} = ")
     assert message.endswith(".")
     assert "\n" not in message
 
 
 def test_lists_and_numbers_of_numpy_make_the_scene_of_tuples_and_plain_numbers():
-    made = Scene(
+    numpy_scene = Scene(
         finger=Finger(np.float32(5.0), bone_centre=[-1.0, np.float64(0.75)], contact_angle=np.int8(45)),
         materials=Materials(fat=Material(np.array(0.034), 0.48, prony=[Relaxation(np.float16(0.5), 1.0)])),
         friction=Friction(np.array(0.44)),
         loading=Loading(np.uint8(1), ["+x", "-x"]),
         receptor=Receptor(ending=np.array([0.2, 1.0])),
     )
-    plain = Scene(
+    plain_scene = Scene(
         materials=Materials(fat=Material(0.034, 0.48, prony=(Relaxation(0.5, 1.0),))),
         friction=Friction(0.44),
         loading=Loading(1, ("+x", "-x")),
     )
-    assert repr(made) == repr(replace(plain, finger=Finger(contact_angle=45)))
-    assert hash(made) == hash(plain)
+    assert repr(numpy_scene) == repr(replace(plain_scene, finger=Finger(contact_angle=45)))
+    assert hash(numpy_scene) == hash(plain_scene)
 
 
 def test_the_error_of_a_scene_says_the_same_when_it_comes_from_another_process():
-    with pytest.raises(SceneError) as refused:
+    with pytest.raises(SceneError) as refusal:
         Friction(-0.1)
-    sent = pickle.loads(pickle.dumps(refused.value))
-    assert (str(sent), sent.key, sent.value) == (str(refused.value), "friction.mu", -0.1)
+    copy = pickle.loads(pickle.dumps(refusal.value))
+    assert (str(copy), copy.key, copy.value) == (str(refusal.value), "friction.mu", -0.1)
 
 
 def test_the_defaults_are_the_published_finger():
@@ -125,9 +125,9 @@ def test_the_bound_as_printed_is_a_hundredth_of_the_computed_one_and_never_a_sil
 
 
 def test_a_scene_can_be_changed_and_is_checked_again():
-    published = scene(STICKINESS[0])
+    sticky = scene(STICKINESS[0])
     with pytest.raises(SceneError, match="indentation"):
-        replace(published, loading=replace(published.loading, indentation=-1.0))
+        replace(sticky, loading=replace(sticky.loading, indentation=-1.0))
 
 
 @pytest.mark.parametrize(
@@ -140,10 +140,10 @@ def test_a_scene_can_be_changed_and_is_checked_again():
     ],
 )
 def test_no_scene_is_pressed_so_deep_that_the_surface_would_lie_in_the_bone(finger):
-    angle, around = np.radians(finger.contact_angle), np.radians(np.linspace(-90.0, 90.0, 100_001))
-    arc = np.array(finger.bone_centre)[:, None] + finger.bone_radius * np.array([np.cos(around), np.sin(around)])
+    angle, phi = np.radians(finger.contact_angle), np.radians(np.linspace(-90.0, 90.0, 100_001))
+    arc = np.array(finger.bone_centre)[:, None] + finger.bone_radius * np.array([np.cos(phi), np.sin(phi)])
     bone = np.hstack([arc, arc[:, [0, -1]] - np.array([[finger.shaft_length], [0.0]])])  # with its edges' far ends
-    room = finger.tip_radius - float((np.array([np.sin(angle), -np.cos(angle)]) @ bone).max())
-    assert Scene(finger=finger, friction=Friction(0.3), loading=Loading(0.9999 * room)).finger is finger
+    bone_depth = finger.tip_radius - float((np.array([np.sin(angle), -np.cos(angle)]) @ bone).max())
+    assert Scene(finger=finger, friction=Friction(0.3), loading=Loading(0.9999 * bone_depth)).finger is finger
     with pytest.raises(SceneError, match="at which the surface meets the bone"):
-        Scene(finger=finger, friction=Friction(0.3), loading=Loading(1.0001 * room))
+        Scene(finger=finger, friction=Friction(0.3), loading=Loading(1.0001 * bone_depth))

@@ -1,4 +1,3 @@
-# ruff: noqa: N806 - the letters of the literature
 """Settled sliding at finite strain: the published finger, the incompressible limit, balance, and patch states."""
 
 from dataclasses import replace
@@ -32,42 +31,42 @@ REFERENCE = {
 def test_the_published_finger_answers_as_two_other_codes_found(name):
     load, sed, normal, tangential = REFERENCE[name]
     newton, probes, _ = finger(24, margin=3.0)
-    shape = solve_full_slip(newton, load, tolerance=1e-7)
-    assert probes.average(shape.u)[0] == pytest.approx(sed, rel=0.003)
-    assert shape.force[1] == pytest.approx(normal, rel=0.003)
-    assert load.sense * shape.force[0] == pytest.approx(tangential, rel=0.003, abs=1e-12)
+    state = solve_full_slip(newton, load, tolerance=1e-7)
+    assert probes.average(state.u)[0] == pytest.approx(sed, rel=0.003)
+    assert state.force[1] == pytest.approx(normal, rel=0.003)
+    assert load.sense * state.force[0] == pytest.approx(tangential, rel=0.003, abs=1e-12)
 
 
 @pytest.fixture(scope="module")
-def capped():
+def bounded_slide():
     newton, _, _ = finger(5)
     return newton, solve_full_slip(newton, LoadState(1.5, 0.44, 0.03009, 1))
 
 
-def test_the_surface_and_the_bone_push_alike(capped):
-    newton, shape = capped
+def test_the_surface_and_the_bone_push_alike(bounded_slide):
+    newton, state = bounded_slide
     body = newton.condensed.body
-    pressure = pressure_of(body, shape.u)
-    force, _ = oracle.forces_and_tangents(body, shape.u, pressure)
-    whole = np.zeros(body.mesh.nodes.shape)
-    np.add.at(whole, body.elements.nodes, force.reshape(-1, 9, 2))
-    bone = whole[body.mesh.held].sum(axis=0)
-    np.testing.assert_allclose(shape.force, -bone, atol=1e-10)
-    free = np.ones(len(whole), bool)
+    pressure = oracle.pressure(body, state.u)
+    force, _ = oracle.forces_and_tangents(body, state.u, pressure)
+    nodal_force = np.zeros(body.mesh.nodes.shape)
+    np.add.at(nodal_force, body.elements.nodes, force.reshape(-1, 9, 2))
+    bone = nodal_force[body.mesh.held].sum(axis=0)
+    np.testing.assert_allclose(state.force, -bone, atol=1e-10)
+    free = np.ones(len(nodal_force), bool)
     free[body.mesh.held] = free[body.mesh.skin] = False
-    assert np.abs(whole[free]).max() < 1e-10
+    assert np.abs(nodal_force[free]).max() < 1e-10
 
 
-def test_forces_of_touching_points_obey_the_friction_law(capped):
-    newton, shape = capped
-    load = shape.load
-    length = oracle.tributary(shape.place(newton.condensed)[:, 0])
-    slip, cap, open_ = (shape.state == code for code in (SLIP, SHEAR_LIMITED, OPEN))
-    np.testing.assert_allclose(shape.reaction[slip, 0], load.mu * shape.reaction[slip, 1], atol=1e-12)
-    np.testing.assert_allclose(shape.reaction[cap, 0], load.tau * length[cap], atol=1e-12)
-    np.testing.assert_allclose(shape.reaction[open_], 0.0, atol=1e-12)
-    assert (shape.reaction[slip | cap, 1] >= -1e-12).all()
-    height = shape.place(newton.condensed)[:, 1] - load.depth
+def test_forces_of_touching_points_obey_the_friction_law(bounded_slide):
+    newton, state = bounded_slide
+    load = state.load
+    length = oracle.tributary(state.place(newton.condensed)[:, 0])
+    slip, bounded, is_open = (state.state == code for code in (SLIP, SHEAR_LIMITED, OPEN))
+    np.testing.assert_allclose(state.reaction[slip, 0], load.mu * state.reaction[slip, 1], atol=1e-12)
+    np.testing.assert_allclose(state.reaction[bounded, 0], load.tau * length[bounded], atol=1e-12)
+    np.testing.assert_allclose(state.reaction[is_open], 0.0, atol=1e-12)
+    assert (state.reaction[slip | bounded, 1] >= -1e-12).all()
+    height = state.place(newton.condensed)[:, 1] - load.depth
     assert height.min() > -1e-10
 
 
@@ -76,17 +75,17 @@ def test_incompressible_tissue_takes_as_many_iterations_and_has_its_own_limit(na
     iterations, sed = [], []
     for nu in (0.48, 0.49, 0.4999, 0.4999999):
         newton, probes, _ = finger(8, nu=nu)
-        shape = solve_full_slip(newton, REFERENCE[name][0])
-        iterations.append(shape.iterations)
-        sed.append(probes.average(shape.u)[0])
+        state = solve_full_slip(newton, REFERENCE[name][0])
+        iterations.append(state.iterations)
+        sed.append(probes.average(state.u)[0])
     assert len(set(iterations)) == 1
     assert sed[-1] == pytest.approx(sed[-2], rel=3e-3)
 
 
 def test_without_friction_both_directions_are_the_same_and_a_bound_of_nothing_is_no_friction():
     newton, probes, _ = finger(5)
-    pulls = (LoadState(1.0, 0.0, np.inf, 1), LoadState(1.0, 0.0, np.inf, -1), LoadState(1.0, 0.5, 0.0, 1))
-    sed = [probes.average(solve_full_slip(newton, load).u)[0] for load in pulls]
+    loads = (LoadState(1.0, 0.0, np.inf, 1), LoadState(1.0, 0.0, np.inf, -1), LoadState(1.0, 0.5, 0.0, 1))
+    sed = [probes.average(solve_full_slip(newton, load).u)[0] for load in loads]
     np.testing.assert_allclose(sed, sed[0], rtol=1e-10)
 
 
@@ -94,19 +93,20 @@ def test_the_next_surface_follows_from_the_last_one():
     newton, _, _ = finger(5)
     first = solve_full_slip(newton, LoadState(1.5, 0.24, 0.00877, 1))
     load = LoadState(1.5, 0.44, 0.03009, 1)
-    onward, afresh = solve_full_slip(newton, load, first), solve_full_slip(newton, load)
-    assert onward.iterations - first.iterations <= 7
-    np.testing.assert_allclose(onward.u, afresh.u, atol=1e-9)
+    from_last, direct = solve_full_slip(newton, load, first), solve_full_slip(newton, load)
+    assert from_last.iterations - first.iterations <= 7
+    np.testing.assert_allclose(from_last.u, direct.u, atol=1e-9)
 
 
 def test_scaling_all_stiffness_scales_the_answer():
     newton, probes, _ = finger(5)
     body = newton.condensed.body
-    stiffer = FiniteBody.of(body.mesh, [NeoHooke(10 * E, 0.48) for E in (0.136, 0.08, 0.034)])
-    one = solve_full_slip(newton, LoadState(1.0, 0.44, 0.02, 1))
-    ten = solve_full_slip(Newton(stiffer.condensed), LoadState(1.0, 0.44, 0.2, 1))
-    np.testing.assert_allclose(ten.u, one.u, atol=1e-9)
-    assert replace(probes, elements=stiffer).average(ten.u)[0] == pytest.approx(10 * probes.average(one.u)[0], rel=1e-9)
+    stiff = FiniteBody.of(body.mesh, [NeoHooke(10 * E, 0.48) for E in (0.136, 0.08, 0.034)])
+    state = solve_full_slip(newton, LoadState(1.0, 0.44, 0.02, 1))
+    stiff_state = solve_full_slip(Newton(stiff.condensed), LoadState(1.0, 0.44, 0.2, 1))
+    np.testing.assert_allclose(stiff_state.u, state.u, atol=1e-9)
+    stiff_sed = replace(probes, elements=stiff).average(stiff_state.u)[0]
+    assert stiff_sed == pytest.approx(10 * probes.average(state.u)[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("distortion", [0.0, 0.06])
@@ -116,8 +116,8 @@ def test_a_block_pressed_between_its_sides_has_the_closed_form_pressure_at_every
     u = np.zeros(mesh.nodes.shape)
     u[:, 1] = (1.0 - mesh.nodes[:, 1]) * 0.2  # to 0.8 of its height; sigma_yy = -0.193089
     force = np.zeros(mesh.nodes.shape)
-    found, _ = oracle.forces_and_tangents(body, u, pressure_of(body, u))
-    np.add.at(force, mesh.elements, found.reshape(-1, 9, 2))
+    element_forces, _ = oracle.forces_and_tangents(body, u, oracle.pressure(body, u))
+    np.add.at(force, mesh.elements, element_forces.reshape(-1, 9, 2))
     length = oracle.tributary(mesh.nodes[mesh.skin, 0])
     np.testing.assert_allclose(force[mesh.skin[1:-1], 1], 0.193089 * length[1:-1], rtol=3e-6)
     inside = np.setdiff1d(np.arange(len(force)), np.concatenate([mesh.skin, mesh.held]))
@@ -133,13 +133,6 @@ def test_turning_the_unloaded_body_by_a_right_angle_stores_nothing():
     np.testing.assert_allclose(force, 0.0, atol=1e-14)
 
 
-def pressure_of(body, u):
-    J = np.linalg.det(oracle.deformation(body, u))
-    return body.elements.lame[:, None] * np.einsum(
-        "eq,eqm,eq->em", body.elements.weight, body.elements.modes, np.log(J)
-    )
-
-
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
 def test_displacements_are_as_good_as_was_asked_for_whichever_state_they_start_from(tolerance):
     newton, _, _ = finger(5)
@@ -147,11 +140,11 @@ def test_displacements_are_as_good_as_was_asked_for_whichever_state_they_start_f
     for name in ("slip 100", "slip 0", "slip 55", "stick 0 at d1.0", "press d2.0"):
         load = REFERENCE[name][0]
         alone = solve_full_slip(newton, load, None, tolerance)
-        after = solve_full_slip(newton, load, start, tolerance)
-        true = solve_full_slip(newton, load, alone, 1e-13)
-        assert np.abs(alone.u - true.u).max() < tolerance
-        assert np.abs(after.u - true.u).max() < tolerance
-        start = solve_full_slip(newton, load, after, tolerance)  # leaves its tangent behind for the next surface
+        from_last = solve_full_slip(newton, load, start, tolerance)
+        exact = solve_full_slip(newton, load, alone, 1e-13)
+        assert np.abs(alone.u - exact.u).max() < tolerance
+        assert np.abs(from_last.u - exact.u).max() < tolerance
+        start = solve_full_slip(newton, load, from_last, tolerance)  # leaves its tangent behind for the next surface
 
 
 def test_contact_settled_within_a_linear_system_takes_the_whole_depth_in_one_step_of_few_iterations():

@@ -52,33 +52,33 @@ def ten():
 
 
 @pytest.fixture(scope="module")
-def marched():
-    asked = [replace(s, solve=Solve(course="history")) for s in (scene(STICKINESS[4]), scene(SLIPPERINESS[4]))]
-    return solve_many(asked)
+def histories():
+    history_scenes = [replace(s, solve=Solve(course="history")) for s in (scene(STICKINESS[4]), scene(SLIPPERINESS[4]))]
+    return solve_many(history_scenes)
 
 
 @pytest.mark.parametrize("title", REFERENCE)
 def test_the_reference_cases_are_met(ten, title):
-    found, (sed, point, normal, tangential) = ten[title], REFERENCE[title]
-    assert found.sed_ending == pytest.approx(sed, rel=0.003)
-    assert found.sed_point == pytest.approx(point, rel=0.01)
-    assert found.normal_force == pytest.approx(normal, rel=0.003)
-    assert found.tangential_force == pytest.approx(tangential, rel=0.003)
+    prediction, (sed, point, normal, tangential) = ten[title], REFERENCE[title]
+    assert prediction.sed_ending == pytest.approx(sed, rel=0.003)
+    assert prediction.sed_point == pytest.approx(point, rel=0.01)
+    assert prediction.normal_force == pytest.approx(normal, rel=0.003)
+    assert prediction.tangential_force == pytest.approx(tangential, rel=0.003)
 
 
 def test_a_finger_that_is_pressed_without_friction_meets_the_reference():
-    found = solve(Scene(friction=Friction(0.0), loading=Loading(1.5, "none")))
-    assert found.sed_ending == pytest.approx(PRESSED[0], rel=0.003)
-    assert found.sed_point == pytest.approx(PRESSED[1], rel=0.01)
-    assert found.normal_force == pytest.approx(PRESSED[2], rel=0.003)
-    assert found.tangential_force == 0.0
+    prediction = solve(Scene(friction=Friction(0.0), loading=Loading(1.5, "none")))
+    assert prediction.sed_ending == pytest.approx(PRESSED[0], rel=0.003)
+    assert prediction.sed_point == pytest.approx(PRESSED[1], rel=0.01)
+    assert prediction.normal_force == pytest.approx(PRESSED[2], rel=0.003)
+    assert prediction.tangential_force == 0.0
 
 
 def test_differences_between_surfaces_are_met_within_five_per_cent_of_their_range(ten):
     for names in (list(REFERENCE)[:3], list(REFERENCE)[3:]):
-        seds = np.array([REFERENCE[n][0] for n in names])
-        found = np.array([ten[n].sed_ending for n in names])
-        assert np.abs(np.diff(found) - np.diff(seds)).max() < 0.05 * np.ptp(seds)
+        expected = np.array([REFERENCE[n][0] for n in names])
+        seds = np.array([ten[n].sed_ending for n in names])
+        assert np.abs(np.diff(seds) - np.diff(expected)).max() < 0.05 * np.ptp(expected)
 
 
 def test_the_finding_of_the_paper_holds_on_its_own_numbers(ten):
@@ -93,15 +93,15 @@ def test_the_finding_of_the_paper_holds_on_its_own_numbers(ten):
 
 
 def test_every_result_balances_and_exceeds_nothing(ten):
-    for found in ten.values():
-        checks = found.audits
+    for prediction in ten.values():
+        checks = prediction.audits
         for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"):
             assert checks[name] < 1e-8
         assert checks["penetration"] < 1e-10
         assert checks["tension"] < 1e-10
         assert checks["cone_violation"] < 1e-10
-        skin = found.skin
-        bound = np.minimum(found.scene.friction.mu * skin.pressure, found.scene.friction.cap)
+        skin = prediction.skin
+        bound = np.minimum(prediction.scene.friction.mu * skin.pressure, prediction.scene.friction.cap)
         assert np.all(np.abs(skin.traction) <= bound + 1e-12)
         assert skin.gap.min() == 0.0
 
@@ -113,19 +113,19 @@ def test_the_estimate_lies_above_the_error_and_below_one_per_cent(ten):
 
 
 def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
-    asked = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
-    finger = LinearFinger.of(asked, Sizing(5, 1.0, margin=3.0))
+    sliding = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
+    finger = LinearFinger.of(sliding, Sizing(5, 1.0, margin=3.0))
     contact = solve_full_slip(finger.newton, LoadState(1.0, 0.44, 0.02, 1))
     displacement = finger.displacement(contact)
     reaction, middle = contact.reaction.copy(), int(np.argmax(contact.normal))
     normal = reaction[:, 1]
-    moved = 0.2 * normal[middle]
-    normal[middle] -= moved
-    normal[middle + 1] += moved
-    told = audits(finger, contact, displacement)
-    planted = audits(finger, replace(contact, reaction=reaction), displacement)
-    assert max(told["inner_forces"], planted["equilibrium_y"]) < 1e-10
-    assert planted["inner_forces"] == pytest.approx(moved / normal.sum(), rel=1e-6)
+    moved_force = 0.2 * normal[middle]
+    normal[middle] -= moved_force
+    normal[middle + 1] += moved_force
+    sound_audits = audits(finger, contact, displacement)
+    wrong_audits = audits(finger, replace(contact, reaction=reaction), displacement)
+    assert max(sound_audits["inner_forces"], wrong_audits["equilibrium_y"]) < 1e-10
+    assert wrong_audits["inner_forces"] == pytest.approx(moved_force / normal.sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -139,27 +139,27 @@ def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     ],
 )
 def test_forces_balance_near_the_incompressible_limit_and_in_tiny_contacts(nu, depth, balance):
-    asked = Scene(
+    sliding = Scene(
         materials=Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu)),
         friction=Friction(0.3),
         loading=Loading(depth, "+x"),
     )
-    checks = solve(asked).audits
+    checks = solve(sliding).audits
     for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"):
         assert checks[name] < balance
 
 
-def test_the_marched_course_ends_in_the_state_solved_directly(ten, marched):
-    for found in marched:
-        direct = ten[found.scene.title]
-        assert found.audits["course_against_direct"] < 1e-10
-        assert found.history.sed_ending[-1] == pytest.approx(found.sed_ending, rel=1e-12)
-        assert found.sed_ending == pytest.approx(direct.sed_ending, rel=2e-3)  # on another mesh when depths differ
+def test_the_marched_course_ends_in_the_state_solved_directly(ten, histories):
+    for prediction in histories:
+        direct = ten[prediction.scene.title]
+        assert prediction.audits["course_against_direct"] < 1e-10
+        assert prediction.history.sed_ending[-1] == pytest.approx(prediction.sed_ending, rel=1e-12)
+        assert prediction.sed_ending == pytest.approx(direct.sed_ending, rel=2e-3)  # on another mesh when depths differ
 
 
-def test_the_course_presses_within_a_second_then_slides_at_the_scene_s_speed(marched):
-    for found in marched:
-        course, loading = found.history, found.scene.loading
+def test_the_course_presses_within_a_second_then_slides_at_the_scene_s_speed(histories):
+    for prediction in histories:
+        course, loading = prediction.history, prediction.scene.loading
         pressed = course.time <= 1.0
         assert np.allclose(course.bone_y[pressed], -loading.indentation * course.time[pressed])
         assert not course.bone_x[pressed].any()
@@ -171,42 +171,42 @@ def test_the_course_presses_within_a_second_then_slides_at_the_scene_s_speed(mar
         assert course.slipping[pressed][-1] < 1.0
 
 
-def test_the_course_loses_no_work(marched):
-    for found in marched:
-        assert found.audits["course_work_balance"] < 1e-12
-        assert found.audits["course_step_work"] < 1e-3
-        assert found.audits["course_least_dissipation"] > -1e-14
+def test_the_course_loses_no_work(histories):
+    for prediction in histories:
+        assert prediction.audits["course_work_balance"] < 1e-12
+        assert prediction.audits["course_step_work"] < 1e-3
+        assert prediction.audits["course_least_dissipation"] > -1e-14
 
 
 def test_direction_and_speed_do_not_matter_without_friction():
-    asked = [
+    frictionless = [
         Scene(friction=Friction(mu, cap), loading=Loading(1.5, slide, speed))
         for mu, cap, slide, speed in ((0.0, None, "+x", 5.0), (0.0, None, "-x", 50.0), (0.4, 0.0, "+x", 5.0))
     ]
-    asked.append(Scene(friction=Friction(0.0), loading=Loading(1.5, "none")))
-    found = solve_many(asked)
-    for other in found[1:]:
-        assert other.sed_ending == pytest.approx(found[0].sed_ending, rel=1e-12)
-    still = solve(Scene(friction=Friction(0.4, 0.0), loading=Loading(1.5, "+x"), solve=Solve(course="history")))
-    assert still.sed_ending == pytest.approx(found[0].sed_ending, rel=1e-10)
+    frictionless.append(Scene(friction=Friction(0.0), loading=Loading(1.5, "none")))
+    predictions = solve_many(frictionless)
+    for prediction in predictions[1:]:
+        assert prediction.sed_ending == pytest.approx(predictions[0].sed_ending, rel=1e-12)
+    history = solve(Scene(friction=Friction(0.4, 0.0), loading=Loading(1.5, "+x"), solve=Solve(course="history")))
+    assert history.sed_ending == pytest.approx(predictions[0].sed_ending, rel=1e-10)
 
 
 def test_stiffer_everything_scales_the_energy_and_moves_nothing():
-    base = scene(STICKINESS[2])
-    m = base.materials
+    usual = scene(STICKINESS[2])
+    soft = usual.materials
     factor = 3.0
-    stiff = Materials(*(Material(factor * t.E, t.nu) for t in (m.epidermis, m.dermis, m.fat, m.bone)))
-    friction = Friction(base.friction.mu, factor * base.friction.cap)
-    one, other = solve(base), solve(replace(base, materials=stiff, friction=friction))
-    assert other.sed_ending == pytest.approx(factor * one.sed_ending, rel=1e-10)
-    assert other.contact_width == pytest.approx(one.contact_width, rel=1e-10)
+    stiff = Materials(*(Material(factor * t.E, t.nu) for t in (soft.epidermis, soft.dermis, soft.fat, soft.bone)))
+    friction = Friction(usual.friction.mu, factor * usual.friction.cap)
+    prediction, stiff_prediction = solve(usual), solve(replace(usual, materials=stiff, friction=friction))
+    assert stiff_prediction.sed_ending == pytest.approx(factor * prediction.sed_ending, rel=1e-10)
+    assert stiff_prediction.contact_width == pytest.approx(prediction.contact_width, rel=1e-10)
 
 
 def test_pressing_with_friction_is_marched_and_sticks_in_the_middle():
-    found = solve(Scene(friction=Friction(0.4), loading=Loading(1.5, "none")))
-    assert "stick" in found.skin.state
-    assert found.tangential_force > 0.0
-    assert found.audits["equilibrium_x"] < 1e-8
+    prediction = solve(Scene(friction=Friction(0.4), loading=Loading(1.5, "none")))
+    assert "stick" in prediction.skin.state
+    assert prediction.tangential_force > 0.0
+    assert prediction.audits["equilibrium_x"] < 1e-8
 
 
 def test_work_put_in_by_deeper_pressing_is_the_normal_force():
@@ -216,31 +216,31 @@ def test_work_put_in_by_deeper_pressing_is_the_normal_force():
         [Scene(friction=Friction(0.0), loading=Loading(d, "none")) for d in (1.0 + step, 1.0, 1.0 - step)]
     )
 
-    def stored(p):
+    def elastic_energy(p):
         forces = p.skin.pressure * skin_lengths(p.mesh)
         return 0.5 * forces @ p.displacement[p.mesh.skin, 1]
 
-    assert (stored(deep) - stored(shallow)) / (2 * step) == pytest.approx(mid.normal_force, rel=1e-5)
+    assert (elastic_energy(deep) - elastic_energy(shallow)) / (2 * step) == pytest.approx(mid.normal_force, rel=1e-5)
 
 
 def test_where_the_drag_wedges_the_finger_in_there_is_no_number_but_a_limit():
-    asked = Scene(friction=Friction(2.0), loading=Loading(2.0, "+x"), solve=Solve(tolerance=0.5))
-    with pytest.raises(NoSteadyState, match="wedges") as refused:
-        solve(asked)
-    limit = refused.value.limit_mu
+    wedged = Scene(friction=Friction(2.0), loading=Loading(2.0, "+x"), solve=Solve(tolerance=0.5))
+    with pytest.raises(NoSteadyState, match="wedges") as refusal:
+        solve(wedged)
+    limit = refusal.value.limit_mu
     assert limit is not None
     assert 1.0 < limit < 1.6
-    solve(replace(asked, friction=Friction(0.97 * limit)))
-    told = refused.value.to_dict()["error"]
-    assert told["kind"] == "no_steady_state"
-    assert told["limit_mu"] == limit
-    assert json.loads(json.dumps(told)) == told
+    solve(replace(wedged, friction=Friction(0.97 * limit)))
+    document = refusal.value.to_dict()["error"]
+    assert document["kind"] == "no_steady_state"
+    assert document["limit_mu"] == limit
+    assert json.loads(json.dumps(document)) == document
 
 
 def test_a_bound_lets_even_the_stickiest_surface_slide():
-    found = solve(Scene(friction=Friction(1000.0, 0.005), loading=Loading(1.5, "-x")))
-    assert set(found.skin.state) <= {"open", "cap", "slip"}
-    assert found.audits["cone_violation"] < 1e-10
+    prediction = solve(Scene(friction=Friction(1000.0, 0.005), loading=Loading(1.5, "-x")))
+    assert set(prediction.skin.state) <= {"open", "cap", "slip"}
+    assert prediction.audits["cone_violation"] < 1e-10
 
 
 any_scene = given(
@@ -256,37 +256,37 @@ any_scene = given(
 
 @settings(deadline=None, max_examples=5, derandomize=True)
 @any_scene
-def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(**drawn):
-    balanced_or_refused(**drawn)
+def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(**sample):
+    balanced_or_refused(**sample)
 
 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @any_scene
-def test_sixty_scenes_end_in_balanced_answers_or_in_sentences(**drawn):
-    balanced_or_refused(**drawn)
+def test_sixty_scenes_end_in_balanced_answers_or_in_sentences(**sample):
+    balanced_or_refused(**sample)
 
 
 def balanced_or_refused(depth, mu, bound, slide, angle, nu, course):
-    asked = Scene(
+    sample = Scene(
         finger=Finger(contact_angle=angle),
         materials=Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu)),
         friction=Friction(mu, bound),
         loading=Loading(depth, slide),
         solve=Solve(course=course),
     )
-    (found,) = solve_many([asked])
-    if isinstance(found, SolveFailure):
-        assert str(found).endswith(".")
-        assert mu > 0.7 or "round-off" in str(found)  # a state exists below, and is not refused
-        json.dumps(found.to_dict(), allow_nan=False)
+    (result,) = solve_many([sample])
+    if isinstance(result, SolveFailure):
+        assert str(result).endswith(".")
+        assert mu > 0.7 or "round-off" in str(result)  # a state exists below, and is not refused
+        json.dumps(result.to_dict(), allow_nan=False)
         return
-    json.dumps(found.to_dict(), allow_nan=False)
-    assert found.sed_ending > 0.0
-    assert found.error_estimate > 0.0
-    assert found.audits["equilibrium_y"] < 1e-4
-    assert found.audits["equilibrium_y"] < 1e-8 or found.warnings
-    assert found.audits["cone_violation"] < 1e-9
+    json.dumps(result.to_dict(), allow_nan=False)
+    assert result.sed_ending > 0.0
+    assert result.error_estimate > 0.0
+    assert result.audits["equilibrium_y"] < 1e-4
+    assert result.audits["equilibrium_y"] < 1e-8 or result.warnings
+    assert result.audits["cone_violation"] < 1e-9
 
 
 def test_a_run_can_be_stopped():
@@ -294,8 +294,8 @@ def test_a_run_can_be_stopped():
         solve_many(scenes(), progress=lambda part: part < 0.35)
 
 
-def test_a_prediction_is_told_as_plain_data_with_all_the_contract_asks_for(ten, marched):
-    told = ten["stickiness 100"].to_dict()
+def test_a_prediction_is_told_as_plain_data_with_all_the_contract_asks_for(ten, histories):
+    document = ten["stickiness 100"].to_dict()
     for name in (
         "sed_ending",
         "sed_point",
@@ -307,16 +307,17 @@ def test_a_prediction_is_told_as_plain_data_with_all_the_contract_asks_for(ten, 
         "tangential_force_error",
         "dofs",
     ):
-        assert told[name] == getattr(ten["stickiness 100"], name)
-    assert {"newton_iterations", "wall_s", "setup_s", "row", "model", "audits"} <= set(told)
-    assert len(told["row"]["arc"]) == len(told["row"]["sed"]) == 57
-    assert told["row"]["arc"][0] == -8.0
-    assert told["row"]["arc"][-1] == 6.0
-    assert told["row"]["sed"][32] == pytest.approx(told["sed_ending"], rel=1e-12)
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
-    course = marched[0].to_dict()
-    assert len(course["time"]) == len(course["bone_x"]) == len(course["bone_y"]) == len(course["history"]["sed_ending"])
-    json.dumps(course, allow_nan=False)
+        assert document[name] == getattr(ten["stickiness 100"], name)
+    assert {"newton_iterations", "wall_s", "setup_s", "row", "model", "audits"} <= set(document)
+    assert len(document["row"]["arc"]) == len(document["row"]["sed"]) == 57
+    assert document["row"]["arc"][0] == -8.0
+    assert document["row"]["arc"][-1] == 6.0
+    assert document["row"]["sed"][32] == pytest.approx(document["sed_ending"], rel=1e-12)
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+    history = histories[0].to_dict()
+    columns = [history[name] for name in ("time", "bone_x", "bone_y")]
+    assert {len(column) for column in columns} == {len(history["history"]["sed_ending"])}
+    json.dumps(history, allow_nan=False)
 
 
 def test_what_was_left_out_comes_with_numbers_of_this_scene(ten):
@@ -338,14 +339,14 @@ def test_strains_too_large_for_small_strain_are_warned_of(ten):
 def test_a_finger_too_short_for_the_row_has_no_number_there():
     small = Finger(2.0, 0.3, 0.5, shaft_length=4.0, bone_radius=0.6, bone_centre=(-0.4, 0.3))
     receptor = Receptor(depth=0.7, ending=(0.1, 0.4))
-    found = solve(Scene(finger=small, receptor=receptor, friction=Friction(0.2), loading=Loading(0.5, "+x")))
-    assert np.isnan(found.row.sed[0])
-    assert found.to_dict()["row"]["sed"][0] is None
+    prediction = solve(Scene(finger=small, receptor=receptor, friction=Friction(0.2), loading=Loading(0.5, "+x")))
+    assert np.isnan(prediction.row.sed[0])
+    assert prediction.to_dict()["row"]["sed"][0] is None
 
 
 def test_pictures_can_be_drawn_of_a_prediction(ten):
-    found = ten["slipperiness 0"]
-    picture = fields_of(found)
+    prediction = ten["slipperiness 0"]
+    picture = fields_of(prediction)
     assert picture.triangles.max() < len(picture.nodes)
     assert picture.sed.shape == (len(picture.nodes),)
     assert picture.sed.min() >= 0.0

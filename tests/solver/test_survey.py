@@ -1,4 +1,4 @@
-"""Surveys of error estimates: what is kept is not solved again, and a planted error is counted as one."""
+"""Surveys of error estimates: stored answers are not solved again, and each planted error counts."""
 
 import sys
 from dataclasses import replace
@@ -28,9 +28,9 @@ def test_a_family_draws_the_same_scene_for_the_same_number_and_another_for_anoth
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_the_surfaces_of_a_set_differ_in_friction_alone(kinematics):
-    one, *others = surface_set(5, kinematics)
-    assert len({scene.friction for scene in (one, *others)}) == 3
-    assert {replace(scene, friction=one.friction) for scene in others} == {one}
+    first, *rest = surface_set(5, kinematics)
+    assert len({scene.friction for scene in (first, *rest)}) == 3
+    assert {replace(scene, friction=first.friction) for scene in rest} == {first}
 
 
 def cells(*rows):
@@ -49,40 +49,40 @@ def test_a_tolerance_that_is_said_to_be_met_and_is_not_counts_as_missed_unsaid()
 
 
 def test_ratio_and_rank_are_those_of_estimates_by_errors():
-    found = cells(estimate(0.02, 0.01), estimate(0.03, 0.02), estimate(0.12, 0.03))
-    assert (found["ratio"], found["rank"]) == ("2.0", "1.00")
+    row = cells(estimate(0.02, 0.01), estimate(0.03, 0.02), estimate(0.12, 0.03))
+    assert (row["ratio"], row["rank"]) == ("2.0", "1.00")
     assert cells(estimate(0.02, 0.01), estimate(0.03, 0.005), estimate(0.04, 0.001))["rank"] == "-1.00"
 
 
 def test_a_corrected_value_counts_by_its_side_and_by_its_error():
-    found = cells(
+    row = cells(
         estimate(0.02, 0.01, corrected=0.002, towards=True), estimate(0.02, 0.01, corrected=0.02, towards=False)
     )
-    assert (found["sign"], found["corrected"]) == ("50 %", "1.10")
+    assert (row["sign"], row["corrected"]) == ("50 %", "1.10")
 
 
-TRUE = np.array([1.0, 2.0, 3.0])
+TRUTH = np.array([1.0, 2.0, 3.0])
 
 
 def test_a_common_error_of_all_surfaces_falls_out_of_their_differences():
-    assert answers.apart(TRUE + 0.3, np.array([TRUE, TRUE, TRUE])) == pytest.approx((0.0, 0.0), abs=1e-15)
+    assert answers.apart(TRUTH + 0.3, np.array([TRUTH, TRUTH, TRUTH])) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
 def test_a_difference_that_is_off_is_told_by_the_range_and_so_is_the_doubt_of_the_truth():
     first = np.array([1.0, 0.0, 0.0])
-    doubtful = TRUE + 0.3 * first
-    error, doubt = answers.apart(TRUE + 0.2 * first, np.array([TRUE, TRUE, doubtful]))
+    doubtful = TRUTH + 0.3 * first
+    error, doubt = answers.apart(TRUTH + 0.2 * first, np.array([TRUTH, TRUTH, doubtful]))
     assert error == pytest.approx(0.1 / 1.9, rel=1e-12)
     assert doubt == pytest.approx(0.2 / 1.9, rel=1e-12)
 
 
 def test_a_survey_of_answers_holds_every_estimate_of_the_program_against_fine_meshes():
     row = answers.solve("axis", 0, "small")
-    (answer,) = solve_many([random_scene("axis", 0, "small")])
-    assert not isinstance(answer, SolveFailure)
-    assert row.estimates[3].estimate == answer.error_estimate  # the second answer, at the usual tolerance
+    (prediction,) = solve_many([random_scene("axis", 0, "small")])
+    assert not isinstance(prediction, SolveFailure)
+    assert row.estimates[3].estimate == prediction.error_estimate  # the second answer, at the usual tolerance
     assert len(row.estimates) == 6
-    assert all(one.above for one in row.estimates)
+    assert all(entry.above for entry in row.estimates)
 
 
 def test_what_a_file_keeps_is_not_solved_again_and_stands_in_the_page(tmp_path, monkeypatch, capsys):

@@ -19,25 +19,25 @@ def with_skin(law, stiffening=None, kinematics="finite"):
 
 
 def test_with_an_exponent_of_two_ogdens_law_is_the_neo_hookean_one_and_with_that_of_skin_the_finger_resists_more():
-    usual, none, some = (solve(with_skin(*law)) for law in [("neo-hookean",), ("ogden", 2.0), ("ogden",)])
-    assert none.sed_ending == pytest.approx(usual.sed_ending, rel=1e-6)
-    assert none.normal_force == pytest.approx(usual.normal_force, rel=1e-6)
-    assert some.normal_force > 1.02 * usual.normal_force
-    assert "Ogden, exponent 9 (default: human skin" in some.model["material"]
+    usual, linear, skin = (solve(with_skin(*law)) for law in [("neo-hookean",), ("ogden", 2.0), ("ogden",)])
+    assert linear.sed_ending == pytest.approx(usual.sed_ending, rel=1e-6)
+    assert linear.normal_force == pytest.approx(usual.normal_force, rel=1e-6)
+    assert skin.normal_force > 1.02 * usual.normal_force
+    assert "Ogden, exponent 9 (default: human skin" in skin.model["material"]
 
 
 def test_the_default_laws_are_hooke_at_small_strain_and_neo_hooke_at_finite_strain():
     for kinematics, law in (("small", "hooke"), ("finite", "neo-hookean")):
-        named = solve(with_skin(law, kinematics=kinematics))
-        assert named.sed_ending == solve(with_skin(None, kinematics=kinematics)).sed_ending
+        prediction = solve(with_skin(law, kinematics=kinematics))
+        assert prediction.sed_ending == solve(with_skin(None, kinematics=kinematics)).sed_ending
 
 
 def test_the_picture_at_finite_strain_shows_the_energy_of_its_law():
-    found = solve(with_skin("ogden"))
-    drawn = fields_of(found)
-    middle = (drawn.patch[:-1].min(axis=0) + drawn.patch[:-1].max(axis=0)) / 2.0
-    near = ((drawn.nodes - middle) ** 2).sum(axis=1).argmin()
-    assert drawn.sed[near] == pytest.approx(found.sed_ending, rel=0.15)
+    prediction = solve(with_skin("ogden"))
+    picture = fields_of(prediction)
+    middle = (picture.patch[:-1].min(axis=0) + picture.patch[:-1].max(axis=0)) / 2.0
+    nearest = ((picture.nodes - middle) ** 2).sum(axis=1).argmin()
+    assert picture.sed[nearest] == pytest.approx(prediction.sed_ending, rel=0.15)
 
 
 @pytest.mark.parametrize(
@@ -54,14 +54,14 @@ def test_the_picture_at_finite_strain_shows_the_energy_of_its_law():
     ],
 )
 def test_laws_that_do_not_fit_are_refused_with_their_key(tissue, kinematics, key):
-    with pytest.raises(SceneError) as refused:
+    with pytest.raises(SceneError) as refusal:
         Scene(
             materials=replace(Materials(), dermis=tissue),
             friction=Friction(0.3),
             loading=Loading(1.0),
             solve=Solve(kinematics),
         )
-    assert refused.value.key == key
+    assert refusal.value.key == key
 
 
 def test_a_scene_file_may_hold_every_option(tmp_path):
@@ -72,7 +72,7 @@ def test_a_scene_file_may_hold_every_option(tmp_path):
         '[friction]\nmu = 0.5\n[loading]\nnormal_force = 1.5\nforce_unit = "N"\nslide = ["+x", "-x"]\n'
         '[solve]\nevidence = "measured"\n'
     )
-    read = load_toml(path, Scene)
-    assert read.normal_force == pytest.approx(0.1)
-    assert read.loading.directions == (1, -1)
-    assert read.materials.dermis.prony == (Relaxation(0.2, 0.07),)
+    loaded_scene = load_toml(path, Scene)
+    assert loaded_scene.normal_force == pytest.approx(0.1)
+    assert loaded_scene.loading.directions == (1, -1)
+    assert loaded_scene.materials.dermis.prony == (Relaxation(0.2, 0.07),)

@@ -16,10 +16,10 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 FILE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "fe-reference.json"
 CASES = (
     [
-        (kinematics, name, told)
+        (kinematics, name, numbers)
         for kinematics in ("small", "finite")
-        for name, told in json.loads(FILE.read_text(encoding="utf-8"))[kinematics].items()
-        if isinstance(told, dict)
+        for name, numbers in json.loads(FILE.read_text(encoding="utf-8"))[kinematics].items()
+        if isinstance(numbers, dict)
     ]
     if FILE.exists()
     else []
@@ -28,29 +28,29 @@ pytestmark = pytest.mark.skipif(not CASES, reason="the results of other codes do
 SURFACES = {"stick": STICKINESS, "slip": SLIPPERINESS}
 
 
-def asked(kinematics: str, name: str) -> Scene:
+def scene_of_case(kinematics: str, name: str) -> Scene:
     """Return the scene of a case, by its name: "press d1.5", "slip 55", "stick 0 at d1.0"."""
-    solving = Solve(kinematics, tolerance=0.001)
-    if pressed := re.fullmatch(r"press d([\d.]+)", name):
-        return Scene(friction=Friction(0.0), loading=Loading(float(pressed[1]), "none"), solve=solving)
+    settings = Solve(kinematics, tolerance=0.001)
+    if press := re.fullmatch(r"press d([\d.]+)", name):
+        return Scene(friction=Friction(0.0), loading=Loading(float(press[1]), "none"), solve=settings)
     experiment, index, _, depth = re.fullmatch(r"(stick|slip) (\d+)( at d([\d.]+))?", name).groups()
     (surface,) = (s for s in SURFACES[experiment] if s.index == int(index))
     usual = scene(surface)
     loading = Loading(float(depth or usual.loading.depth), usual.loading.slide, usual.loading.speed)
-    return Scene(title=name, friction=usual.friction, loading=loading, solve=solving)
+    return Scene(title=name, friction=usual.friction, loading=loading, solve=settings)
 
 
 @pytest.mark.parametrize(
-    ("kinematics", "name", "told"),
+    ("kinematics", "name", "expected"),
     [
         pytest.param(*case, id=f"{case[0]}: {case[1]}", marks=[pytest.mark.slow] if case[0] == "finite" else [])
         for case in CASES
     ],
 )
-def test_a_tolerance_of_a_thousandth_agrees_with_two_other_codes_within_three(kinematics, name, told):
-    found = solve(asked(kinematics, name))
-    assert isinstance(found, Prediction)
-    assert found.error_estimate <= 0.001
-    assert found.sed_ending == pytest.approx(told["sed_ending"], rel=0.003)
-    assert found.normal_force == pytest.approx(told["normal_force"], rel=0.003)
-    assert found.tangential_force == pytest.approx(told["tangential_force"], rel=0.003, abs=1e-9)
+def test_a_tolerance_of_a_thousandth_agrees_with_two_other_codes_within_three(kinematics, name, expected):
+    prediction = solve(scene_of_case(kinematics, name))
+    assert isinstance(prediction, Prediction)
+    assert prediction.error_estimate <= 0.001
+    assert prediction.sed_ending == pytest.approx(expected["sed_ending"], rel=0.003)
+    assert prediction.normal_force == pytest.approx(expected["normal_force"], rel=0.003)
+    assert prediction.tangential_force == pytest.approx(expected["tangential_force"], rel=0.003, abs=1e-9)

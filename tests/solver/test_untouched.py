@@ -44,9 +44,9 @@ def round_foot(part, *, held):
     mesh = grid_mesh(points, region, slice(0, len(x)), number[:, 0] if held else number[:0, 0])
     drag = part * MU * LOAD
     loads = edge_load(mesh, number[:, 2], np.tile([drag / WIDE, -LOAD / WIDE], (len(x), 1)))
-    for side, way in ((0, -1.0), (-1, 1.0)):
+    for side, sign in ((0, -1.0), (-1, 1.0)):
         force = edge_load(mesh, number[side, 2:], np.tile([0.0, 1.0], (len(y) - 2, 1)))
-        loads += way * drag * HIGH / WIDE * force / force.sum()
+        loads += sign * drag * HIGH / WIDE * force / force.sum()
     return mesh, loads
 
 
@@ -60,24 +60,24 @@ def test_dead_loads_below_the_friction_limit_leave_the_stick_zone_of_cattaneo_an
     mesh, loads = round_foot(part, held=held)
     free = () if held else ("x", "y", "turn")
     body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-5, 0.3)], loads, free=free).condensed
-    now = Newton(body).settle(EquilibriumState.undeformed(body), LoadState(0.0, MU))
-    load, drag = now.normal.sum(), -now.tangential.sum()
+    state = Newton(body).settle(EquilibriumState.undeformed(body), LoadState(0.0, MU))
+    load, drag = state.normal.sum(), -state.tangential.sum()
     assert load == pytest.approx(LOAD, rel=0.01 if held else 1e-9)
     assert drag == pytest.approx(part * MU * LOAD, rel=0.01 if held else 1e-9)
     half_width = np.sqrt(4.0 * load * RADIUS * (1.0 - NU**2) / (np.pi * YOUNG))
-    peak, stuck = 2.0 * load / (np.pi * half_width), np.sqrt(1.0 - drag / (MU * load))
+    peak, stick_ratio = 2.0 * load / (np.pi * half_width), np.sqrt(1.0 - drag / (MU * load))
     x = mesh.nodes[mesh.skin, 0]
-    assert np.ptp(x[now.state == STICK]) / 2.0 == pytest.approx(half_width * stuck, abs=0.01)  # half an element
-    traction = -(now.tangential / body.fixed_length)[abs(x) < 0.03].mean()
-    assert traction == pytest.approx(MU * peak * (1.0 - stuck), rel=0.02)
+    assert np.ptp(x[state.state == STICK]) / 2.0 == pytest.approx(half_width * stick_ratio, abs=0.01)  # half an element
+    traction = -(state.tangential / body.fixed_length)[abs(x) < 0.03].mean()
+    assert traction == pytest.approx(MU * peak * (1.0 - stick_ratio), rel=0.02)
 
 
 def test_skin_that_dead_loads_leave_clear_of_the_surface_sticks_where_they_have_put_it():
     mesh, loads = round_foot(0.5, held=True)
     body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-4, 0.3)], loads).condensed
-    high = -2.0  # mm: the loads lower the foot by a third of one
-    before = replace(EquilibriumState.undeformed(body), u=body.free_displacement(), load=LoadState(high, MU))
-    assert (before.place(body)[:, 1] - high).min() > 0.0
-    pressed = Newton(body).settle(before, LoadState(0.0, MU))
-    assert pressed.normal.sum() > 0.9 * LOAD
-    assert abs(pressed.tangential.sum()) < 0.05 * MU * LOAD  # the pad carries the drag
+    start_depth = -2.0  # mm: the loads lower the foot by a third of one
+    start = replace(EquilibriumState.undeformed(body), u=body.free_displacement(), load=LoadState(start_depth, MU))
+    assert (start.place(body)[:, 1] - start_depth).min() > 0.0
+    state = Newton(body).settle(start, LoadState(0.0, MU))
+    assert state.normal.sum() > 0.9 * LOAD
+    assert abs(state.tangential.sum()) < 0.05 * MU * LOAD  # the pad carries the drag

@@ -30,7 +30,7 @@ CONTRADICTORY = "the states of the touching points still contradicted each other
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Touchable:
+class CondensedSurface:
     """What the surface feels of a body: k points that may touch, and r free motions of the body as a whole.
 
     Displacements [mm] are relative to the driven part of the body; forces [N/mm] are those of the surface on the body.
@@ -66,12 +66,12 @@ class Contact:
         return self.state != OPEN
 
 
-def touchable(body: CondensedLinear) -> Touchable:
+def condense_surface(body: CondensedLinear) -> CondensedSurface:
     """Return what the surface feels of a held body: the inverse of its skin's stiffness."""
     compliance = np.linalg.inv(body.stiffness)
     free = (compliance @ body.load).reshape(-1, 2)
     nothing = np.zeros((2 * len(free), 0))
-    return Touchable(
+    return CondensedSurface(
         body.rest[:, 1], body.fixed_length, compliance[1::2, 1::2], compliance[1::2, ::2], compliance[::2, ::2],
         free[:, 1], free[:, 0], nothing, np.zeros(0),
     )  # fmt: skip
@@ -80,7 +80,7 @@ def touchable(body: CondensedLinear) -> Touchable:
 class System:
     """The linear system of one guess of states, factorised."""
 
-    def __init__(self, body: Touchable, law: FrictionLaw, state: States, sense: Array) -> None:
+    def __init__(self, body: CondensedSurface, law: FrictionLaw, state: States, sense: Array) -> None:
         """Factorise the system of `state` (k,), friction forces pointing along `sense` (k,)."""
         self.key = state.tobytes() + sense.tobytes()
         self.on = np.flatnonzero(state != OPEN)
@@ -112,10 +112,10 @@ class System:
         return right if self._factors is None else dgetrs(self._factors[0], self._factors[1], right)[0]
 
 
-class Course:
+class ContactSolver:
     """Contact of one body under one law, step after step; keeps the last factorisation, since most steps reuse it."""
 
-    def __init__(self, body: Touchable, law: FrictionLaw, patience: int | None = None) -> None:
+    def __init__(self, body: CondensedSurface, law: FrictionLaw, patience: int | None = None) -> None:
         """Start with nothing known; a step is given up after `patience` corrections (None: when nothing can help)."""
         self.body = body
         self.law = law
@@ -124,7 +124,7 @@ class Course:
         self._entering = SLIP  # what a point is first thought to do when it comes to touch
         self._resultants = body.resultants
 
-    def sliding(self, depth: float, direction: int, guess: States | None = None) -> Contact:
+    def solve_full_slip(self, depth: float, direction: int, guess: States | None = None) -> Contact:
         """Return the settled sliding state of a body driven `depth` [mm] into the surface and along +x or -x.
 
         Every touching point slips, so nothing is left of how it came there. Raises ContactLost where no such state
@@ -144,7 +144,7 @@ class Course:
             guesses.append(np.where(low, SHEAR_LIMITED, OPEN))
         for number, first in enumerate(guesses):
             try:
-                return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
+                return self._solve_active_set(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
             except ContactLost:
                 if number == len(guesses) - 1:
                     raise
@@ -164,51 +164,51 @@ class Course:
         """
         depth, travel = finite("depth", depth), finite("travel", travel)
         if self.body.motions.shape[1]:
-            before = lowered(self.law, before)
+            before = lower_contact(self.law, before)
         self._resultants = self.body.resultants if resultants is None else resultants
         try:
-            return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+            return self._solve_active_set(depth, travel, before.shift, before.state, before.sense, free=True)
         except ContactLost:  # points that come to touch are then first thought to stick, not to slip
             self._entering = SLIP if frictionless(self.law) else STICK
-            return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+            return self._solve_active_set(depth, travel, before.shift, before.state, before.sense, free=True)
         finally:
             self._entering = SLIP
 
-    def _consistent(
+    def _solve_active_set(
         self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
     ) -> Contact:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
-        seen: set[bytes] = set()
-        one_by_one = resticked = False
+        past_keys: set[bytes] = set()
+        one_by_one = all_stuck = False
         for iteration in range(1, self._patience + 1):
             if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
                 self._system = System(self.body, self.law, state, sense)
             if self._system.singular:
                 touching = state != OPEN
-                if not free or resticked or (state == STICK).any() or not touching.any():
+                if not free or all_stuck or (state == STICK).any() or not touching.any():
                     raise ContactLost(AMBIGUOUS)
-                # a body that is free along x needs a point that holds it: all are asked again, one by one
+                # a body that is free along x needs a point that holds it: all are tried again, one by one
                 state = np.where(touching, STICK, OPEN).astype(np.int8)
-                resticked = one_by_one = True
+                all_stuck = one_by_one = True
                 continue
-            found = self._solved(self._system, depth, travel, anchor, state, sense, iteration)
-            wanted, turned, badness = self._corrected(found, anchor, free=free)
-            changed = np.flatnonzero((wanted != state) | (turned != sense))
+            contact = self._solve_system(self._system, depth, travel, anchor, state, sense, iteration)
+            new_state, new_sense, contradiction = self._update_contact_states(contact, anchor, free=free)
+            changed = np.flatnonzero((new_state != state) | (new_sense != sense))
             if not len(changed):
-                return found
+                return contact
             if one_by_one:
-                worst = changed[np.argmax(badness[changed])]
+                worst = changed[np.argmax(contradiction[changed])]
                 keep = np.arange(len(state)) != worst
-                wanted, turned = np.where(keep, state, wanted), np.where(keep, sense, turned)
-            state, sense = wanted.astype(np.int8), turned
+                new_state, new_sense = np.where(keep, state, new_state), np.where(keep, sense, new_sense)
+            state, sense = new_state.astype(np.int8), new_sense
             key = state.tobytes() + sense.tobytes()
-            if key in seen:
+            if key in past_keys:
                 one_by_one = True
-                seen.clear()
-            seen.add(key)
+                past_keys.clear()
+            past_keys.add(key)
         raise ContactLost(CONTRADICTORY.format(self._patience))
 
-    def _solved(
+    def _solve_system(
         self,
         system: System,
         depth: float,
@@ -219,10 +219,10 @@ class Course:
         iteration: int,
     ) -> Contact:
         body, on, stuck, tangential = self.body, system.on, system.stuck, system.capped
-        lifted = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
-        moved = body.tangential_free + travel + body.tangential_by_tangential @ tangential
-        missing = self._resultants - body.motions[len(state) :].T @ tangential
-        answer = system.solve(np.concatenate([-lifted[on], (anchor - moved)[stuck], missing]))
+        free_gap = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
+        free_shift = body.tangential_free + travel + body.tangential_by_tangential @ tangential
+        residual = self._resultants - body.motions[len(state) :].T @ tangential
+        answer = system.solve(np.concatenate([-free_gap[on], (anchor - free_shift)[stuck], residual]))
         normal = np.zeros(len(state))
         normal[on] = answer[: len(on)]
         rest = np.zeros(len(state))
@@ -230,48 +230,48 @@ class Course:
         rest[stuck] = answer[len(on) : len(on) + len(stuck)]
         motion = answer[len(on) + len(stuck) :]
         up, along = np.split(body.motions @ motion, 2)
-        gap = lifted + up + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
-        shift = moved + along + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
+        gap = free_gap + up + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
+        shift = free_shift + along + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
         return Contact(state, sense, normal, tangential + rest, shift, gap, motion, iteration)
 
-    def _corrected(self, found: Contact, anchor: Array, *, free: bool) -> tuple[States, Array, Array]:
+    def _update_contact_states(self, contact: Contact, anchor: Array, *, free: bool) -> tuple[States, Array, Array]:
         """Return the states and senses that the solution calls for, and how badly each point contradicts its own."""
         body, law = self.body, self.law
-        state, sense = found.state.copy(), found.sense.copy()
-        force = np.abs(found.normal).max(initial=0.0)
-        lengths = np.concatenate([body.gap, found.gap, found.shift])
+        state, sense = contact.state.copy(), contact.sense.copy()
+        force = np.abs(contact.normal).max(initial=0.0)
+        lengths = np.concatenate([body.gap, contact.gap, contact.shift])
         height = max(float(np.abs(lengths).max(initial=0.0)), np.finfo(float).tiny)
-        badness = np.zeros(len(state))
+        contradiction = np.zeros(len(state))
 
-        def change(where: NDArray[np.bool_], to: int, how_bad: Array) -> None:
+        def change(where: NDArray[np.bool_], to: int, size: Array) -> None:
             state[where] = to
-            badness[where] = how_bad[where]
+            contradiction[where] = size[where]
 
-        touching = found.state != OPEN
+        touching = contact.state != OPEN
         slack = SMALL * force
         bound = law.bound(body.length)
-        change((found.state == SLIP) & (law.mu * found.normal > bound + slack), SHEAR_LIMITED, found.normal)
-        change((found.state == SHEAR_LIMITED) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
+        change((contact.state == SLIP) & (law.mu * contact.normal > bound + slack), SHEAR_LIMITED, contact.normal)
+        change((contact.state == SHEAR_LIMITED) & (law.mu * contact.normal < bound - slack), SLIP, contact.normal)
         if free and not frictionless(law):
-            over = np.abs(found.tangential) - law.limit(found.normal, body.length)
-            loose = (found.state == STICK) & (over > slack)
-            sense[loose] = np.sign(found.tangential[loose])
-            capped = law.mu * found.normal > bound
-            change(loose & ~capped, SLIP, over)
-            change(loose & capped, SHEAR_LIMITED, over)
+            over = np.abs(contact.tangential) - law.limit(contact.normal, body.length)
+            exceeds = (contact.state == STICK) & (over > slack)
+            sense[exceeds] = np.sign(contact.tangential[exceeds])
+            capped = law.mu * contact.normal > bound
+            change(exceeds & ~capped, SLIP, over)
+            change(exceeds & capped, SHEAR_LIMITED, over)
             # a point that slips along its friction force sticks; one whose force is about to change is asked later
-            forward = (found.shift - anchor) * found.sense
-            stops = (found.state >= SLIP) & (state == found.state) & (forward > SMALL * height)
-            change(stops, STICK, forward * force / height)
-        change(touching & (found.normal < -slack), OPEN, -found.normal)
-        enters = ~touching & (found.gap < -SMALL * height)
+            forward = (contact.shift - anchor) * contact.sense
+            sticks = (contact.state >= SLIP) & (state == contact.state) & (forward > SMALL * height)
+            change(sticks, STICK, forward * force / height)
+        change(touching & (contact.normal < -slack), OPEN, -contact.normal)
+        enters = ~touching & (contact.gap < -SMALL * height)
         if free:
-            sense[enters] = np.where(found.shift > anchor, -1.0, 1.0)[enters]
-        change(enters, self._entering, -found.gap * force / height)
-        return state, sense, badness
+            sense[enters] = np.where(contact.shift > anchor, -1.0, 1.0)[enters]
+        change(enters, self._entering, -contact.gap * force / height)
+        return state, sense, contradiction
 
 
-def untouched(body: Touchable, depth: float = 0.0) -> Contact:
+def undeformed_contact(body: CondensedSurface, depth: float = 0.0) -> Contact:
     """Return the state before first touch."""
     count = len(body.gap)
     zero = np.zeros(count)
@@ -280,7 +280,7 @@ def untouched(body: Touchable, depth: float = 0.0) -> Contact:
     return Contact(state, np.ones(count), zero, zero, body.tangential_free, gap, np.zeros(0), 0)
 
 
-def lowered(law: FrictionLaw, contact: Contact) -> Contact:
+def lower_contact(law: FrictionLaw, contact: Contact) -> Contact:
     """Return `contact` with the lowest point on the surface, where nothing touches: under a force something does."""
     if contact.touching.any():
         return contact
@@ -289,15 +289,17 @@ def lowered(law: FrictionLaw, contact: Contact) -> Contact:
     return replace(contact, state=state)
 
 
-def forced(body: Touchable, normal_force: float, tangential_force: float | None = None) -> Touchable:
+def under_forces(
+    body: CondensedSurface, normal_force: float, tangential_force: float | None = None
+) -> CondensedSurface:
     """Return the body free to move along y under a given normal force [N/mm] instead of being driven to a depth.
 
     With a `tangential_force`, of the surface on the body along +x [N/mm], it is free to move along x too. Its motions
     are the last of `Contact.motion`: up, then along +x.
     """
-    one, zero = np.ones(len(body.gap)), np.zeros(len(body.gap))
-    motions, resultants = [body.motions, np.r_[one, zero][:, None]], [body.resultants, [normal_force]]
+    ones, zeros = np.ones(len(body.gap)), np.zeros(len(body.gap))
+    motions, resultants = [body.motions, np.r_[ones, zeros][:, None]], [body.resultants, [normal_force]]
     if tangential_force is not None:
-        motions.append(np.r_[zero, one][:, None])
+        motions.append(np.r_[zeros, ones][:, None])
         resultants.append([tangential_force])
     return replace(body, motions=np.concatenate(motions, axis=1), resultants=np.concatenate(resultants))

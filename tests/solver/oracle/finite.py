@@ -26,18 +26,18 @@ def _gradient(body: FiniteBody, u: Array) -> Array:
     return np.stack([body.elements.grad_x @ local, body.elements.grad_y @ local], axis=-1)
 
 
-def _turned(H: Array) -> tuple[Array, Array]:
+def _inverse_transpose(H: Array) -> tuple[Array, Array]:
     """Return the transposed inverse of F = 1 + H and what F exceeds it by (e, 9, 2, 2), that to its own digits."""
-    grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
-    across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
+    volume_strain = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
+    adjugate = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
     F = np.eye(2) + H
-    return (np.eye(2) + across) / (1.0 + grown), (H - across + grown * F) / (1.0 + grown)
+    return (np.eye(2) + adjugate) / (1.0 + volume_strain), (H - adjugate + volume_strain * F) / (1.0 + volume_strain)
 
 
 def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:
     """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
-    grown = H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0])
-    log = _log1p(grown)
+    volume_strain = H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0])
+    log = _log1p(volume_strain)
     return log, np.einsum("eq,eqm,eq->em", body.elements.weight, body.elements.modes, log)
 
 
@@ -58,14 +58,14 @@ def pressure(body: FiniteBody, u: Array) -> Array:
 
 def energy(body: FiniteBody, u: Array) -> float:
     """Return the energy stored in the body [N mm per mm]."""
-    return _stored(body, _gradient(body, u)).real
+    return _elastic_energy(body, _gradient(body, u)).real
 
 
-def _stored(body: FiniteBody, H: Array) -> complex:
+def _elastic_energy(body: FiniteBody, H: Array) -> complex:
     log, volume = _logarithm(body, H)
-    grown = shape(body.elements.stiffening[:, None], _excess(H, log))
+    stretch_energy = shape(body.elements.stiffening[:, None], _excess(H, log))
     return complex(
-        np.sum(body.elements.weight * body.elements.shear[:, None] / 2.0 * grown)
+        np.sum(body.elements.weight * body.elements.shear[:, None] / 2.0 * stretch_energy)
         + np.sum(body.elements.lame / 2.0 * (volume**2).T)
     )
 
@@ -74,11 +74,11 @@ def forces(body: FiniteBody, u: Array) -> Array:
     """Return the internal forces (e, 18) of the elements, ordered x, y, x, y, ..."""
     H = _gradient(body, u)
     log, volume = _logarithm(body, H)
-    inverse, exceeds = _turned(H)
+    inverse, difference = _inverse_transpose(H)
     G = body.elements.shear[:, None] * slopes(body.elements.stiffening[:, None], _excess(H, log))[0]
     pressure = body.elements.lame[:, None] * (body.elements.modes @ volume[:, :, None])[:, :, 0]
     stress = body.elements.weight[:, :, None, None] * (
-        G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse
+        G[:, :, None, None] * difference + pressure[:, :, None, None] * inverse
     )
     gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
     return (gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1).reshape(len(H), 18)
@@ -91,48 +91,48 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     """
     H = _gradient(body, u)
     log, _ = _logarithm(body, H)
-    inverse, exceeds = _turned(H)
+    inverse, difference = _inverse_transpose(H)
     gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
     w = body.elements.weight
-    grown, growth = slopes(body.elements.stiffening[:, None], _excess(H, log))
-    G = body.elements.shear[:, None] * grown
+    slope, curvature = slopes(body.elements.stiffening[:, None], _excess(H, log))
+    G = body.elements.shear[:, None] * slope
     spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
     dilate = np.einsum("eq,eqm,eqia->emia", w, body.elements.modes, spatial)
-    excess = np.einsum("eqaA,eqiA->eqia", exceeds, gradient)
+    excess = np.einsum("eqaA,eqiA->eqia", difference, gradient)
     geometric = w * (G - np.einsum("eqm,em->eq", body.elements.modes, pressure))
     tangent = np.einsum("eq,eqiA,eqjA,ab->eiajb", w * G, gradient, gradient, np.eye(2))
     tangent += np.einsum("eq,eqja,eqib->eiajb", geometric, spatial, spatial)
-    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * growth * w * body.elements.shear[:, None], excess, excess)
+    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * curvature * w * body.elements.shear[:, None], excess, excess)
     tangent += np.einsum("e,emia,emjb->eiajb", body.elements.lame, dilate, dilate)
     return forces(body, u), tangent.reshape(-1, 18, 18)
 
 
-def without_centres(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
+def condense_centres(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
     """Return the forces (e, 16) and tangents (e, 16, 16) of the elements' outer nodes, their centres being free."""
     force, tangent = forces_and_tangents(body, u, pressure)
-    inside = np.linalg.inv(tangent[:, 16:, 16:])
-    across = tangent[:, :16, 16:] @ inside
-    force = force[:, :16] - (across @ force[:, 16:, None])[:, :, 0]
-    return force, tangent[:, :16, :16] - across @ tangent[:, 16:, :16]
+    compliance = np.linalg.inv(tangent[:, 16:, 16:])
+    coupling = tangent[:, :16, 16:] @ compliance
+    force = force[:, :16] - (coupling @ force[:, 16:, None])[:, :, 0]
+    return force, tangent[:, :16, :16] - coupling @ tangent[:, 16:, :16]
 
 
 def system(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
     """Return the internal forces (n,) and the tangent (n, n) with the elements' centres eliminated."""
-    force, tangent = without_centres(body, u, pressure)
-    out, whole = np.zeros(body.size + 1), np.zeros((body.size + 1, body.size + 1))
-    at = body.elements.unknown.reshape(-1, 16)  # fixed unknowns, -1, go to the last place and are cut off
-    np.add.at(out, at, force)
-    np.add.at(whole, (at[:, :, None], at[:, None, :]), tangent)
-    return out[:-1], whole[:-1, :-1]
+    force, tangent = condense_centres(body, u, pressure)
+    all_forces, stiffness = np.zeros(body.size + 1), np.zeros((body.size + 1, body.size + 1))
+    unknown = body.elements.unknown.reshape(-1, 16)  # fixed unknowns, -1, go to the last place and are cut off
+    np.add.at(all_forces, unknown, force)
+    np.add.at(stiffness, (unknown[:, :, None], unknown[:, None, :]), tangent)
+    return all_forces[:-1], stiffness[:-1, :-1]
 
 
-def reduced(force: Array, tangent: Array, skin: int) -> tuple[Array, Array]:
+def condense_to_skin(force: Array, tangent: Array, skin: int) -> tuple[Array, Array]:
     """Return forces (m,) and stiffness (m, m) of the last `skin` = m unknowns, the others being free to move."""
-    inside = len(force) - skin
-    both = np.concatenate([tangent[:inside, inside:], force[:inside, None]], axis=1)
-    follow: Array = np.linalg.solve(tangent[:inside, :inside], both).astype(np.float64)
-    left = tangent[inside:, :inside] @ follow
-    return force[inside:] - left[:, -1], tangent[inside:, inside:] - left[:, :-1]
+    inner = len(force) - skin
+    coupling = np.concatenate([tangent[:inner, inner:], force[:inner, None]], axis=1)
+    follow: Array = np.linalg.solve(tangent[:inner, :inner], coupling).astype(np.float64)
+    reduction = tangent[inner:, :inner] @ follow
+    return force[inner:] - reduction[:, -1], tangent[inner:, inner:] - reduction[:, :-1]
 
 
 def tributary(x: Array) -> Array:
@@ -144,24 +144,24 @@ def tributary(x: Array) -> Array:
     return out
 
 
-def rubbed(x: Array, touching: Flags, mu: float) -> Array:
+def bounded_length(x: Array, touching: Flags, mu: float) -> Array:
     """Return the length of skin on which a bound acts that each node stands for (k,).
 
     Where friction is steep, without edges whose middle does not touch, but for nodes beside no other.
     """
     if mu <= STEEP:
         return tributary(x)
-    out = np.zeros(len(x))
-    beside = np.r_[False, touching, False]
-    alone = ~beside[:-2] & ~beside[2:]
-    alone[1::2] = True
+    length = np.zeros(len(x))
+    neighbours = np.r_[False, touching, False]
+    isolated = ~neighbours[:-2] & ~neighbours[2:]
+    isolated[1::2] = True
     for start in range(0, len(x) - 2, 2):
         edge = slice(start, start + 3)
-        out[edge] += np.where(touching[start + 1] | alone[edge], tributary(x[edge]), 0.0)
-    return out
+        length[edge] += np.where(touching[start + 1] | isolated[edge], tributary(x[edge]), 0.0)
+    return length
 
 
-def restated(
+def update_contact_states(
     state: Indices,
     sense: Indices,
     reaction: Array,
@@ -178,20 +178,20 @@ def restated(
     slack, small = 1e-12 * np.abs(reaction[:, 1]).max(initial=0.0), 1e-13 * np.abs(above).max(initial=0.0)
     drag, push = reaction.T
     length = np.maximum(length, 0.0)  # skin that hangs over has no limit
-    was_open, stuck, slips = state == OPEN, state == STICK, state >= SLIP
-    coulomb, bound, most = law.mu * np.maximum(push, 0.0), law.bound(length), law.limit(push, length)
+    is_open, stuck, slips = state == OPEN, state == STICK, state >= SLIP
+    coulomb, bound, limit = law.mu * np.maximum(push, 0.0), law.bound(length), law.limit(push, length)
     at_bound = (bound < coulomb - slack) | ((state == SHEAR_LIMITED) & (bound <= coulomb + slack))
-    now, turned = np.where(at_bound, SHEAR_LIMITED, SLIP), sense.copy()
+    new_state, new_sense = np.where(at_bound, SHEAR_LIMITED, SLIP), sense.copy()
     if direction == 0:
-        over = np.abs(drag) > most + slack
-        turned = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
-        now = np.where(stuck, np.where(over, np.where(bound < coulomb, SHEAR_LIMITED, SLIP), STICK), now)
-        now = np.where(slips & (slip * sense > small) & (most > 0.0), STICK, now)
+        over = np.abs(drag) > limit + slack
+        new_sense = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
+        new_state = np.where(stuck, np.where(over, np.where(bound < coulomb, SHEAR_LIMITED, SLIP), STICK), new_state)
+        new_state = np.where(slips & (slip * sense > small) & (limit > 0.0), STICK, new_state)
         entering = SLIP if frictionless(law) else STICK
     else:
-        turned = np.where(was_open | (push < -slack), sense, direction)
+        new_sense = np.where(is_open | (push < -slack), sense, direction)
         entering = SHEAR_LIMITED if law.mu > STEEP and law.tau_max < np.inf else SLIP
-        turned = np.where(was_open & (above < -small), direction, turned)
-    now = np.where(push < -slack, OPEN, now)
-    now = np.where(was_open, np.where(above < -small, entering, OPEN), now)
-    return now, turned
+        new_sense = np.where(is_open & (above < -small), direction, new_sense)
+    new_state = np.where(push < -slack, OPEN, new_state)
+    new_state = np.where(is_open, np.where(above < -small, entering, OPEN), new_state)
+    return new_state, new_sense

@@ -16,18 +16,12 @@ def hooke_energy(law, gradient):
     )
 
 
-def hooke_stress(law, gradient):
-    """Return sigma = 2 G eps + lambda tr(eps) 1 (..., 2, 2) [MPa], tension positive."""
-    strain = (gradient + np.swapaxes(gradient, -1, -2)) / 2.0
-    return 2.0 * law.shear * strain + law.lame * np.trace(strain, axis1=-2, axis2=-1)[..., None, None] * np.eye(2)
-
-
 def energy(law, F):
     """Return W (...) [MPa] of a law of finite strain at deformation gradients F (..., 2, 2); nan where det F <= 0."""
     J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
-    grown = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
-    return law.shear / 2.0 * grown + law.lame / 2.0 * np.log(J) ** 2
+    stretch_energy = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
+    return law.shear / 2.0 * stretch_energy + law.lame / 2.0 * np.log(J) ** 2
 
 
 def overstress_energy(T: Array, F: Array) -> Array:

@@ -11,7 +11,7 @@ _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 _ALONG, _UP = np.ascontiguousarray(_GRADIENTS[..., 0].T), np.ascontiguousarray(_GRADIENTS[..., 1].T)  # (9 nodes, 9)
 
 
-class Plain(NamedTuple):
+class ElementMatrices(NamedTuple):
     """Elements by their matrices, displacements being ordered x, y, x, y, ..."""
 
     stiffness: Array  # (e, 18, 18) [N/mm per mm]
@@ -40,32 +40,32 @@ def elastic(mesh, materials):
 
     shear = np.array([m.shear for m in materials])[mesh.region]
     lame = np.array([m.lame for m in materials])[mesh.region]
-    place = _VALUES @ corners  # (e, q, 2)
-    centre = place.mean(axis=1)
+    points = _VALUES @ corners  # (e, q, 2)
+    centre = points.mean(axis=1)
     modes = np.ones((count, 9, 3))
-    modes[:, :, 1:] = place - centre[:, None]
-    loaded = np.swapaxes(modes * weight[:, :, None], 1, 2)  # (e, 3, q)
+    modes[:, :, 1:] = points - centre[:, None]
+    weighted_modes = np.swapaxes(modes * weight[:, :, None], 1, 2)  # (e, 3, q)
     moments = np.empty((count, 3, 9, 2))  # integral of mode times divergence
-    moments[..., 0], moments[..., 1] = loaded @ by_x, loaded @ by_y
+    moments[..., 0], moments[..., 1] = weighted_modes @ by_x, weighted_modes @ by_y
     moments = moments.reshape(count, 3, 18)
-    dilatation = np.linalg.inv(loaded @ modes) @ moments
-    stiff = np.swapaxes(lame[:, None, None] * moments, 1, 2) @ dilatation
+    dilatation = np.linalg.inv(weighted_modes @ modes) @ moments
+    stiffness = np.swapaxes(lame[:, None, None] * moments, 1, 2) @ dilatation
 
     # K_ia,jb gets G (delta_ab grad N_i . grad N_j + dN_i/db dN_j/da), one pair of directions after the other
-    blocks = stiff.reshape(count, 9, 2, 9, 2)
+    blocks = stiffness.reshape(count, 9, 2, 9, 2)
     weight *= shear[:, None]
     along = np.swapaxes(by_x * weight[:, :, None], 1, 2)
     xx, xy = along @ by_x, along @ by_y
     yy = np.swapaxes(by_y * weight[:, :, None], 1, 2) @ by_y
-    both = xx + yy
-    blocks[:, :, 0, :, 0] += both + xx
-    blocks[:, :, 1, :, 1] += both + yy
+    laplacian = xx + yy
+    blocks[:, :, 0, :, 0] += laplacian + xx
+    blocks[:, :, 1, :, 1] += laplacian + yy
     blocks[:, :, 0, :, 1] += np.swapaxes(xy, 1, 2)
     blocks[:, :, 1, :, 0] += xy
-    return Plain(stiff, dilatation, centre, shear, lame)
+    return ElementMatrices(stiffness, dilatation, centre, shear, lame)
 
 
-class Reduced:
+class CondensedBody:
     """A body reduced to the displacements of its skin, x and y in turn, by one dense elimination of all others."""
 
     def __init__(self, mesh, stiffness, loads=None):
@@ -74,26 +74,26 @@ class Reduced:
         whole = np.zeros((count, count))
         np.add.at(whole, (at[:, :, None], at[:, None, :]), stiffness)
         self.loads = np.zeros((count, 1)) if loads is None else loads
-        self.kept = (2 * mesh.skin[:, None] + np.arange(2)).ravel()
-        self.inner = np.setdiff1d(np.arange(count), np.concatenate([mesh.fixed, self.kept]))
+        self.skin_unknowns = (2 * mesh.skin[:, None] + np.arange(2)).ravel()
+        self.inner = np.setdiff1d(np.arange(count), np.concatenate([mesh.fixed, self.skin_unknowns]))
         self.inside = whole[np.ix_(self.inner, self.inner)]
-        self.across = whole[np.ix_(self.inner, self.kept)]
+        self.across = whole[np.ix_(self.inner, self.skin_unknowns)]
         self.follow = np.linalg.solve(self.inside, self.across)
-        self.stiffness = whole[np.ix_(self.kept, self.kept)] - self.across.T @ self.follow
-        self.load = self.felt(self.loads)
+        self.stiffness = whole[np.ix_(self.skin_unknowns, self.skin_unknowns)] - self.across.T @ self.follow
+        self.load = self.skin_load(self.loads)
 
-    def felt(self, loads):
+    def skin_load(self, loads):
         """Return what the skin (m, l) feels of `loads` (size, l)."""
-        return loads[self.kept] - self.follow.T @ loads[self.inner]
+        return loads[self.skin_unknowns] - self.follow.T @ loads[self.inner]
 
-    def all_unknowns(self, kept, loads=None):
+    def all_unknowns(self, skin, loads=None):
         """Return all unknowns (size, c) for those of the skin (m, c), under `loads` (size, c) too."""
-        out = np.zeros((len(self.loads), kept.shape[1]))
-        out[self.kept] = kept
-        force = np.zeros(out.shape) if loads is None else loads
-        out[self.inner] = np.linalg.solve(self.inside, force[self.inner] - self.across @ kept)
-        return out
+        unknowns = np.zeros((len(self.loads), skin.shape[1]))
+        unknowns[self.skin_unknowns] = skin
+        force = np.zeros(unknowns.shape) if loads is None else loads
+        unknowns[self.inner] = np.linalg.solve(self.inside, force[self.inner] - self.across @ skin)
+        return unknowns
 
     def under(self, loads):
         """Return all unknowns (size, c) under `loads` (size, c) alone."""
-        return self.all_unknowns(np.linalg.solve(self.stiffness, self.felt(loads)), loads)
+        return self.all_unknowns(np.linalg.solve(self.stiffness, self.skin_load(loads)), loads)
