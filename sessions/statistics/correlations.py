@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtri, stdtrit
+from scipy.special import ndtri, stdtr, stdtrit
 
 from drivers.arrays import Array
 
@@ -79,23 +79,18 @@ def t_quantile(dof: float) -> float:
     return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
 
 
-def jackknife(whole: ArrayLike, without: Array) -> tuple[Array, Array]:
-    """Return mean and standard error (m,) of the pseudo-values of numbers `whole` (m,), `without` each of k (k, m).
+def jackknife(whole: ArrayLike, without: Array) -> tuple[Array, Array, Array]:
+    """Return the ends of the 95 % interval of numbers `whole` (m,), and p (m,), from those `without` each of k (k, m).
 
-    An error of round-off alone is nan: cases that are all alike tell none.
-    Their t interval has k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika 61:1).
+    The mean of the pseudo-values follows Student's t with k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika
+    61:1). An error of round-off alone gives nan: cases that are all alike tell none.
     """
     k = len(without)
     pseudo = k * np.asarray(whole, np.float64) - (k - 1) * without
-    error = pseudo.std(axis=0, ddof=1) / math.sqrt(k)
-    return pseudo.mean(axis=0), np.where(error > 1e-9 * np.abs(whole), error, np.nan)
-
-
-def jackknife_interval(whole: ArrayLike, without: Array) -> tuple[Array, Array]:
-    """Return the ends (m,) of the jackknife's 95 % t interval of numbers `whole` (m,), `without` each of k (k, m)."""
-    mean, error = jackknife(whole, without)
-    half = t_quantile(len(without) - 1) * error
-    return mean - half, mean + half
+    mean, error = pseudo.mean(axis=0), pseudo.std(axis=0, ddof=1) / math.sqrt(k)
+    error = np.where(error > 1e-9 * np.abs(whole), error, np.nan)
+    half = t_quantile(k - 1) * error
+    return mean - half, mean + half, 2.0 * np.asarray(stdtr(k - 1, -np.abs(mean) / error), np.float64)
 
 
 def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
@@ -161,13 +156,7 @@ class Contrast:
     low: float | None  # its 95 % interval
     high: float | None
     z: float | None  # Steiger's; None where the interval is the jackknife's
-    p: float | None  # two-sided
-
-    def differs(self, alpha: float) -> bool:
-        """Say whether the two correlations differ: by p where there is one, else by the interval."""
-        if self.p is not None:
-            return self.p < alpha
-        return self.low is not None and self.high is not None and not self.low <= 0.0 <= self.high
+    p: float | None  # two-sided; None of cases that are all alike
 
 
 def steiger_z(first: float, second: float, mutual: float, n: int) -> float | None:

@@ -12,7 +12,7 @@ from sessions.statistics.correlations import (
     Contrast,
     contrast,
     fisher_interval,
-    jackknife_interval,
+    jackknife,
     leave_one_out_error,
     partial_correlation,
     pearson,
@@ -182,8 +182,8 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
         own, models = (_correlations(covariances, 0, column) for column in (1, 2))
         steps = np.sign(models[0]) * models - np.sign(own[0]) * own
         if math.isfinite(steps[0]):
-            low, high = _ends(*jackknife_interval(steps[0], steps[1:]))
-            rival = replace(rival, contrast=Contrast(len(shared), float(steps[0]), low, high, None, None))
+            low, high, p = _known(*jackknife(steps[0], steps[1:]))
+            rival = replace(rival, contrast=Contrast(len(shared), float(steps[0]), low, high, None, p))
         else:
             rival = _because(rival, contrast="one of them does not vary within subjects")
     if name == MODEL_MU:
@@ -194,7 +194,7 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
         return _because(rival, partial="µ determines it, or one of them does not vary")
     with np.errstate(divide="ignore", invalid="ignore"):  # a perfect one has no z
         z = np.arctanh(partials)
-        low, high = _ends(*np.tanh(jackknife_interval(z[0], z[1:])))
+        low, high = _known(*np.tanh(jackknife(z[0], z[1:])[:2]))
     return replace(rival, partial=float(partials[0]), partial_low=low, partial_high=high)
 
 
@@ -220,9 +220,9 @@ def _correlations(covariances: Array, first: int, second: int) -> Array:
     return np.where(size > 0.0, covariances[:, first, second], np.nan) / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
-def _ends(low: Array, high: Array) -> tuple[float, float] | tuple[None, None]:
-    """Return the ends of an interval, None where they are not known."""
-    return (float(low), float(high)) if math.isfinite(low) and math.isfinite(high) else (None, None)
+def _known(*numbers: Array) -> list[float | None]:
+    """Return numbers, None for each that is not known."""
+    return [float(one) if math.isfinite(one) else None for one in numbers]
 
 
 def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float | None:

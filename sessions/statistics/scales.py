@@ -27,7 +27,7 @@ from scipy import special
 from scipy.sparse import csgraph
 
 from drivers.arrays import Array, Indices
-from sessions.statistics.correlations import jackknife_interval
+from sessions.statistics.correlations import jackknife
 from sessions.statistics.mixed_model import Term, mixed_model
 from sessions.statistics.psychometric import QUARTILE, binomial_deviance
 from sessions.statistics.scores import IntervalEstimate, by_key
@@ -204,7 +204,7 @@ def _without_each(counts: Array, model: Model, begin: Array) -> tuple[Array, str
 
 def _estimates(whole: Array, without: Array) -> list[IntervalEstimate]:
     """Return numbers (m,) with the jackknife's intervals, from the same without each subject (k, m)."""
-    low, high = jackknife_interval(whole, without)
+    low, high, _ = jackknife(whole, without)
     ends = [(a, b) if math.isfinite(a) else (None, None) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
     return [IntervalEstimate(value, *two) for value, two in zip(whole.tolist(), ends, strict=True)]
 
@@ -259,8 +259,8 @@ def stevens_exponent(
     slopes = [one[0] for one in without if one is not None]
     if len(slopes) < len(cells):
         return Exponent(len(people), len(y), plain, reason=reason or "without one of the subjects nothing varies")
-    low, high = jackknife_interval(here[0], np.array(slopes))
-    return Exponent(len(people), len(y), plain, (here[0], float(low), float(high)), here[1], reason)
+    low, high, _ = map(float, jackknife(here[0], np.array(slopes)))
+    return Exponent(len(people), len(y), plain, (here[0], low, high), here[1], reason)
 
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:

@@ -118,12 +118,8 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
     if k < 3 or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
-    mean, error = map(float, jackknife(z, np.arctanh(others_xy / size)))
-    if math.isnan(error):
-        return None
-    half = t_quantile(k - 1) * error
-    p = 2.0 * float(special.stdtr(k - 1, -abs(mean) / error))
-    return (math.tanh(mean - half), math.tanh(mean + half)), p
+    low, high, p = map(float, jackknife(z, np.arctanh(others_xy / size)))
+    return None if math.isnan(p) else ((math.tanh(low), math.tanh(high)), p)
 
 
 def agreement(table: Table) -> Agreement | None:

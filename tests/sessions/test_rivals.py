@@ -15,14 +15,16 @@ from sessions.report.prose import distinctions
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.session import tables
 from sessions.statistics.correlations import (
+    Contrast,
     contrast,
+    jackknife,
     leave_one_out_error,
     partial_correlation,
     required_cases,
     steiger_z,
 )
 from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
-from sessions.statistics.rivals import MODEL, MODEL_MU, RivalTrial, rivals_of_means, rivals_within
+from sessions.statistics.rivals import MODEL, MODEL_MU, Rival, RivalTrial, rivals_of_means, rivals_within
 from sessions.statistics.within_subjects import repeated_correlation
 from solver import Finger, solve_many
 from solver.scene.published import scenes as published_scenes
@@ -326,6 +328,26 @@ def test_a_study_shows_rivals_of_means_and_within_subjects_on_its_page_and_as_cs
     rows = rivals_csv(found).splitlines()
     assert rows[0].startswith("SIMULATED,descriptor,kind,name,n,r,low,high")
     assert sum(",within," in row for row in rows) == len(found.descriptors[0].rivals)
+
+
+def test_a_sentence_names_those_rivals_whose_p_allows_for_all_of_them():
+    """Holm's p of 0.01, 0.03 and 0.04 are 0.03, 0.06 and 0.06."""
+    steps = {"N": (0.5, 0.01), "T": (-0.3, 0.03), "speed": (0.4, 0.04)}
+    rivals = [
+        Rival(name, 50, 0.5, 0.1, 0.8, Contrast(50, step, None, None, None, p)) for name, (step, p) in steps.items()
+    ]
+    (said,) = rivals_sentences("roughness", [Rival(MODEL, 50, 0.9, 0.8, 0.95), *rivals])
+    assert said == (
+        "On roughness, the scores follow N less closely than the SED (p < 0.05 by Holm over 3 rivals); they tell no "
+        "difference between the SED and T and speed."
+    )
+
+
+def test_the_jackknife_of_a_mean_is_the_t_test_of_its_values():
+    values = np.random.default_rng(6).normal(1.0, 1.0, 7)
+    test = stats.ttest_1samp(values, 0.0)
+    found = jackknife(values.mean(), np.array([np.delete(values, n).mean() for n in range(7)]))
+    assert found == pytest.approx((*test.confidence_interval(0.95), test.pvalue))
 
 
 def test_equal_rivals_are_said_to_be_told_apart_by_no_number_of_surfaces():

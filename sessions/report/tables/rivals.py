@@ -8,6 +8,7 @@ from sessions.report.wording import NONE, capital, caption, correlation, digits,
 from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
+from sessions.statistics.within_subjects import holm
 
 _ALPHA = 0.05
 MANY_SURFACES = 10_000  # beyond which nobody asks how many
@@ -97,14 +98,16 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
 def _verdict(name: str, model: str, compared: Sequence[Rival]) -> str:
     """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
-    for rival in compared:
-        if (contrast := rival.contrast) is not None:
-            side = "more" if contrast.difference < 0.0 else "less"
-            sides[side if contrast.differs(_ALPHA) else "neither"].append(rival.name)
+    contrasts = [(rival.name, rival.contrast) for rival in compared if rival.contrast is not None]
+    adjusted = holm([1.0 if contrast.p is None else contrast.p for _, contrast in contrasts])
+    for (rival, contrast), p in zip(contrasts, adjusted, strict=True):
+        sides["neither" if p >= _ALPHA else "more" if contrast.difference < 0.0 else "less"].append(rival)
     followed = [
         f"{_rival_names(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]
     ]
-    sentence = f"the scores follow {' and '.join(followed)} (p < 0.05, not corrected)" if followed else ""
+    sentence = (
+        f"the scores follow {' and '.join(followed)} (p < 0.05 by Holm over {len(adjusted)} rivals)" if followed else ""
+    )
     if sides["neither"]:
         sentence += (
             "; they" if sentence else "the scores"

@@ -92,7 +92,7 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
         if exponent.deming is not None:
             value, low, high = exponent.deming
             words += f", {digits(value, 2)} ({digits(low, 2)} to {digits(high, 2)}) with errors in both"
-        sentences.append(f"{name}: estimates grow as a power of µ, with an exponent of {words}.")
+        sentences.append(f"{name}: if estimates are a power of µ, its exponent is {words}.")
     elif exponent is not None and exponent.reason:
         sentences.append(f"{name}: no exponent of the estimates by µ: {exponent.reason}.")
     return sentences
