@@ -104,7 +104,7 @@ def test_a_signal_ends_a_run_within_a_second_while_its_transducer_sends_no_readi
     command += ["--out", str(tmp_path / "session")]
     ran = subprocess.Popen([sys.executable, "-m", "daq_app", *command], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        while not device.asked.wait(0.1):
+        while not device.stream_request.wait(0.1):
             assert ran.poll() is None, ran.stderr.read()
         began = time.monotonic()
         ran.send_signal(number)
