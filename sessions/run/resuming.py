@@ -14,6 +14,7 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.head import calibration_hash
+from sessions.recording.manifest import is_sealed
 from sessions.run.event_log import Line, event_of, line_of
 from sessions.run.machine import advance, resume_interrupted, start
 from sessions.run.states import State
@@ -68,15 +69,14 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
 
 def check_resumable(recording: Recording) -> None:
     """Raise RecordingError unless the session was cut short, its log is whole and its clock can go on."""
+    folder, end = recording.folder, recording.end
+    seals = "" if is_sealed(folder) else f"; 'daq-app resume {folder} --end' seals it"
     if not recording.log_is_whole:
-        raise RecordingError(f"{recording.folder} cannot be resumed: its log is damaged; it can still be analysed")
-    end = recording.end
+        raise RecordingError(f"{folder} cannot be resumed: its log is damaged; it can still be analysed{seals}")
     if end is not None and end.get("cause") not in RESUMABLE:
-        raise RecordingError(
-            f"{recording.folder} has ended ({end.get('reason')}); only one that was cut short is resumed"
-        )
+        raise RecordingError(f"{folder} has ended ({end.get('reason')}); only one cut short is resumed{seals}")
     if recording.provenance["clock"]["factor"] == 0.0:
-        raise RecordingError(f"{recording.folder} ran on simulated time without a pace; begin a new session")
+        raise RecordingError(f"{folder} ran on simulated time without a pace; begin a new session{seals}")
 
 
 def check_same_transducer(recorded: TransducerInfo | None, opened: TransducerInfo | None) -> None:

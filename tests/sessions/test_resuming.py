@@ -166,7 +166,7 @@ def test_a_session_whose_last_event_is_damaged_is_not_resumed(tmp_path):
 
 def test_ended_and_sealed_sessions_are_refused(tmp_path):
     recording = Session(tmp_path / "s").run()
-    with pytest.raises(RecordingError, match="has ended"):
+    with pytest.raises(RecordingError, match=r"has ended .*'daq-app resume .*s --end' seals it"):
         check_resumable(recording)
     seal(tmp_path / "s")
     with pytest.raises(RecordingError, match="is sealed"):
