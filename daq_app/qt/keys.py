@@ -162,7 +162,8 @@ class Keyboard(QObject):
         """Take a key that no field took; return whether it meant anything."""
         match owner(name_of(event), self._subject.asks, typing=self.focused_field() is not None):
             case "answer":
-                self._subject.take_key(event)
+                if self._subject.isVisible():  # nobody answers on a page that nobody sees
+                    self._subject.take_key(event)
                 return True
             case "course":
                 act = act_of(event)

@@ -70,6 +70,21 @@ def test_an_answer_can_be_given_with_keys_that_reach_the_experimenters_window(dr
     assert driver.session.trials[0].answer == "score 60"
 
 
+def test_no_key_answers_on_a_page_that_was_closed_and_its_mark_waits(driver):
+    window = driver.window
+    begin(driver)
+    until_scoring(driver)
+    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    window.subject.close()
+    for key in (Qt.Key.Key_PageUp, ENTER, SPACE):
+        QTest.keyClick(window, key)
+    assert (driver.session.phase, window.subject.line.answer.score) == ("scoring", 50.0)
+    QTest.keyClick(window, Qt.Key.Key_F6)
+    QTest.keyClick(window, ENTER)
+    moved_on(driver, 1)
+    assert driver.session.trials[0].answer == "score 50"
+
+
 def test_a_report_that_comes_between_the_answer_and_its_record_asks_for_no_second_answer(driver):
     begin(driver)
     until_scoring(driver)
