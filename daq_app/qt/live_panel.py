@@ -227,8 +227,8 @@ class LivePanel(Panel):
         self.bar.finite.setChecked(finite)
         self._model.follow_at("finite" if finite else "small")
 
-    def draw(self, marks: tuple[Mark, ...], clock: float) -> None:
-        """Draw a frame; `clock` [s] is the machine's."""
+    def draw(self, marks: tuple[Mark, ...], clock: float, *, silent: bool = False) -> None:
+        """Draw a frame; `clock` [s] is the machine's. Where the transducer is `silent`, nothing is measured now."""
         if not self._forces_shown:
             return
         trace = self._feed.trace
@@ -260,7 +260,7 @@ class LivePanel(Panel):
         if clock - self._read_at >= READ_EVERY:
             self._read_at = clock
             _, values = trace.between(now - 0.1, np.nextafter(now, np.inf))
-            self.bar.show_numbers(values)
+            self.bar.show_numbers(values[:, :0] if silent else values)
 
     def _show_until(self, plots: Sequence[LivePlot], end: float, marks: tuple[Mark, ...], clock: float) -> None:
         """Show the readings up to `end` [s, device time]."""

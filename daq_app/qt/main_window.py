@@ -286,7 +286,8 @@ class MainWindow(QMainWindow):
         try:
             self.live.model_says()
             self.side.show_force()
-            self.live.draw(() if session is None else session.marks, self.bridge.state.now)
+            marks = () if session is None else session.marks
+            self.live.draw(marks, self.bridge.state.now, silent=self.bridge.view.bench.silent)
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.report_drawing_failure(error)
 

@@ -38,6 +38,7 @@ class Display:
         self._saturated_before = self._saturated_now = 0
         self._arrived: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
         self._live_due = self._health_due = 0.0
+        self._heard = 0.0  # when the newest reading came, or the stream began [real s]
 
     def device(self, info: TransducerInfo | None) -> None:
         """Show this transducer from now on, or none. Zero and peaks stay: it may be the one of before."""
@@ -46,6 +47,7 @@ class Display:
         self._load = np.zeros(7)
         self._count_anew()
         self._health_due = 0.0
+        self._heard = time.monotonic()
 
     def forget(self) -> None:
         """Forget the zero and the greatest loads: another transducer will be shown."""
@@ -56,6 +58,7 @@ class Display:
         """Take what comes next as a new stream, whose time and numbers begin anew."""
         self._flush()
         self._stream += 1
+        self._heard = time.monotonic()
         self._arrived.clear()
         self._count_anew()
 
@@ -80,17 +83,18 @@ class Display:
         """Take readings, of the stream that runs."""
         if len(block) and self._info is not None:
             self._waiting.append(block)
-            self._arrived.append((time.monotonic(), len(block)))
+            self._heard = time.monotonic()
+            self._arrived.append((self._heard, len(block)))
 
-    def look(self, health: Health) -> None:
-        """Send what is due."""
+    def look(self, health: Health, *, streaming: bool = True) -> None:
+        """Send what is due; where it is not `streaming`, nobody waits for readings."""
         now = time.monotonic()
         if now >= self._live_due:
             self._live_due = now + LIVE_EVERY
             self._flush()
         if now >= self._health_due:
             self._health_due = now + HEALTH_EVERY
-            self._tell_health(health, now)
+            self._tell_health(health, now, now - self._heard if streaming and self._info is not None else 0.0)
 
     def _flush(self) -> None:
         info, block = self._info, ReadingBlock.concatenate(self._waiting)
@@ -116,7 +120,7 @@ class Display:
             )
         )
 
-    def _tell_health(self, health: Health, now: float) -> None:
+    def _tell_health(self, health: Health, now: float, silence: float) -> None:
         while self._arrived and now - self._arrived[0][0] > RATE_OVER:
             self._arrived.popleft()
         span = now - self._arrived[0][0] if self._arrived else 0.0
@@ -133,6 +137,7 @@ class Display:
                 tuple(load.tolist()),
                 tuple(peak.tolist()),
                 self._saturated_now - self._saturated_before,
+                silence,
             )
         )
         self._load = np.zeros(7)

@@ -113,6 +113,7 @@ class HealthReport(Struct, frozen=True):
     load: tuple[float, ...]  # (7,) the greatest since the last report, nothing subtracted [-]; nan: no rated range
     peak: tuple[float, ...]  # (7,) the same since somebody acknowledged overloads; both as `drivers.calibration.loads`
     saturated: int  # readings the device called invalid since somebody acknowledged
+    silence: float = 0.0  # since the newest reading, or since the stream began; 0 where nothing need come [real s]
 
 
 class Live(Struct, frozen=True, eq=False):

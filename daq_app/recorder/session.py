@@ -239,7 +239,7 @@ class _Operator:
 
     def poll(self) -> Sequence[Event]:
         """Return what was done; say no to what is not for now."""
-        self._display.look(self._bench.health)
+        self._display.look(self._bench.health, streaming=self._info is not None)
         acts: list[Event] = []
         for request in self._inbox.take_requests():
             match request:

@@ -98,6 +98,7 @@ class BenchState:
     load: Load = field(default_factory=Load)
     peak: Load = field(default_factory=Load)  # since somebody acknowledged it
     saturated: int = 0  # since somebody acknowledged it
+    silence: float = 0.0  # since the newest reading [s]
     taring: bool = False
     zero: Zero | None = None  # the latest
     first_zero: Zero | None = None  # the first since the bench was connected
@@ -150,8 +151,9 @@ def _fold_tare(bench: BenchState, message: Message) -> BenchState:
 
 def _fold_load(bench: BenchState, message: Message) -> BenchState:
     match message:
-        case m.HealthReport(health, rate, load, peak, saturated):
-            return replace(bench, health=health, rate=rate, load=Load(load), peak=Load(peak), saturated=saturated)
+        case m.HealthReport(health, rate, load, peak, saturated, silence):
+            loads = {"load": Load(load), "peak": Load(peak)}
+            return replace(bench, health=health, rate=rate, saturated=saturated, silence=silence, **loads)
         case LifeKnown(serial, life) if bench.info is not None and bench.info.serial == serial:
             return replace(bench, life=life)
         case m.AcknowledgeOverloads():

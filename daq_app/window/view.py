@@ -25,6 +25,7 @@ ENDED = {  # by how far the sealing is
     "cut short": tr_noop("ended, not sealed"), "sealed": tr_noop("ended and sealed"),
 }  # fmt: skip
 SILENT = 3.0  # a recorder that was not heard for longer is said to be silent [s]
+NO_READINGS = 1.0  # a transducer that sent nothing for longer is said to: its rate is measured over as long [s]
 UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer [s]
 
 
@@ -82,6 +83,7 @@ class BenchView:
     serial: str
     calibration: str
     rate: str
+    silent: bool  # readings should come, and do not
     counters: tuple[tuple[str, str], ...]
     bars: tuple[Bar, ...]
     tare: str  # its figures
@@ -110,7 +112,7 @@ def bench_summary(view: BenchView) -> str:
 def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
     """Return what is shown of the bench; while a session is recorded it is neither disconnected nor tared."""
     info = bench.info
-    lamp, words = _bench_lamp(bench)
+    lamp, words = _bench_lamp(bench, recording=recording)
     counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"
     open_now = bench.link == "open"
     return BenchView(
@@ -120,6 +122,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
+        silent=_is_silent(bench),
         counters=(*((name, f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
@@ -146,7 +149,7 @@ def _search_words(bench: BenchState) -> str:
     return tr("Found {count}: choose from the list.", count=len(bench.devices))
 
 
-def _bench_lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], str]:
+def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "well", "look", "wrong"], str]:
     match bench.link:
         case "none":
             return "off", tr("not connected")
@@ -156,6 +159,8 @@ def _bench_lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wron
             return "wrong", tr("does not answer")
         case "open":
             pass
+    if _is_silent(bench):
+        return "wrong" if recording else "look", tr("no readings for {age:.0f} s", age=bench.silence)
     if bench.peak.over:
         return "wrong", tr("overloaded")
     if bench.saturated:
@@ -163,6 +168,11 @@ def _bench_lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wron
         return "wrong", tr("invalid readings: {said}", said=said) if said else tr("invalid readings")
     if near := bench.peak.near:
         return "look", tr("near the rated load: {axes}", axes=", ".join(tr(axis) for axis in near))
+    return _losses(bench)
+
+
+def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
+    """Return what was counted of the stream, in words."""
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
@@ -171,6 +181,10 @@ def _bench_lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wron
     if bench.health.lag_ms > LAGGING:
         return "look", tr("{lag:.0f} ms late", lag=bench.health.lag_ms)
     return "well", tr("nothing lost")
+
+
+def _is_silent(bench: BenchState) -> bool:
+    return bench.link == "open" and bench.silence > NO_READINGS
 
 
 def _rate(bench: BenchState) -> str:
@@ -320,10 +334,8 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("wrong", words)
     if state.gone is not None:
         return Banner("wrong", sentence(state.gone))
-    if bench.link == "lost":
-        lost = tr(" Readings are being lost; what came before is kept.") if running else ""
-        problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # which the banner says itself
-        return Banner("wrong", tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost))
+    if words := _no_readings(bench, running=running):
+        return Banner("wrong", words)
     if running and state.heard is not None and state.now - state.heard > SILENT:
         return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=state.now - state.heard))
     if over := bench.peak.over:
@@ -338,6 +350,18 @@ def _banner(state: AppState) -> Banner | None:
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
     return None
+
+
+def _no_readings(bench: BenchState, *, running: bool) -> str:
+    """Return why nothing comes from a transducer that should send; empty where something does."""
+    if bench.link == "lost":
+        lost = tr(" Readings are being lost; what came before is kept.") if running else ""
+        problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # which the banner says itself
+        return tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost)
+    if running and _is_silent(bench):
+        words = tr("No readings for {age:.0f} s: check power and cable of the transducer.", age=bench.silence)
+        return words + tr(" What came before is kept.")
+    return ""
 
 
 def _cut_short(state: AppState, session: SessionState) -> str:

@@ -84,6 +84,25 @@ def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
     assert report.load[:3] == report.peak[:3] == pytest.approx((4.5 / 36, 0.0, 0.5))
 
 
+def test_the_time_since_the_newest_reading_is_told_and_where_none_need_come_it_is_nothing(monkeypatch):
+    now, reports = [100.0], []
+    monkeypatch.setattr("daq_app.recorder.display.time.monotonic", lambda: now[0])
+    display, one = Display(reports.append, 1.0), np.zeros(1, np.int64)
+
+    def told(at, **how):
+        now[0] = at
+        display.look(Health(), **how)
+        return reports[-1].silence
+
+    assert told(130.0) == 0.0  # there is no transducer
+    display.device(INFO)
+    display.stream_began()
+    assert told(131.5) == 1.5
+    display.take(ReadingBlock(one, one, one, one / 1.0, one, np.zeros((1, 6))))
+    assert told(131.7) == pytest.approx(0.2)
+    assert told(190.0, streaming=False) == 0.0
+
+
 def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and_go_with_another(seat):
     seat.bench.begin_tare(0.5)
     tared, peak = seat.until(Tared), seat.until(HealthReport).peak

@@ -214,6 +214,20 @@ def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transdu
     panel.hide()
 
 
+def test_a_transducer_that_sends_nothing_now_has_no_number_now(driver):
+    class Feed:
+        trace = LiveTrace(100.0)
+
+    panel = LivePanel(Feed, driver.window.bridge.model)
+    panel.resize(1200, 800)
+    time = np.arange(0.0, 1.0, 0.01)
+    Feed.trace.add(time, np.full((len(CHANNELS), len(time)), 3.0))
+    panel.draw((), 1.0)
+    assert panel.bar.values["N"].text() == "3.00 N"
+    panel.draw((), 2.5, silent=True)
+    assert panel.bar.values["N"].text() == "–"
+
+
 def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
     window, mirror = driver.window, driver.window.course.mirror
     mirror.open.set_room(room=True)

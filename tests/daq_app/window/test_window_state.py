@@ -236,6 +236,21 @@ def test_the_health_lamp_names_what_was_lost():
     assert dict(bench.counters)["lost"] == "3"
 
 
+def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_still_come_back():
+    def shown(silence, *session):
+        report = structs.replace(loaded((0.1,) * 7), silence=silence)
+        return derive_view(after(m.Device(INFO, None), *session, report))
+
+    quiet, silent = shown(0.9, *TOUCH), shown(2.2, *TOUCH)
+    assert (quiet.bench.lamp, quiet.bench.silent, quiet.banner) == ("well", False, None)
+    assert (silent.bench.lamp, silent.bench.lamp_words) == ("wrong", "no readings for 2 s")
+    assert silent.bench.silent
+    assert silent.banner.grade == "wrong"
+    assert silent.banner.sentence.startswith("No readings for 2 s: check power and cable")
+    before = shown(2.2)  # nothing is lost where nothing is recorded
+    assert (before.bench.lamp, before.banner) == ("look", None)
+
+
 def test_an_overload_stays_until_somebody_acknowledges_it():
     state = after(m.Device(INFO, None), loaded((0.1,) * 6 + (0.2,), (0.1, 0.1, 0.4, 0.1, 0.1, 0.9, 1.3)))
     bench = derive_view(state).bench
