@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
@@ -308,6 +308,11 @@ class NewSessionPage(Panel):
         """Put the cards in two columns where there is room."""
         super().resizeEvent(event)
         set_horizontal(self._columns, self.width() >= self._two)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Propose the code after that of a session that has just ended."""
+        super().showEvent(event)
+        self._place_changed()
 
     def changeEvent(self, event: QEvent) -> None:
         """Look for studies anew where the window is turned to: another program may have made one."""

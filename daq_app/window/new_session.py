@@ -278,9 +278,25 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
             continue
         subject, trials = recording.plan.subject, recording.trials
         done = sum(record.outcome not in ("open", "skipped") for record in trials)
-        words = tr("{subject}: trials done {done} of {count}", subject=subject, done=done, count=len(trials))
+        begun = _local_time(recording.provenance.get("created_utc"))
+        words = tr(
+            "{subject}, {begun}: trials done {done} of {count}",
+            subject=subject, begun=begun, done=done, count=len(trials),
+        )  # fmt: skip
         unfinished.append(UnfinishedSession(place.parent, words))
     return tuple(unfinished)
+
+
+def _local_time(recorded: object) -> str:
+    """Return day and time of this computer's zone; a dash where nothing readable is recorded.
+
+    >>> _local_time("2026-11-26T19:51:33"), _local_time(None)
+    ('2026-11-26 19:51', '–')
+    """
+    try:
+        return datetime.fromisoformat(str(recorded)).astimezone().strftime("%Y-%m-%d %H:%M")
+    except ValueError:
+        return "–"
 
 
 def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:

@@ -231,13 +231,14 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
     assert not list(different_events(recording, replayed))
 
 
-def test_the_page_of_the_next_session_has_no_code_and_enter_begins_none(driver):
+def test_the_page_of_the_next_session_has_no_code_proposes_the_next_and_enter_begins_none(driver):
     begin(driver)
     driver.window.bridge.send(steps.Abort("enough"))
     driver.until(lambda: driver.session.sealing == "sealed", "the end")
     QTest.keyClick(driver.window, ENTER)
     assert driver.session is None
     assert driver.window.page.subject.text() == ""
+    assert driver.window.page.subject.placeholderText() == "e.g. P08"  # after P07
     QTest.keyClick(driver.window.page.subject, ENTER)
     assert "never a name" in driver.window.page.frames["Subject"].words.text()
     assert driver.session is None

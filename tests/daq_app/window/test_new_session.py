@@ -1,3 +1,4 @@
+import time
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -208,4 +209,21 @@ def test_a_skipped_trial_of_a_session_that_was_cut_short_is_not_done(tmp_path):
     writer.event("skip", 2)
     writer.close()
     (cut,) = unfinished_sessions(tmp_path)
-    assert cut.words == "S01: trials done 1 of 3"
+    assert cut.words.endswith(": trials done 1 of 3")
+
+
+def test_sessions_of_one_subject_that_were_cut_short_are_told_apart_by_when_they_began(tmp_path, monkeypatch):
+    class Clock(datetime):
+        @classmethod
+        def now(cls, tz=None):
+            return cls(2026, 11, 26, hour, 51, 33, tzinfo=tz)
+
+    monkeypatch.setenv("TZ", "Asia/Tokyo")  # nine hours ahead of UTC, all year
+    time.tzset()
+    monkeypatch.setattr("sessions.recording.head.datetime", Clock)
+    for hour in (8, 11):
+        begun(tmp_path / f"at-{hour}", plan=PLAN).close()
+    words = {cut.folder.name: cut.words[: len("S01, 2026-11-26 17:51")] for cut in unfinished_sessions(tmp_path)}
+    assert words == {"at-8": "S01, 2026-11-26 17:51", "at-11": "S01, 2026-11-26 20:51"}
+    monkeypatch.undo()
+    time.tzset()
