@@ -13,7 +13,7 @@ from daq_app.qt.tokens import GRID, px
 from daq_app.window.subject import owner
 from daq_app.wording import tr, tr_noop
 
-WIDTH, HEIGHT = 720, 560  # of the page, before the font's scale
+WIDTH = 720  # of the page, before the font's scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,10 +111,11 @@ class KeysPage(Panel):
         rows, pairs = QWidget(), ((tr(known.key), label(tr(known.words), wrap=True)) for known in self._keys)
         grid = label_grid(pairs, role="value")
         grid.setHorizontalSpacing(3 * GRID)
-        vbox(grid, on=rows, margins=(0, 0, GRID, 0))
-        area = scroll_area(rows)
-        area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
-        vbox(head, (area, 1), on=self, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)), spacing=GRID)
+        self._rows = vbox(grid, on=rows, margins=(0, 0, GRID, 0))
+        self._area = scroll_area(rows)
+        self._area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
+        margins = (2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID))
+        self._column = vbox(head, (self._area, 1), on=self, margins=margins, spacing=GRID)
 
     def toggle(self) -> None:
         """Show the page over everything else, or hide it; it is filled when it is first seen."""
@@ -126,9 +127,13 @@ class KeysPage(Panel):
 
     def fit(self) -> None:
         """Take the middle of the window, as much as there is need for."""
+        if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  it was never seen
+            return
         window = self._over.size()
-        wanted = QSize(px(WIDTH), px(HEIGHT))
-        size = wanted.boundedTo(window - QSize(4 * GRID, 4 * GRID))
+        size = QSize(px(WIDTH), 0).boundedTo(window - QSize(4 * GRID, 4 * GRID))
+        around = self._column.totalMinimumSize() - self._area.minimumSizeHint()
+        keys = self._rows.totalHeightForWidth(size.width() - around.width())
+        size.setHeight(min(around.height() + keys, window.height() - 4 * GRID))
         self.resize(size)
         self.move((window.width() - size.width()) // 2, (window.height() - size.height()) // 2)
 

@@ -102,7 +102,7 @@ class LiveBar(QWidget):
             self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
         self.show_words()
-        set_horizontal(self._rows, not self._forces_shown or self._needed_width(TITLE) + self._acts <= self.width())
+        set_horizontal(self._rows, self._in_a_row(self.width()))
         size, role = next((pair for pair in SIZES if self._needed_width(pair[0]) <= self.width()), SIZES[-1])
         room = self.width()
         for channel, value in self.values.items():
@@ -112,6 +112,14 @@ class LiveBar(QWidget):
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
             for widget in (caption, value):
                 widget.setVisible(self._forces_shown and room >= 0)
+
+    def height_with_acts(self, width: int) -> int:
+        """Return the height that numbers and acts take at a width [px]."""
+        numbers, acts = self.minimumHeight(), self.hold.sizeHint().height()
+        return max(numbers, acts) if self._in_a_row(width) else numbers + self._rows.spacing() + acts
+
+    def _in_a_row(self, width: int) -> bool:
+        return not self._forces_shown or self._needed_width(TITLE) + self._acts <= width
 
     def show_words(self) -> None:
         """Say on the buttons what they do, or their keys alone where there is no room."""
@@ -181,7 +189,7 @@ class LivePanel(Panel):
         self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self._pictures = QWidget()
         hbox((self.drawer, 1), self.tab, on=self._pictures, spacing=2)
-        vbox(self.bar, (self._pictures, 1), 0, on=self, margins=GRID, spacing=4)
+        self._rows = vbox(self.bar, (self._pictures, 1), 0, on=self, margins=GRID, spacing=4)
         self._show_tab()
         self.show_seconds(self._seconds)
         self.show_finite(settings().value(FINITE) == "yes")
@@ -190,12 +198,14 @@ class LivePanel(Panel):
         """Say whether there is room for the stroke and an open drawer beside each other."""
         self.drawer.open.set_room(room)
         self._show_tab()
+        self._show_acts()
 
     def toggle_drawer(self) -> None:
         """Open or close the drawer, where readings are shown."""
         if self._forces_shown:
             self.drawer.open.toggle()
             self._show_tab()
+            self._show_acts()
 
     def _show_tab(self) -> None:
         opened = bool(self.drawer.open)
@@ -292,16 +302,23 @@ class LivePanel(Panel):
         picture, row = (None, np.empty(0)) if shown is None else (shown.picture, shown.row)
         self.finger.show_model(picture, row, words, clock)
 
+    def _show_acts(self) -> None:
+        """Show the acts where the pictures keep their least height beneath them; their keys serve everywhere."""
+        inside = self.contentsRect().marginsRemoved(self._rows.contentsMargins())
+        least = self.bar.height_with_acts(inside.width()) + self._rows.spacing() + self.drawer.least_height()
+        shown = self.height() >= self._least_for_acts and inside.height() >= least
+        for act in (self.bar.finite, self.bar.length, self.bar.hold):
+            act.setVisible(shown)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        for act in (self.bar.finite, self.bar.length, self.bar.hold):  # their keys still serve
-            act.setVisible(self.height() >= self._least_for_acts)
         speed, model = self.height() >= LEAST_FOR_SPEED, self.height() >= LEAST_FOR_MODEL
         visible = [True, True, speed, model]
         for plot, shown, below in zip(self._column, visible, [*visible[1:], False], strict=True):
             plot.setVisible(shown)
             plot.show_axis(times=not below)  # one axis for all of them
         self.finger.setVisible(model)
+        self._show_acts()
 
     def _lay_out(self) -> tuple[QWidget, QWidget]:
         stroke, drawer = QWidget(), QWidget()

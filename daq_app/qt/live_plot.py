@@ -97,6 +97,8 @@ class LivePlot(PaintedWidget):
                 y = np.where(np.floor(self._columns.time * DASHES / self._seconds) % 3 < 2, y, np.nan)
             painter.setPen(fine(self._colour(curve.colour)))
             draw_line(painter, x, np.clip(y, -FAR, FAR))
+        painter.setClipping(False)
+        painter.drawPixmap(0, 0, self._names)
 
     def _inside(self) -> QRectF:
         left = px(AXIS_WIDTH)
@@ -118,8 +120,8 @@ class LivePlot(PaintedWidget):
         painter.setPen(fine(self.theme.line))
         painter.drawLine(inside.topLeft(), inside.bottomLeft())
         painter.drawLine(inside.bottomLeft(), inside.bottomRight())
-        self._paint_names(painter, inside)
         painter.end()
+        self._names = self._draw_names(inside)
         return picture
 
     def _paint_values(self, painter: QPainter, inside: QRectF) -> None:
@@ -155,9 +157,14 @@ class LivePlot(PaintedWidget):
             painter.setPen(QColor(self.theme.quiet))
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
 
-    def _paint_names(self, painter: QPainter, inside: QRectF) -> None:
-        """Name the plot; where it has several curves, with a piece of the line of each."""
+    def _draw_names(self, inside: QRectF) -> QPixmap:
+        """Return the plot's name, and where it has several curves a piece of the line of each, to lie over the curves.
+
+        In a low plot they would be unreadable beneath them.
+        """
         metrics = QFontMetricsF(font(SMALL, bold=True))
+        picture = blank(self, "transparent")
+        painter = QPainter(picture)
         painter.setFont(font(SMALL, bold=True))
         x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
         named = [curve for curve in self._curves if curve.named]
@@ -166,6 +173,9 @@ class LivePlot(PaintedWidget):
         words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in named)
         room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
         sample = max(min(SAMPLE * type_scale(), room), 0.0)
+        width = words + len(named) * sample if several else 0.0
+        ground = QRectF(x - 3, inside.top(), width + metrics.horizontalAdvance(unit) + 6, metrics.height())
+        painter.fillRect(ground, sheer(self.theme.surface, 200))
         for curve in named if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
             if curve.dashed:
@@ -178,6 +188,8 @@ class LivePlot(PaintedWidget):
             x = end + 4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ")
         painter.setPen(QColor(self.theme.quiet))
         painter.drawText(QPointF(x, baseline), unit)
+        painter.end()
+        return picture
 
     def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
         """Mark what was found: a line for onset and lift, a shaded stretch for the steady window."""

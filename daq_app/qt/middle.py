@@ -147,7 +147,7 @@ class Middle(QWidget):
         self.strip = TrialStrip(self.inspect)
         self.live = LivePanel(bridge.feed, bridge.model)
         self.trial = InspectedTrial(self.leave)
-        self.stroke = WrappedLabel("value")
+        self.stroke = WrappedLabel("value", keeps_room=True)
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
         self.undo.hide()

@@ -95,6 +95,7 @@ class WrappedLabel(QLabel):
             self._fit()
 
     def _fit(self) -> None:
+        self.setMinimumHeight(0)  # which Qt would count among what the text needs
         needed = max(self.heightForWidth(max(self.width(), 60)), self._least)
         if self._keeps_room:
             self._least = needed
@@ -335,6 +336,11 @@ class Drawer(QSplitter):
         self.splitterMoved.connect(lambda: settings().setValue(DRAWER_SIZES, self.saveState()))
         self.open = Openness(DRAWER, self._place)
         self._place()
+
+    def least_height(self) -> int:
+        """Return the height that those of its two parts need that are shown [px]."""
+        shown = [layout for part in (self._main, self._drawer) if not part.isHidden() and (layout := part.layout())]
+        return max(layout.totalMinimumSize().height() for layout in shown)
 
     def _place(self) -> None:
         self._drawer.setVisible(bool(self.open))

@@ -164,7 +164,7 @@ class SubjectPreview(QDialog):
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.lost = WrappedLabel("value", "look")
         self.back = button(tr("◂ Back"), tr("the page before"), lambda: self._turn(-1))
-        self.on = button(tr("On ▸"), tr("the next page"), lambda: self._turn(1))
+        self.on = button(tr("Forward ▸"), tr("the next page"), lambda: self._turn(1))
         self._count = label("", "quiet")
         close = button(tr("Close  Esc"), tr("close the preview"), self.close)
         page = vbox((self.picture, 1), self.lost, hbox(self.back, self.on, self._count, 1, close), spacing=GRID)

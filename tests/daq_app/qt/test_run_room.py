@@ -189,6 +189,29 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
     panel.hide()
 
 
+@pytest.mark.parametrize("opened", [False, True])
+@pytest.mark.parametrize("width", [240, 420, 800])
+def test_buttons_over_the_pictures_are_whole_or_not_there(driver, width, opened):
+    panel = LivePanel(driver.window.bridge.feed, driver.window.bridge.model)
+    panel.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
+    panel.set_room(room=False)
+    panel.show()
+    if opened:
+        panel.toggle_drawer()
+    seen = set()
+    for height in range(150, 420, 15):
+        panel.resize(width, height)
+        for _ in range(3):
+            driver.application.processEvents()
+        for act in (panel.bar.finite, panel.bar.length, panel.bar.hold):
+            seen.add(act.isVisible())
+            if act.isVisible():
+                assert act.visibleRegion().boundingRect() == act.rect(), height
+                assert act.height() >= act.sizeHint().height()
+    panel.hide()
+    assert seen == {False, True}
+
+
 def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transducer_sends(driver):
     class Feed:
         trace = LiveTrace(100.0)

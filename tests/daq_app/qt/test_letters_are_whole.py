@@ -1,0 +1,71 @@
+"""Letters that Qt's own style writes are whole, and words have as many lines as they need."""
+
+import pytest
+from PySide6.QtGui import QColor, QFontMetricsF
+from PySide6.QtWidgets import QMainWindow, QStyleFactory, QTabWidget, QWidget
+
+from daq_app.qt import tokens
+from daq_app.qt.keys import KeysPage
+from daq_app.qt.parts import WrappedLabel
+from tests.daq_app.qt.test_window_for_everybody import contrast
+
+pytestmark = pytest.mark.qt
+
+
+def lowest_ink(tabs):
+    """Return the lowest row of the second tab in which something is written [px]."""
+    image, box = tabs.grab().toImage(), tabs.tabRect(1).adjusted(6, 6, -6, -4)
+    return max(
+        y
+        for y in range(box.top(), box.bottom())
+        for x in range(box.left(), box.right())
+        if contrast(QColor(tokens.LIGHT.ground).name(), image.pixelColor(x, y).name()) > 1.5
+    )
+
+
+def test_the_letters_of_a_tab_that_is_not_chosen_are_whole(application):
+    widget = QTabWidget()
+    fusion = QStyleFactory.create("Fusion")
+    fusion.setParent(widget)  # which does not keep its style alive
+    widget.setStyle(fusion)
+    widget.setPalette(tokens.palette(tokens.LIGHT))
+    widget.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
+    for words in ("one", "two"):
+        widget.addTab(QWidget(), words)
+    widget.show()
+    rows = []
+    for words in ("HHHH", "gjpqy"):
+        widget.setTabText(1, words)
+        application.processEvents()
+        rows.append(lowest_ink(widget.tabBar()))
+    metrics = QFontMetricsF(widget.tabBar().font())
+    below = metrics.tightBoundingRect("gjpqy").bottom() - metrics.tightBoundingRect("HHHH").bottom()
+    assert rows[1] - rows[0] > below - 0.5
+
+
+@pytest.mark.usefixtures("application")
+@pytest.mark.parametrize("keeps", [False, True])
+def test_words_take_the_lines_they_need_at_the_width_they_have_now(keeps):
+    window = QWidget()
+    shown, fresh = WrappedLabel("value", keeps_room=keeps), WrappedLabel("value")
+    for one in (shown, fresh):
+        one.setParent(window)
+    window.show()
+    for width in (90, 400):
+        shown.resize(width, 20)
+        shown.show_text(10 * "several words ")
+    fresh.resize(400, 20)
+    fresh.show_text(10 * "several words ")
+    assert shown.height() == fresh.height()
+
+
+@pytest.mark.parametrize(("height", "scrolled"), [(1000, False), (500, True)])
+def test_every_key_is_seen_at_once_where_the_window_has_room_for_the_list(application, height, scrolled):
+    window = QMainWindow()
+    window.resize(1280, height)
+    window.show()
+    keys = KeysPage(window)
+    keys.toggle()
+    application.processEvents()
+    assert (keys._area.verticalScrollBar().maximum() > 0) is scrolled
+    assert keys.height() <= height
