@@ -184,7 +184,7 @@ class Metronome:
         self._thread.join()
 
 
-def retry_if_interrupted(run, whole=lambda _: True, pause=PAUSE):
+def retry_if_interrupted(run, accept=lambda _: True, pause=PAUSE):
     """Return what `run` returns; again where the machine stood still for `pause`, a device was lost, or not `whole`."""
     for _ in range(AGAIN):
         try:
@@ -192,7 +192,7 @@ def retry_if_interrupted(run, whole=lambda _: True, pause=PAUSE):
                 result = run()
         except LinkLost:  # as of a device that had no time to answer
             continue
-        if metronome.longest < pause and whole(result):
+        if metronome.longest < pause and accept(result):
             return result
     return run()
 
@@ -200,10 +200,10 @@ def retry_if_interrupted(run, whole=lambda _: True, pause=PAUSE):
 def run_calm_course(name, folder):
     """Go through the undisturbed course with one driver; again where it lost readings, as a faulty one always does."""
 
-    def whole(course):
+    def is_whole(course):
         return name == "replay" or not any(health.lost for health in course.healths)
 
-    return retry_if_interrupted(lambda: run_calm_course_once(name, folder), whole)
+    return retry_if_interrupted(lambda: run_calm_course_once(name, folder), is_whole)
 
 
 def run_calm_course_once(name, folder):

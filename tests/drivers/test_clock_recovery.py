@@ -41,8 +41,8 @@ def test_a_pause_that_nothing_makes_up_for_is_a_loss_of_its_length(rate):
     arrivals, record_times = lumps(rate, 8.0, 0.01, outage=(4.0, 4.5))
     recovery = ClockRecovery(rate)
     sequence, time = recover(recovery, arrivals)
-    missing = 0.5 * rate
-    assert abs(recovery.lost - missing) <= 0.02 * rate + 1
+    lost_count = 0.5 * rate
+    assert abs(recovery.lost - lost_count) <= 0.02 * rate + 1
     assert sequence[-1] == len(record_times) + recovery.lost
     np.testing.assert_allclose(time, record_times, atol=0.03)
 

@@ -40,13 +40,13 @@ def test_a_rate_that_becomes_another_is_found_within_seconds_and_so_is_its_retur
     rate = 200.0
     times = np.cumsum(np.repeat([1.0, 1.0 / ratio, 1.0], [2000, round(2000 * ratio), 4000]) / rate)  # 10 s, 10 s, 20 s
     watch = RateWatch(rate, 1.0, 1.0)
-    (change_time, new_rate), (return_time, again) = rate_changes(
+    (change_time, new_rate), (return_time, end_rate) = rate_changes(
         watch, np.arange(len(times)), late_arrivals(times, jitter=0.004, stalls=0)
     )
     assert 10.0 < change_time < (14.0 if abs(ratio - 1) > 0.15 else 18.5)
     assert new_rate == pytest.approx(rate * ratio, rel=0.02)
     assert 20.0 < return_time < (24.0 if abs(ratio - 1) > 0.15 else 28.5)
-    assert again == rate
+    assert end_rate == rate
     assert watch.changes == 2
 
 

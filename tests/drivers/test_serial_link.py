@@ -150,10 +150,10 @@ def test_a_port_is_had_by_one_at_a_time(terminal):
 
 
 def test_a_port_that_cannot_be_opened_is_named_with_the_reason(tmp_path, monkeypatch):
-    missing = str(tmp_path / "ttyNone")
+    path = str(tmp_path / "ttyNone")
     with pytest.raises(SetupError, match="no such port") as refusal:
-        SerialLink(missing, 9600)
-    assert str(refusal.value).startswith(missing)
+        SerialLink(path, 9600)
+    assert str(refusal.value).startswith(path)
     text_file = tmp_path / "plain.txt"
     text_file.write_bytes(b"")
     with pytest.raises(SetupError, match="no serial port"):

@@ -93,11 +93,11 @@ def test_a_stream_numbers_its_records_from_1_and_counts_35_ticks_at_200_hz(start
     assert {r[3:] for r in records} == {(1_000_000, -2_000_000, 5_000_000, 125_000, 0, 0)}
 
 
-@pytest.mark.parametrize(("rate", "step", "shown"), [(7000, 1, 7000), (1000, 7, 1000), (150, 46, 152), (99, 70, 100)])
-def test_rates_are_integer_fractions_of_7000_rounded_up(start_box, rate, step, shown):
+@pytest.mark.parametrize(("rate", "step", "page"), [(7000, 1, 7000), (1000, 7, 1000), (150, 46, 152), (99, 70, 100)])
+def test_rates_are_integer_fractions_of_7000_rounded_up(start_box, rate, step, page):
     box = start_box()
     assert change_setting(box, f"/comm.cgi?comrdtrate={rate}") == b"HTTP/1.0 302 Found"
-    assert setting(box, "comrdtrate") == str(shown)
+    assert setting(box, "comrdtrate") == str(page)
     with client(box) as udp:
         udp.send(START)
         records = receive_records(udp, 10)
@@ -339,10 +339,10 @@ def test_the_same_seed_sends_the_same_bytes_whenever_it_is_asked(start_box):
         with client(start_box(BenchSettings(), faults=Faults([Fault("corrupt", 0.0, 1e6, share=0.3)], seed=5))) as udp:
             udp.send(struct.pack(">HHI", 0x1234, 2, 400))
             streams.append({d[4:8]: d[4:] for d in (udp.recv(100) for _ in range(400))})
-    whole = [{k: d for k, d in stream.items() if d[4:8] == bytes(4)} for stream in streams]
-    (a, b), common = whole, whole[0].keys() & whole[1].keys()
+    sound = [{k: d for k, d in stream.items() if d[4:8] == bytes(4)} for stream in streams]
+    (a, b), common = sound, sound[0].keys() & sound[1].keys()
     assert len(common) > 100
     assert all(a[k] == b[k] for k in common)
     ticks = sorted(int.from_bytes(k, "big") for k in common)
-    spoilt = [{t for t in range(ticks[0], ticks[-1], 35) if t.to_bytes(4, "big") not in stream} for stream in whole]
-    assert spoilt[0] == spoilt[1] != set()
+    gaps = [{t for t in range(ticks[0], ticks[-1], 35) if t.to_bytes(4, "big") not in stream} for stream in sound]
+    assert gaps[0] == gaps[1] != set()

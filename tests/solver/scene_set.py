@@ -27,12 +27,12 @@ def scenes():
     """Return the scenes by name, always the same."""
     from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
-    out = {}
+    scenes_by_name = {}
     for kinematics in ("small", "finite"):
         for surface in STICKINESS + SLIPPERINESS:
             published = scene(surface)
             name = f"{kinematics} published {surface.descriptor} {surface.index}"
-            out[name] = replace(published, solve=replace(published.solve, kinematics=kinematics))
+            scenes_by_name[name] = replace(published, solve=replace(published.solve, kinematics=kinematics))
     kinds = {
         "depth": (60, 60), "tolerance": (15, 15), "force": (18, 18), "drag": (10, 10), "press": (6, 6),
         "history": (6, 4), "reversal": (4, 2), "relaxing": (5, 2), "steep": (8, 8), "finger": (10, 8), "light": (3, 2),
@@ -40,8 +40,8 @@ def scenes():
     for kind, counts in kinds.items():
         for kinematics, count in zip(("small", "finite"), counts, strict=True):
             for number in range(count):
-                out[f"{kinematics} {kind} {number}"] = _random_scene(kind, kinematics, number)
-    return out
+                scenes_by_name[f"{kinematics} {kind} {number}"] = _random_scene(kind, kinematics, number)
+    return scenes_by_name
 
 
 def _random_scene(kind, kinematics, number):
@@ -133,13 +133,13 @@ def _time_outcome(name):
 def solve_all(names=None, workers=2):
     """Return the outcomes by name; the time each took [s] beside them."""
     names = list(scenes()) if names is None else names
-    out, seconds_by_name = {}, {}
+    outcomes, seconds_by_name = {}, {}
     with ProcessPoolExecutor(workers) as pool:
         for number, (name, result, seconds) in enumerate(pool.map(_time_outcome, names)):
-            out[name], seconds_by_name[name] = result, seconds
+            outcomes[name], seconds_by_name[name] = result, seconds
             if (number + 1) % 50 == 0:
                 print(f"{number + 1} of {len(names)}", file=sys.stderr, flush=True)
-    return out, seconds_by_name
+    return outcomes, seconds_by_name
 
 
 def differences(before, after, path=""):
@@ -163,8 +163,8 @@ def main(arguments):
     command, file = arguments[0], Path(arguments[1])
     names = [name for name in scenes() if len(arguments) < 3 or arguments[2] in name]
     if command == "record":
-        out, seconds_by_name = solve_all(names)
-        file.write_text(json.dumps({"outcomes": out, "took_s": seconds_by_name}, indent=0))
+        results, seconds_by_name = solve_all(names)
+        file.write_text(json.dumps({"outcomes": results, "took_s": seconds_by_name}, indent=0))
         return 0
     recording = json.loads(file.read_text())["outcomes"]
     outcomes, _ = solve_all([name for name in names if name in recording])

@@ -17,7 +17,7 @@ from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 LAWS = {"no bound": FrictionLaw(0.44, np.inf), "bound": FrictionLaw(0.44, 0.005)}
-WAYS = [("no bound", 1), ("no bound", -1), ("bound", 1), ("bound", -1)]
+CASES = [("no bound", 1), ("no bound", -1), ("bound", 1), ("bound", -1)]
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def finger():
 @pytest.fixture(scope="module")
 def histories(finger):
     loadings = {1: Loading(1.5, "+x"), -1: Loading(1.5, "-x")}
-    return {(law, way): march_instants(finger, LAWS[law], loadings[way]) for law, way in WAYS}
+    return {(law, direction): march_instants(finger, LAWS[law], loadings[direction]) for law, direction in CASES}
 
 
 def march_instants(finger, law, loading):
@@ -45,19 +45,19 @@ def bone_force(finger, contact: EquilibriumState):
     return inner[finger.geometry.mesh.held].sum(axis=0)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, histories, way):
-    for instant in histories[way][1:]:
+@pytest.mark.parametrize("case", CASES)
+def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, histories, case):
+    for instant in histories[case][1:]:
         contact = instant.state
         bone, total = bone_force(finger, contact), contact.normal.sum()
         assert abs(bone[0] + contact.tangential.sum()) < 1e-11 * total
         assert abs(bone[1] + total) < 1e-11 * total
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_law(finger, histories, way):
-    law, length = LAWS[way[0]], finger.body.condensed.fixed_length
-    for instant in histories[way][1:]:
+@pytest.mark.parametrize("case", CASES)
+def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_law(finger, histories, case):
+    law, length = LAWS[case[0]], finger.body.condensed.fixed_length
+    for instant in histories[case][1:]:
         contact = instant.state
         push = contact.normal.max()
         assert contact.place(finger.body.condensed)[:, 1].min() - instant.depth > -1e-9 * instant.depth
@@ -65,11 +65,11 @@ def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_
         assert (np.abs(contact.tangential) - law.limit(contact.normal, length)).max() < 1e-10 * push
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_in_steady_sliding_the_drag_is_the_law_s(finger, histories, way):
-    law, contact = LAWS[way[0]], histories[way][-1].state
+@pytest.mark.parametrize("case", CASES)
+def test_in_steady_sliding_the_drag_is_the_law_s(finger, histories, case):
+    law, contact = LAWS[case[0]], histories[case][-1].state
     assert set(contact.state[contact.touching].tolist()) <= {SLIP, SHEAR_LIMITED}
-    drag, force = -way[1] * contact.tangential.sum(), contact.normal.sum()
+    drag, force = -case[1] * contact.tangential.sum(), contact.normal.sum()
     if law.tau_max == np.inf:
         assert drag / force == pytest.approx(law.mu, rel=1e-12)
     else:
@@ -79,10 +79,10 @@ def test_in_steady_sliding_the_drag_is_the_law_s(finger, histories, way):
         assert (contact.state == SLIP).any()
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(histories, way):
+@pytest.mark.parametrize("case", CASES)
+def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(histories, case):
     """Trapezoidal work of each step; the rest closes gaps within a step, and is computed by itself."""
-    instants = histories[way]
+    instants = histories[case]
     energy_before, scale = 0.0, None
     for before, after in pairwise(instants):
         old, new = before.state, after.state
@@ -97,10 +97,10 @@ def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(histories, way):
         energy_before = energy
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_in_steady_sliding_all_the_bone_s_work_is_the_drag_s(histories, way):
+@pytest.mark.parametrize("case", CASES)
+def test_in_steady_sliding_all_the_bone_s_work_is_the_drag_s(histories, case):
     """Dissipation rate = T V: over the last step nothing more is stored."""
-    before, after = histories[way][-2:]
+    before, after = histories[case][-2:]
     distance = after.travel - before.travel
     friction_work = -after.state.tangential @ (after.state.u - before.state.u + distance)[:, 0]
     assert friction_work == pytest.approx(-after.state.tangential.sum() * distance, rel=1e-10)
@@ -115,7 +115,7 @@ def test_speed_only_rescales_time(finger):
 
 
 def test_without_friction_either_way_is_the_static_answer(finger):
-    forwards, backwards = (solve_full_slip(finger.newton, LoadState(1.5, 0.0, sense=way)) for way in (-1, 1))
+    forwards, backwards = (solve_full_slip(finger.newton, LoadState(1.5, 0.0, sense=sense)) for sense in (-1, 1))
     assert np.array_equal(forwards.normal, backwards.normal)
     static = march_instants(finger, FrictionLaw(0.0, np.inf), Loading(1.5, "none"))[-1].state
     assert np.abs(static.normal - forwards.normal).max() < 1e-13 * forwards.normal.max()

@@ -12,7 +12,7 @@ from solver import ContactLost
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
-from solver.constitutive import Hooke
+from solver.constitutive import MATERIALS, Hooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import Q2P1, block
@@ -25,16 +25,17 @@ PRESSURE = 1e-3  # [MPa]
 MU = 0.4
 
 
+@pytest.mark.parametrize("material", MATERIALS)
 @pytest.mark.parametrize("kind", ["straight", "distorted", "curved", "aspect 50"])
 @pytest.mark.parametrize(("nu", "round_off"), [(0.0, 1e-14), (0.3, 1e-14), (0.48, 1e-13), (0.4999999, 1e-8)])
-def test_a_linear_field_on_the_boundary_is_linear_inside_and_its_stress_constant(kind, nu, round_off):
+def test_a_linear_field_on_the_boundary_is_linear_inside_and_its_stress_constant(material, kind, nu, round_off):
     mesh = sheet(kind)
     exact = mesh.nodes @ GRADIENT.T
-    body = LinearBody.of(mesh, [Hooke(1.0, nu)], prescribed=exact * mesh.driven)
+    body = LinearBody.of(mesh, [material(1.0, nu)], prescribed=exact * mesh.driven)
     displacement = body.displacement(np.zeros((0, 2)))
     assert np.abs(displacement - exact).max() < round_off
-    everywhere = np.repeat(np.arange(len(mesh.elements)), 4), np.tile(Q2P1.corners, (len(mesh.elements), 1))
-    probes = Probes.at(mesh, body.elastic.centre, *everywhere)
+    at_corners = np.repeat(np.arange(len(mesh.elements)), 4), np.tile(Q2P1.corners, (len(mesh.elements), 1))
+    probes = Probes.at(mesh, body.elastic.centre, *at_corners)
     slope = probes.displacement_gradient(mesh, displacement)
     assert np.abs(slope - GRADIENT).max() < 1e3 * round_off
     energy = body.elastic.energy(probes, displacement[:, :, None])[:, 0]

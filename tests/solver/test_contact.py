@@ -21,16 +21,16 @@ def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0
     steps = [0.0]
     while steps[-1] < half_width:
         steps.append(steps[-1] + max(finest, 0.25 * (steps[-1] - zone)))
-    right = np.array(steps) * half_width / steps[-1]
-    lines = np.concatenate([-right[:0:-1], right])
-    up = [0.0]
-    while up[-1] < 14.0:
-        up.append(up[-1] + finest + 0.25 * up[-1])
-    return LinearBody.of(block(lines, np.array(up) * 14.0 / up[-1], RADIUS), [Hooke(0.08, nu)])
+    half_lines = np.array(steps) * half_width / steps[-1]
+    lines = np.concatenate([-half_lines[:0:-1], half_lines])
+    heights = [0.0]
+    while heights[-1] < 14.0:
+        heights.append(heights[-1] + finest + 0.25 * heights[-1])
+    return LinearBody.of(block(lines, np.array(heights) * 14.0 / heights[-1], RADIUS), [Hooke(0.08, nu)])
 
 
 @pytest.fixture(scope="module")
-def pressed():
+def hertz_contact():
     """P = 0.01 N/mm on R = 5, E = 0.08, nu = 0.48: a = 0.782578 mm, p0 = 0.008135 MPa (Johnson 1985, ch. 4)."""
     body = cylinder(4.5, 0.06)
     return body, slide_under(Newton(body.condensed), LoadState(0.0, 0.0, sense=-1), 0.01)
@@ -40,8 +40,8 @@ def start_state(body, half_width=0.7):
     return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN)
 
 
-def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(pressed):
-    body, state = pressed
+def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(hertz_contact):
+    body, state = hertz_contact
     x = body.mesh.nodes[body.mesh.skin, 0]
     assert state.normal.sum() == pytest.approx(0.01, rel=1e-12)
     touching = x[state.touching]
@@ -54,9 +54,9 @@ def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(pressed):
 
 
 @pytest.mark.parametrize("k", [0.8, 0.6, 0.4])
-def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(pressed, k):
+def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(hertz_contact, k):
     """t = min(mu p, tau_max), k = tau_max/(mu p0): Q/(mu P) = 0.895912, 0.715243, 0.495368."""
-    body, frictionless = pressed
+    body, frictionless = hertz_contact
     mu = 0.02  # so small that the drag does not move the pressure
     load = LoadState(0.0, mu, k * mu * 0.008135, -1)
     state = slide_from_guess(Newton(body.condensed), load, frictionless.state, 0.01)
@@ -68,9 +68,9 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
 
 
 @pytest.mark.parametrize("tau_max", [np.inf, 1e-4, 0.0])
-def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(pressed, tau_max):
-    newton, load = Newton(pressed[0].condensed), LoadState(0.01, 0.4, tau_max, -1)
-    guess = np.where(pressed[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
+def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(hertz_contact, tau_max):
+    newton, load = Newton(hertz_contact[0].condensed), LoadState(0.01, 0.4, tau_max, -1)
+    guess = np.where(hertz_contact[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
     direct, stepwise = solve_full_slip(newton, load), slide_from_guess(newton, load, guess)
     assert np.array_equal(direct.state, stepwise.state)
     assert (direct.state == SHEAR_LIMITED).any() == (tau_max < np.inf)

@@ -27,17 +27,17 @@ def block_on_the_flat():
 
 
 @pytest.mark.parametrize(
-    ("stretch", "across", "nominal"),
+    ("stretch", "lateral", "nominal"),
     [(0.9, 1.101300, -0.012098), (0.8, 1.224285, -0.029016), (0.7, 1.376321, -0.054219)],
 )
-def test_a_block_pressed_on_the_flat_by_a_dead_traction_takes_the_closed_forms_shape(stretch, across, nominal):
+def test_a_block_pressed_on_the_flat_by_a_dead_traction_takes_the_closed_forms_shape(stretch, lateral, nominal):
     newton, start = block_on_the_flat()
     mesh = newton.condensed.body.mesh
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 1], 1.0))
     top = top[np.argsort(mesh.nodes[top, 0])]
     loads = edge_load(mesh, top, np.ones((len(top), 1)) @ [[0.0, nominal]])
     state = solve_dead_load(newton.condensed.body, loads, load=LoadState(0.0, 0.0, sense=1), start=start)
-    exact = (mesh.nodes - [1.0, 0.0]) * [across - 1.0, stretch - 1.0]
+    exact = (mesh.nodes - [1.0, 0.0]) * [lateral - 1.0, stretch - 1.0]
     np.testing.assert_allclose(state.u, exact, atol=3e-5)  # the traction is given to five figures
     # the held corner of two of the four edges takes a sixth of each
     assert state.force[1] == pytest.approx(-2.0 * nominal * (1.0 - 1.0 / 12.0), rel=1e-9)

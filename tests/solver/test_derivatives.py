@@ -46,8 +46,8 @@ def derivative_table(slopes):
 
 def differences(numbers, scene, steps):
     """Return the same table from central differences of solves; `numbers` gives its rows' numbers of a scene."""
-    none = np.zeros(4 + len(QUANTITIES))
-    columns = [(numbers(vary(scene, n, h)) - numbers(vary(scene, n, -h))) / (2 * h) if h else none
+    zeros = np.zeros(4 + len(QUANTITIES))
+    columns = [(numbers(vary(scene, n, h)) - numbers(vary(scene, n, -h))) / (2 * h) if h else zeros
                for n, h in zip(NAMES, steps, strict=True)]  # fmt: skip
     return np.stack(columns, axis=1)
 
@@ -126,15 +126,15 @@ def test_one_point_on_springs_answers_as_its_formula_says():
     """N = d / (3 + s mu b), and at the bound N = (d - s b tau L) / 3, with s = -1 for a slide along +x."""
     d, b, mu, tau, length = 0.6, 0.8, 0.5, 0.04, 0.7
     newton, load = springs(b), LoadState(d, mu, sense=-1)
-    along, up = newton.follows(of_skin(newton, solve_full_slip(newton, load)))
+    drag_slopes, push_slopes = newton.follows(of_skin(newton, solve_full_slip(newton, load)))
     soft = 3.0 - mu * b
-    assert up == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
-    assert along == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
+    assert push_slopes == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
+    assert drag_slopes == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
     bounded = solve_full_slip(newton, load._replace(tau=tau))
     assert bounded.state.tolist() == [SHEAR_LIMITED, OPEN]
-    along, up = newton.follows(of_skin(newton, bounded))
-    assert up == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
-    assert along == pytest.approx([0.0, -length, 0.0], rel=1e-13)
+    drag_slopes, push_slopes = newton.follows(of_skin(newton, bounded))
+    assert push_slopes == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
+    assert drag_slopes == pytest.approx([0.0, -length, 0.0], rel=1e-13)
 
 
 def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):

@@ -103,8 +103,8 @@ def test_surfaces_that_nobody_asked_to_tell_apart_say_in_what_and_by_how_much_th
     error = np.ptp(seds - truth[:, 0]) / np.ptp(truth[:, 0])
     (warning,) = {w for p in predictions for w in p.warnings if w.startswith("Differences in")}
     assert "more than all" in warning or 100.0 * error < float(warning.split(" may be off by ")[1].split(" %")[0])
-    quick = solve_many([replace(s, solve=Solve(evidence="quick")) for s in surfaces])
-    assert not [w for p in quick for w in p.warnings if w.startswith("Differences")]
+    quick_predictions = solve_many([replace(s, solve=Solve(evidence="quick")) for s in surfaces])
+    assert not [w for p in quick_predictions for w in p.warnings if w.startswith("Differences")]
 
 
 @pytest.mark.slow

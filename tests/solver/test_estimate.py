@@ -83,8 +83,8 @@ def test_the_tolerance_is_met_with_no_more_work_than_it_needs(tolerance):
 def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_add_a_third_of_what_a_node_changes():
     sliding = Scene(friction=Friction(0.3), loading=Loading(1.0))
     truth, error = np.ones(COUNT), 0.04
-    none, edges = np.zeros((1, COUNT)), np.full((2, COUNT), 0.005)
-    nested = NestedNumbers(truth * (1.0 + error / 4.0), none, none, none)
+    zeros, edges = np.zeros((1, COUNT)), np.full((2, COUNT), 0.005)
+    nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros)
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
     assert estimate.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
     with_edges = errors(sliding, truth * (1.0 + error), replace(nested, of_edges=edges), None)

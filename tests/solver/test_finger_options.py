@@ -65,8 +65,8 @@ def test_the_bones_elements_fill_it_from_a_third_of_its_radius():
     corners = geometry.mesh.nodes[geometry.mesh.elements[geometry.mesh.region == BONE][:, [0, 1, 2, 3]]]
     next_corners = np.roll(corners, -1, axis=1)
     area = np.sum(corners[..., 0] * next_corners[..., 1] - corners[..., 1] * next_corners[..., 0]) / 2.0
-    straight, radius, core = 14.0, 1.5, 0.5
-    exact = np.pi / 2 * (radius**2 - core**2) + 2 * (radius - core) * straight
+    shaft, radius, core = 14.0, 1.5, 0.5
+    exact = np.pi / 2 * (radius**2 - core**2) + 2 * (radius - core) * shaft
     assert area == pytest.approx(exact, rel=5e-3)  # elements' corners cut off a little of the arc
 
 

@@ -158,14 +158,14 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
     assert large.sed_ending == pytest.approx(small.sed_ending, rel=0.03)
 
 
-@pytest.mark.parametrize(("lost_below", "known"), [(5_000, True), (1e9, False)])
+@pytest.mark.parametrize(("least_dofs", "known"), [(5_000, True), (1e9, False)])
 def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
-    monkeypatch, lost_below, known
+    monkeypatch, least_dofs, known
 ):
     nested = finite_answers.solve_nested
 
     def lose_coarse(scene, top, *arguments):
-        return (None, None) if top.finger.body.mesh.dofs < lost_below else nested(scene, top, *arguments)
+        return (None, None) if top.finger.body.mesh.dofs < least_dofs else nested(scene, top, *arguments)
 
     monkeypatch.setattr(finite_answers, "solve_nested", lose_coarse)
     scene = Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick"))

@@ -34,17 +34,17 @@ def published(kinematics, course="steady"):
     return replace(scene(SLIPPERINESS[4]), solve=Solve(kinematics, course, COARSE))
 
 
-def under_force(driven, **changes):
-    return replace(driven, loading=replace(driven.loading, indentation=None, **changes))
+def under_force(scene, **changes):
+    return replace(scene, loading=replace(scene.loading, indentation=None, **changes))
 
 
 @pytest.mark.parametrize("kinematics", KINEMATICS)
 def test_the_force_of_a_driven_finger_presses_it_to_the_same_depth(kinematics):
-    driven = solve(published(kinematics))
-    prediction = solve(under_force(published(kinematics), normal_force=driven.normal_force))
-    assert prediction.normal_force == pytest.approx(driven.normal_force, rel=1e-9)
+    by_depth = solve(published(kinematics))
+    prediction = solve(under_force(published(kinematics), normal_force=by_depth.normal_force))
+    assert prediction.normal_force == pytest.approx(by_depth.normal_force, rel=1e-9)
     assert prediction.indentation == pytest.approx(1.5, rel=2e-3)  # the meshes are made for about the same depth
-    assert prediction.sed_ending == pytest.approx(driven.sed_ending, rel=5e-3)
+    assert prediction.sed_ending == pytest.approx(by_depth.sed_ending, rel=5e-3)
     assert prediction.shift is None
 
 

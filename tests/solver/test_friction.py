@@ -56,11 +56,11 @@ class PointStates:
     length: np.ndarray
 
 
-def springs(across=COMPLIANCE[1]):
+def springs(coupling=COMPLIANCE[1]):
     """Five points that do not feel each other, the outer two above any depth."""
     along_y, _, along_x = COMPLIANCE
     rest = np.stack([np.linspace(-1.0, 1.0, 5), [9.0, 0.0, 0.02, 0.15, 9.0]], axis=1)
-    stiffness = np.kron(np.eye(5), np.linalg.inv([[along_x, across], [across, along_y]]))
+    stiffness = np.kron(np.eye(5), np.linalg.inv([[along_x, coupling], [coupling, along_y]]))
     return CondensedLinear(rest, stiffness, np.zeros(10), LENGTH, np.zeros(5, np.int32))
 
 
@@ -117,8 +117,8 @@ def press_by_forces(law):
 @pytest.fixture(scope="module")
 def cushion():
     """A round cushion of skin at finite strain."""
-    across = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.2])
-    mesh = block(np.r_[-across[:0:-1], across], np.array([0.0, 0.2, 0.5, 1.0]), 2.0)
+    half_x = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.2])
+    mesh = block(np.r_[-half_x[:0:-1], half_x], np.array([0.0, 0.2, 0.5, 1.0]), 2.0)
     return Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]).condensed)
 
 
@@ -143,13 +143,13 @@ def drive_finite(law, newton):
     return points
 
 
-WAYS = [drive, drive_oracle, slide_at_once, press_by_forces, drive_finite]
+SEARCHES = [drive, drive_oracle, slide_at_once, press_by_forces, drive_finite]
 
 
-@pytest.fixture(params=WAYS, ids=lambda way: way.__name__)
+@pytest.fixture(params=SEARCHES, ids=lambda search: search.__name__)
 def points_by_law(request, cushion):
-    way = request.param
-    return (lambda law: way(law, cushion)) if way is drive_finite else way
+    search = request.param
+    return (lambda law: search(law, cushion)) if search is drive_finite else search
 
 
 def test_every_law_of_the_list_is_tested_here():
@@ -206,7 +206,7 @@ def test_friction_that_vanishes_is_none_and_a_bound_that_is_never_felt_is_none(p
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     """No point feels another, and without coupling N = (d - g)/a; T is the springs' pull, cut off."""
-    body = springs(across=0.0)
+    body = springs(coupling=0.0)
     newton, state = Newton(body), EquilibriumState.undeformed(body)
     for depth, travel in DRIVES:
         normal = np.maximum(depth - body.rest[:, 1], 0.0) / COMPLIANCE[0]

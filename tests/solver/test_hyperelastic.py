@@ -70,15 +70,15 @@ def test_a_block_held_at_its_sides_has_the_closed_form_stress(law, stretch, cauc
 
 
 @pytest.mark.parametrize(
-    ("stretch", "across", "cauchy", "nominal", "density"),
+    ("stretch", "lateral", "cauchy", "nominal", "density"),
     [
         (0.9, 1.101300, -0.010985, -0.012098, 0.000574),
         (0.8, 1.224285, -0.023700, -0.029016, 0.002579),
         (0.7, 1.376321, -0.039394, -0.054219, 0.006650),
     ],
 )
-def test_a_block_with_free_sides_has_the_closed_form_stress(stretch, across, cauchy, nominal, density):
-    F = np.diag([across, stretch])
+def test_a_block_with_free_sides_has_the_closed_form_stress(stretch, lateral, cauchy, nominal, density):
+    F = np.diag([lateral, stretch])
     P = stress(DERMIS, F)
     sigma = P @ F.T / np.linalg.det(F)
     np.testing.assert_allclose([P[0, 0], P[1, 1], sigma[1, 1]], [0.0, nominal, cauchy], atol=2e-6)

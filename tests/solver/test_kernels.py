@@ -123,17 +123,17 @@ def test_a_tangent_without_stiffness_cannot_be_eliminated():
 
 
 @compile_loop
-def solve_system(matrix, right, size):
-    return contact_system.solve(matrix, right, size)
+def solve_system(matrix, rhs, size):
+    return contact_system.solve(matrix, rhs, size)
 
 
 def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
     rng = np.random.default_rng(0)
     for size in range(1, 12):
-        matrix, right = rng.normal(size=(size, size)) + 4.0 * np.eye(size), rng.normal(size=(size, 4))
-        solution = right.copy()
+        matrix, rhs = rng.normal(size=(size, size)) + 4.0 * np.eye(size), rng.normal(size=(size, 4))
+        solution = rhs.copy()
         assert solve_system(np.r_[matrix.ravel(), 7.0], solution, size)
-        np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
+        np.testing.assert_allclose(solution, np.linalg.solve(matrix, rhs), rtol=1e-9)
     assert not solve_system(np.zeros(4), np.ones((2, 4)), 2)
 
 

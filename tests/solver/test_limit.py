@@ -79,9 +79,9 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     load = LoadState(1.0, 0.5, 0.03, TOWARDS_TIP)
     start = solve_full_slip(finger.newton, load._replace(mu=0.0))
     branch = continue_branch(finger, start, BY_FRICTION, load.mu, 0.54)
-    again = continue_branch(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
-    assert again.states == (branch.last,)
-    assert not again.limited
+    second_branch = continue_branch(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
+    assert second_branch.states == (branch.last,)
+    assert not second_branch.limited
     assert not branch.limited
     np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=1e-6)
 

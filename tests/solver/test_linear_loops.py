@@ -72,8 +72,8 @@ def test_what_no_stable_body_is_made_of_is_refused(mesh):
 def test_the_same_question_is_answered_bit_by_bit_the_same_again():
     scenes = [scene(surface) for surface in SLIPPERINESS]
     first = solve_many(scenes)
-    again = solve_many(scenes)
-    for prediction, repeated in zip(first, again, strict=True):
+    second = solve_many(scenes)
+    for prediction, repeated in zip(first, second, strict=True):
         assert (prediction.sed_ending, prediction.error_estimate) == (repeated.sed_ending, repeated.error_estimate)
         np.testing.assert_array_equal(prediction.displacement, repeated.displacement)
     assert solve(scenes[0]).sed_ending == solve(scenes[0]).sed_ending

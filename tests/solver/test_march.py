@@ -69,10 +69,10 @@ def test_points_stick_before_they_slip_and_turn_round_with_the_bone():
     forwards = press_and_slide(1.5, 0.44, 0.03009, -1, press=6, slides=20, distance=6.0)
     backwards = [load._replace(travel=6.0 - 0.5 * i) for i, load in enumerate([forwards[-1]] * 22, start=1)]
     states = list(march(newton, forwards + backwards))
-    early, settled, last = states[5], states[25], states[-1]
+    early, sliding, last = states[5], states[25], states[-1]
     assert (early.state == STICK).any()
-    assert (settled.state[settled.touching] >= SLIP).all()
-    assert (settled.sense[settled.touching] == 1).all()
+    assert (sliding.state[sliding.touching] >= SLIP).all()
+    assert (sliding.sense[sliding.touching] == 1).all()
     assert (last.sense[last.touching] == -1).all()
     opposite = solve_full_slip(newton, LoadState(1.5, 0.44, 0.03009, -1))
     assert probes.average(last.u)[0] == pytest.approx(probes.average(opposite.u)[0], rel=1e-9)

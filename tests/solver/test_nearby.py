@@ -43,8 +43,8 @@ def test_its_tangent_says_where_states_beside_it_lie(predictions, name):
     scene, slide = DRIVEN[name], slide_near(predictions[name])
     derivative = slide.derivatives().sed
     more_friction = replace(scene, friction=Friction(scene.friction.mu * (1 + 1e-5), scene.friction.tau_max))
-    here, there = slide.seds([scene, more_friction])[:, 0]
-    assert there - here == pytest.approx(derivative.mu * 1e-5 * scene.friction.mu, rel=1e-3)
+    sed, nearby_sed = slide.seds([scene, more_friction])[:, 0]
+    assert nearby_sed - sed == pytest.approx(derivative.mu * 1e-5 * scene.friction.mu, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", DRIVEN)
@@ -52,8 +52,8 @@ def test_states_beside_it_are_those_that_are_solved(name):
     scene = DRIVEN[name]
     more_friction = with_mu(scene, 1.05 * scene.friction.mu)
     first, second = solve_many([scene, more_friction])  # on one mesh
-    here, there = slide_near(first).seds([scene, more_friction])[:, 0]
-    assert there - here == pytest.approx(second.sed_ending - first.sed_ending, rel=1e-5)
+    sed, nearby_sed = slide_near(first).seds([scene, more_friction])[:, 0]
+    assert nearby_sed - sed == pytest.approx(second.sed_ending - first.sed_ending, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", ["small, by depth", "finite, by depth"])
@@ -65,9 +65,9 @@ def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name
 
 
 def test_a_finger_that_is_only_pressed_or_held_by_a_drag_depends_on_its_way():
-    pressed = Loading(1.0, "none")
-    held = Loading(normal_force=0.06, tangential_force=0.01)
-    predictions = solve_many([Scene(friction=Friction(0.4), loading=loading) for loading in (pressed, held)])
+    press = Loading(1.0, "none")
+    drag = Loading(normal_force=0.06, tangential_force=0.01)
+    predictions = solve_many([Scene(friction=Friction(0.4), loading=loading) for loading in (press, drag)])
     assert [slide_near(prediction) for prediction in predictions] == [None, None]
 
 

@@ -110,8 +110,8 @@ def test_a_press_with_friction_errs_by_its_load_steps_too():
     truth = drag_of_half(None, press(small(foot(48)), 400))
     fewer = [press(newton, round(25 * part)) for part in PARTS]
     estimate = estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer)
-    without = estimate_errors(drag_of_half, newton, usual, (nested, finer))
+    without_steps = estimate_errors(drag_of_half, newton, usual, (nested, finer))
     assert abs(estimate.value - truth) <= estimate.error
-    assert estimate.error > without.error
+    assert estimate.error > without_steps.error
     with pytest.raises(ValueError, match="fewer has 1 states"):
         estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer[:1])

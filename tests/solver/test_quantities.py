@@ -94,8 +94,8 @@ def test_simple_shear_along_the_skin_by_gamma_is_a_shear_of_gamma_and_stretches_
     local = state([[[0.0, gamma], [0.0, 0.0]]], angle=0.0, small=kind == "small")
     assert getattr(BY_NAME["shear_along_skin"], kind)(local) == pytest.approx([gamma], rel=1e-14)
     assert getattr(BY_NAME["stretch_along_skin"], kind)(local) == pytest.approx([0.0], abs=1e-15)
-    across = state([[[0.0, 0.0], [-gamma, 0.0]]], angle=np.pi / 2, small=kind == "small")  # the same, all turned
-    assert getattr(BY_NAME["shear_along_skin"], kind)(across) == pytest.approx([gamma], rel=1e-14)
+    upright = state([[[0.0, 0.0], [-gamma, 0.0]]], angle=np.pi / 2, small=kind == "small")  # the same, all turned
+    assert getattr(BY_NAME["shear_along_skin"], kind)(upright) == pytest.approx([gamma], rel=1e-14)
 
 
 def test_a_pure_dilation_has_no_energy_of_shape_but_for_the_plane_that_holds_it():
@@ -134,6 +134,6 @@ def test_principal_stresses_of_simple_states_are_as_closed_forms_say(law):
     """Pure shear by an angle g has G g and -G g; a stretch e with the sides held has (lambda + 2 G) e and lambda e."""
     shear, lame = float(law.shear), float(law.lame)
     local = state([[[0.0, 0.01], [0.01, 0.0]], [[0.01, 0.0], [0.0, 0.0]]], law, small=True)
-    greatest, least = (BY_NAME[f"principal_stress_{which}"].small(local) for which in ("greatest", "least"))
+    greatest, least = (BY_NAME[f"principal_stress_{kind}"].small(local) for kind in ("greatest", "least"))
     np.testing.assert_allclose(greatest, [0.02 * shear, 0.01 * (lame + 2.0 * shear)], rtol=1e-12)
     np.testing.assert_allclose(least, [-0.02 * shear, 0.01 * lame], rtol=1e-12)

@@ -21,9 +21,9 @@ RELAXING = Scene(
 
 
 def course(time, bone_x, slipping, response):
-    none = np.zeros(len(time))
+    zeros = np.zeros(len(time))
     values = np.outer(response, np.arange(1.0, len(NAMES) + 1.0))
-    return History(np.array(time), np.array(bone_x), *[none] * 6, np.array(slipping), values)
+    return History(np.array(time), np.array(bone_x), *[zeros] * 6, np.array(slipping), values)
 
 
 def test_parts_end_where_the_bone_begins_to_move_and_where_all_slips():

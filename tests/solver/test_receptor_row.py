@@ -57,7 +57,7 @@ def test_errors_along_a_row_at_another_depth_lie_above_the_true_ones(kinematics)
     scene, deep = SCENES[kinematics], Receptor(depth=0.4)
     row = row_along(solve(replace(scene, solve=replace(scene.solve, tolerance=0.02))), receptor=deep)
     fine = row_along(solve(replace(scene, solve=replace(scene.solve, tolerance=0.0005))), receptor=deep)
-    judged = np.isfinite(row.values) & (fine.errors < row.errors / 3.0)
-    assert judged.sum() > 0.5 * judged.size
-    assert np.mean((np.abs(row.values - fine.values) <= row.errors)[judged]) >= 0.95
+    comparable = np.isfinite(row.values) & (fine.errors < row.errors / 3.0)
+    assert comparable.sum() > 0.5 * comparable.size
+    assert np.mean((np.abs(row.values - fine.values) <= row.errors)[comparable]) >= 0.95
     assert np.array_equal(np.isfinite(row.errors), np.isfinite(row.values))

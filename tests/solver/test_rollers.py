@@ -66,15 +66,15 @@ def test_one_component_prescribed_leaves_the_other_free_at_small_strain():
 def test_one_component_prescribed_leaves_the_other_free_at_finite_strain():
     """Sides free at a stretch of 0.8: the closed form of the law."""
     mesh = block_on_rollers()
-    right = nodes_at(mesh, 0, 2.0)
-    skin = right[np.argsort(mesh.nodes[right, 1])][2:5]
+    side = nodes_at(mesh, 0, 2.0)
+    skin = side[np.argsort(mesh.nodes[side, 1])][2:5]
     mesh = replace(mesh, skin=skin, held_y=np.union1d(mesh.held_y, nodes_at(mesh, 1, 1.0)))
     prescribed = np.zeros(mesh.nodes.shape)
     prescribed[nodes_at(mesh, 1, 1.0), 1] = -0.2
     state = solve_dead_load(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]), prescribed=prescribed, load=CLEAR)
     np.testing.assert_allclose(state.u, mesh.nodes * [0.224285, -0.2], atol=1e-6)
-    across = state.u[right, 0]
-    assert np.ptp(across) < 1e-9
+    side_u = state.u[side, 0]
+    assert np.ptp(side_u) < 1e-9
 
 
 def halves():

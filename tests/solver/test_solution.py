@@ -160,15 +160,15 @@ def test_the_marched_course_ends_in_the_state_solved_directly(ten, histories):
 def test_the_course_presses_within_a_second_then_slides_at_the_scene_s_speed(histories):
     for prediction in histories:
         course, loading = prediction.history, prediction.scene.loading
-        pressed = course.time <= 1.0
-        assert np.allclose(course.bone_y[pressed], -loading.indentation * course.time[pressed])
-        assert not course.bone_x[pressed].any()
-        slip = loading.direction * loading.speed * (course.time[~pressed] - 1.0)
-        assert np.allclose(course.bone_x[~pressed], slip)
+        pressing = course.time <= 1.0
+        assert np.allclose(course.bone_y[pressing], -loading.indentation * course.time[pressing])
+        assert not course.bone_x[pressing].any()
+        slip = loading.direction * loading.speed * (course.time[~pressing] - 1.0)
+        assert np.allclose(course.bone_x[~pressing], slip)
         assert course.sed_ending[0] == 0.0
         assert np.all(np.diff(course.time) > 0)
         assert course.slipping[-1] == 1.0
-        assert course.slipping[pressed][-1] < 1.0
+        assert course.slipping[pressing][-1] < 1.0
 
 
 def test_the_course_loses_no_work(histories):

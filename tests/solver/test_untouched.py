@@ -22,10 +22,10 @@ def graded(end):
     lines = [0.0]
     while lines[-1] < end:
         lines.append(lines[-1] + max(0.02, 0.3 * (lines[-1] - 0.2)))
-    out = np.empty(2 * len(lines) - 1)
-    out[::2] = np.array(lines) * end / lines[-1]
-    out[1::2] = (out[2::2] + out[:-2:2]) / 2.0
-    return out
+    with_middles = np.empty(2 * len(lines) - 1)
+    with_middles[::2] = np.array(lines) * end / lines[-1]
+    with_middles[1::2] = (with_middles[2::2] + with_middles[:-2:2]) / 2.0
+    return with_middles
 
 
 def round_foot(part, *, held):

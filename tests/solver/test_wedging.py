@@ -34,8 +34,8 @@ def test_where_a_drag_lifts_the_bone_the_slide_is_found_as_the_course_finds_it_a
     assert prediction.audits["course_against_direct"] < 1e-9
     assert any(LIFTED in warning for warning in prediction.warnings)
     # at the same depth there is a slide with less force too, and that is where a finger driven there ends
-    driven = solve(driven_scene(prediction.indentation, 1.5))
-    assert driven.normal_force < 0.5 * prediction.normal_force
+    by_depth = solve(driven_scene(prediction.indentation, 1.5))
+    assert by_depth.normal_force < 0.5 * prediction.normal_force
 
 
 def test_a_drag_that_does_not_lift_the_bone_is_not_told():
@@ -80,10 +80,10 @@ def test_every_force_ends_in_an_answer_or_in_limits_that_hold(force, mu, slide, 
     else:
         assert prediction.normal_force == pytest.approx(force, rel=1e-9)
         return
-    for within in at_limits(refusal, -1.0):
-        solve(within)
-    beyond = [refusal_of(scene) for scene in at_limits(refusal, 1.0)]
-    assert tau_max is not None or len(beyond) == 3
+    for possible in at_limits(refusal, -1.0):
+        solve(possible)
+    refusals = [refusal_of(scene) for scene in at_limits(refusal, 1.0)]
+    assert tau_max is not None or len(refusals) == 3
 
 
 @pytest.mark.slow

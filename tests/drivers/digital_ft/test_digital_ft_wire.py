@@ -110,29 +110,29 @@ def test_no_garbage_raises_or_loops(garbage):
     assert malformed == sum(damaged)
 
 
-@given(skipped=st.integers(0, 12), seed=st.integers(0, 100))
-def test_a_stream_begun_in_the_middle_of_a_packet_is_found(skipped, seed):
+@given(offset=st.integers(0, 12), seed=st.integers(0, 100))
+def test_a_stream_begun_in_the_middle_of_a_packet_is_found(offset, seed):
     values = random_gauges(40, seed).tolist()
-    raw, _, _, _ = decode([b"".join(packet(v) for v in values)[skipped:]])
-    first = 1 if skipped else 0
+    raw, _, _, _ = decode([b"".join(packet(v) for v in values)[offset:]])
+    first = 1 if offset else 0
     assert raw[-20:] == values[-21:-1]
     assert len(raw) >= 38 - first - 6  # a wrong place may pass for a while, never six packets in a row for long
 
 
 def test_lost_bytes_cost_few_packets_and_rarely_a_wrong_reading():
     cases = [(at, gap) for at in range(130, 400, 31) for gap in range(1, 61)]
-    wrong = 0
+    wrong_count = 0
     for seed in range(4):
         values = random_gauges(80, seed)
         stream = b"".join(packet(v) for v in values)
         true_values = set(map(tuple, values.tolist()))
         for at, gap in cases:
             raw, _, damaged, malformed = decode([stream[:at], stream[at + gap :]])
-            wrong += sum(tuple(v) not in true_values for v in raw)
+            wrong_count += sum(tuple(v) not in true_values for v in raw)
             assert len(raw) >= len(values) - gap // 13 - 6
             assert malformed == sum(damaged)
     # Where whole packets' lengths are lost the stream stays in step, and seven bits let one splice in 128 pass.
-    assert wrong <= 2 * 4 * len(cases) / 13 / 128
+    assert wrong_count <= 2 * 4 * len(cases) / 13 / 128
 
 
 def test_a_packet_with_a_bad_checksum_is_broken_and_the_others_are_kept():
@@ -169,12 +169,12 @@ def calibration_registers(**changes):
 def test_a_calibration_is_read_from_its_registers():
     registers = calibration_registers()
     assert len(registers) == 2 * wire.CALIBRATION_SIZE
-    stored = parse_calibration(registers)
-    assert (stored.calibration.serial, stored.part_number, stored.calibrated) == ("FT12345", "SI-36-0.5", "12/14/2020")
+    record = parse_calibration(registers)
+    assert (record.calibration.serial, record.part_number, record.calibrated) == ("FT12345", "SI-36-0.5", "12/14/2020")
     # 1.5 in the matrix over 1000 counts in a newton; 4.5 over 2000 counts in a newton metre
-    np.testing.assert_allclose(np.diag(stored.calibration.matrix), [1.5e-3, 2.5e-3, 3.5e-3, 2.25, 2.75, 3.25])
-    np.testing.assert_allclose(stored.calibration.rated, [36, 36, 36, 500, 500, 500])
-    assert struct.unpack(">12H", stored.gains_and_offsets) == tuple(range(1, 13))
+    np.testing.assert_allclose(np.diag(record.calibration.matrix), [1.5e-3, 2.5e-3, 3.5e-3, 2.25, 2.75, 3.25])
+    np.testing.assert_allclose(record.calibration.rated, [36, 36, 36, 500, 500, 500])
+    assert struct.unpack(">12H", record.gains_and_offsets) == tuple(range(1, 13))
 
 
 @pytest.mark.parametrize(
@@ -201,10 +201,10 @@ def test_a_range_that_is_not_stated_is_unknown():
 @given(st.binary(min_size=266, max_size=266))
 def test_any_registers_are_a_calibration_or_refused(registers):
     try:
-        stored = parse_calibration(registers)
+        record = parse_calibration(registers)
     except SetupError:
         return
-    assert np.all(np.isfinite(stored.calibration.matrix))
+    assert np.all(np.isfinite(record.calibration.matrix))
 
 
 def test_status_bits_have_their_names():

@@ -65,16 +65,16 @@ def test_a_status_word_is_told_in_words(status, words):
 
 
 @pytest.mark.parametrize(
-    ("family", "saturated", "notes", "listed"),
+    ("family", "saturated", "notes", "numbers"),
     [  # bits of the makers' tables: 9620-05-NET FT, section 15.2, and 9610-05-Ethernet Axia, chapter 10
         (NET_FT, {17}, {16}, {*range(1, 15), *range(16, 31)}),
         (AXIA, {30, 27}, {28, 16, 3}, {0, 1, 2, 3, 5, 7, 16, 27, 28, 29, 30}),
     ],
 )
-def test_every_bit_of_the_makers_table_is_named_and_judged(family, saturated, notes, listed):
+def test_every_bit_of_the_makers_table_is_named_and_judged(family, saturated, notes, numbers):
     for number in range(31):
         (entry,) = family.entries(1 << number)
-        assert ("unknown" not in entry.words) == (number in listed)
+        assert ("unknown" not in entry.words) == (number in numbers)
         assert entry.verdict == ("saturated" if number in saturated else "note" if number in notes else "doubtful")
         assert family.entries(1 << number | 1 << 31) == (entry,)
 

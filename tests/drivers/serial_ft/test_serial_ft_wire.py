@@ -74,9 +74,9 @@ def test_readings_do_not_depend_on_how_the_stream_was_cut(form, cuts, seed, dama
         del stream[200:205]
         stream[400:413] = b"Power on.\r\n>\xff"
     chunks = [bytes(stream[a:b]) for a, b in itertools.pairwise([0, *cuts, len(stream)])]
-    cut, whole = decode(form, chunks), decode(form, [bytes(stream)])
-    assert cut[0].tolist() == whole[0].tolist()
-    assert cut[1:] == whole[1:]
+    in_chunks, at_once = decode(form, chunks), decode(form, [bytes(stream)])
+    assert in_chunks[0].tolist() == at_once[0].tolist()
+    assert in_chunks[1:] == at_once[1:]
 
 
 @pytest.mark.parametrize("form", DECODERS)

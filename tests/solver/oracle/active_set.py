@@ -70,10 +70,10 @@ def condense_surface(body: CondensedLinear) -> CondensedSurface:
     """Return what the surface feels of a held body: the inverse of its skin's stiffness."""
     compliance = np.linalg.inv(body.stiffness)
     free = (compliance @ body.load).reshape(-1, 2)
-    nothing = np.zeros((2 * len(free), 0))
+    no_motions = np.zeros((2 * len(free), 0))
     return CondensedSurface(
         body.rest[:, 1], body.fixed_length, compliance[1::2, 1::2], compliance[1::2, ::2], compliance[::2, ::2],
-        free[:, 1], free[:, 0], nothing, np.zeros(0),
+        free[:, 1], free[:, 0], no_motions, np.zeros(0),
     )  # fmt: skip
 
 
@@ -83,33 +83,33 @@ class System:
     def __init__(self, body: CondensedSurface, law: FrictionLaw, state: States, sense: Array) -> None:
         """Factorise the system of `state` (k,), friction forces pointing along `sense` (k,)."""
         self.key = state.tobytes() + sense.tobytes()
-        self.on = np.flatnonzero(state != OPEN)
-        self.stuck = np.flatnonzero(state == STICK)
-        on, stuck, free = self.on, self.stuck, body.motions.shape[1]
+        self.contacts = np.flatnonzero(state != OPEN)
+        self.sticking = np.flatnonzero(state == STICK)
+        touching, sticking, free = self.contacts, self.sticking, body.motions.shape[1]
         by_force, by_length = friction_slopes(law, state, sense)
-        self.drag = drag = by_force[on]  # tangential by normal force
-        self.capped = by_length * body.length  # (k,) tangential force of points at the bound
-        count = len(on) + len(stuck)
+        self.drag = drag = by_force[touching]  # tangential by normal force
+        self.bounded = by_length * body.length  # (k,) tangential force of points at the bound
+        n, count = len(touching), len(touching) + len(sticking)
         matrix = np.zeros((count + free, count + free))
-        touch = body.normal_by_normal[np.ix_(on, on)] + body.normal_by_tangential[np.ix_(on, on)] * drag
-        matrix[: len(on), : len(on)] = touch
-        if len(stuck):
-            coupling = body.normal_by_tangential[np.ix_(on, stuck)]
-            inside = body.tangential_by_tangential[np.ix_(stuck, on)]
-            matrix[: len(on), len(on) : count] = coupling
-            matrix[len(on) : count, : len(on)] = coupling.T + inside * drag
-            matrix[len(on) : count, len(on) : count] = body.tangential_by_tangential[np.ix_(stuck, stuck)]
+        pairs = np.ix_(touching, touching)
+        matrix[:n, :n] = body.normal_by_normal[pairs] + body.normal_by_tangential[pairs] * drag
+        if len(sticking):
+            coupling = body.normal_by_tangential[np.ix_(touching, sticking)]
+            inside = body.tangential_by_tangential[np.ix_(sticking, touching)]
+            matrix[:n, n:count] = coupling
+            matrix[n:count, :n] = coupling.T + inside * drag
+            matrix[n:count, n:count] = body.tangential_by_tangential[np.ix_(sticking, sticking)]
         if free:
             normal, tangential = np.split(body.motions, 2)
-            matrix[: len(on), count:], matrix[len(on) : count, count:] = normal[on], tangential[stuck]
-            matrix[count:, : len(on)] = (normal[on] + tangential[on] * drag[:, None]).T
-            matrix[count:, len(on) : count] = tangential[stuck].T
+            matrix[:n, count:], matrix[n:count, count:] = normal[touching], tangential[sticking]
+            matrix[count:, :n] = (normal[touching] + tangential[touching] * drag[:, None]).T
+            matrix[count:, n:count] = tangential[sticking].T
         self._factors = dgetrf(matrix) if len(matrix) else None
         self.singular = self._factors is not None and bool(self._factors[2])
 
-    def solve(self, right: Array) -> Array:
+    def solve(self, rhs: Array) -> Array:
         """Return the solution for the right-hand side `right`, or for several side by side."""
-        return right if self._factors is None else dgetrs(self._factors[0], self._factors[1], right)[0]
+        return rhs if self._factors is None else dgetrs(self._factors[0], self._factors[1], rhs)[0]
 
 
 class ContactSolver:
@@ -193,11 +193,11 @@ class ContactSolver:
                 continue
             contact = self._solve_system(self._system, depth, travel, anchor, state, sense, iteration)
             new_state, new_sense, contradiction = self._update_contact_states(contact, anchor, free=free)
-            changed = np.flatnonzero((new_state != state) | (new_sense != sense))
-            if not len(changed):
+            contradicting = np.flatnonzero((new_state != state) | (new_sense != sense))
+            if not len(contradicting):
                 return contact
             if one_by_one:
-                worst = changed[np.argmax(contradiction[changed])]
+                worst = contradicting[np.argmax(contradiction[contradicting])]
                 keep = np.arange(len(state)) != worst
                 new_state, new_sense = np.where(keep, state, new_state), np.where(keep, sense, new_sense)
             state, sense = new_state.astype(np.int8), new_sense
@@ -218,20 +218,20 @@ class ContactSolver:
         sense: Array,
         iteration: int,
     ) -> Contact:
-        body, on, stuck, tangential = self.body, system.on, system.stuck, system.capped
+        body, touching, sticking, tangential = self.body, system.contacts, system.sticking, system.bounded
         free_gap = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
         free_shift = body.tangential_free + travel + body.tangential_by_tangential @ tangential
         residual = self._resultants - body.motions[len(state) :].T @ tangential
-        answer = system.solve(np.concatenate([-free_gap[on], (anchor - free_shift)[stuck], residual]))
+        answer = system.solve(np.concatenate([-free_gap[touching], (anchor - free_shift)[sticking], residual]))
         normal = np.zeros(len(state))
-        normal[on] = answer[: len(on)]
+        normal[touching] = answer[: len(touching)]
         rest = np.zeros(len(state))
-        rest[on] = system.drag * normal[on]
-        rest[stuck] = answer[len(on) : len(on) + len(stuck)]
-        motion = answer[len(on) + len(stuck) :]
-        up, along = np.split(body.motions @ motion, 2)
-        gap = free_gap + up + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
-        shift = free_shift + along + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
+        rest[touching] = system.drag * normal[touching]
+        rest[sticking] = answer[len(touching) : len(touching) + len(sticking)]
+        motion = answer[len(touching) + len(sticking) :]
+        along_y, along_x = np.split(body.motions @ motion, 2)
+        gap = free_gap + along_y + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
+        shift = free_shift + along_x + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
         return Contact(state, sense, normal, tangential + rest, shift, gap, motion, iteration)
 
     def _update_contact_states(self, contact: Contact, anchor: Array, *, free: bool) -> tuple[States, Array, Array]:
@@ -243,9 +243,9 @@ class ContactSolver:
         height = max(float(np.abs(lengths).max(initial=0.0)), np.finfo(float).tiny)
         contradiction = np.zeros(len(state))
 
-        def change(where: NDArray[np.bool_], to: int, size: Array) -> None:
-            state[where] = to
-            contradiction[where] = size[where]
+        def change(mask: NDArray[np.bool_], to: int, size: Array) -> None:
+            state[mask] = to
+            contradiction[mask] = size[mask]
 
         touching = contact.state != OPEN
         slack = SMALL * force
@@ -256,9 +256,9 @@ class ContactSolver:
             over = np.abs(contact.tangential) - law.limit(contact.normal, body.length)
             exceeds = (contact.state == STICK) & (over > slack)
             sense[exceeds] = np.sign(contact.tangential[exceeds])
-            capped = law.mu * contact.normal > bound
-            change(exceeds & ~capped, SLIP, over)
-            change(exceeds & capped, SHEAR_LIMITED, over)
+            at_bound = law.mu * contact.normal > bound
+            change(exceeds & ~at_bound, SLIP, over)
+            change(exceeds & at_bound, SHEAR_LIMITED, over)
             # a point that slips along its friction force sticks; one whose force is about to change is asked later
             forward = (contact.shift - anchor) * contact.sense
             sticks = (contact.state >= SLIP) & (state == contact.state) & (forward > SMALL * height)

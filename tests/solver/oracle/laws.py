@@ -26,21 +26,21 @@ def energy(law, F):
 
 def overstress_energy(T: Array, F: Array) -> Array:
     """Return 1/2 J^-2/3 T:C (...) [MPa], of which `overstress` is the derivative within a step."""
-    J, _, _, whole = stress_parts(F, T)
-    return 0.5 * J ** (-2.0 / 3.0) * whole
+    J, _, _, contraction = stress_parts(F, T)
+    return 0.5 * J ** (-2.0 / 3.0) * contraction
 
 
 def overstress_tangent(T: Array, F: Array) -> Array:
     """Return dP_aA/dF_bB (..., a, A, b, B) [MPa] within a step."""
-    J, inverse, pulled, whole = stress_parts(F, T)
-    wide = (..., None, None, None, None)
+    J, inverse, pulled, contraction = stress_parts(F, T)
+    expanded = (..., None, None, None, None)
     plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    across = np.einsum("...aA,...bB->...aAbB", pulled, inverse)
-    out = np.einsum("ab,...AB->...aAbB", np.eye(2), plane)
-    out = out - 2.0 / 3.0 * (across + np.einsum("...aA,...bB->...aAbB", inverse, pulled))
-    out += 2.0 / 9.0 * whole[wide] * np.einsum("...aA,...bB->...aAbB", inverse, inverse)
-    out += whole[wide] / 3.0 * np.einsum("...aB,...bA->...aAbB", inverse, inverse)
-    return (J ** (-2.0 / 3.0))[wide] * out
+    outer = np.einsum("...aA,...bB->...aAbB", pulled, inverse)
+    tangent = np.einsum("ab,...AB->...aAbB", np.eye(2), plane)
+    tangent = tangent - 2.0 / 3.0 * (outer + np.einsum("...aA,...bB->...aAbB", inverse, pulled))
+    tangent += 2.0 / 9.0 * contraction[expanded] * np.einsum("...aA,...bB->...aAbB", inverse, inverse)
+    tangent += contraction[expanded] / 3.0 * np.einsum("...aB,...bA->...aAbB", inverse, inverse)
+    return (J ** (-2.0 / 3.0))[expanded] * tangent
 
 
 def friction_slopes(law, state, sense):

@@ -71,15 +71,15 @@ class CondensedBody:
     def __init__(self, mesh, stiffness, loads=None):
         count = mesh.nodes.size
         at = (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
-        whole = np.zeros((count, count))
-        np.add.at(whole, (at[:, :, None], at[:, None, :]), stiffness)
+        matrix = np.zeros((count, count))
+        np.add.at(matrix, (at[:, :, None], at[:, None, :]), stiffness)
         self.loads = np.zeros((count, 1)) if loads is None else loads
         self.skin_unknowns = (2 * mesh.skin[:, None] + np.arange(2)).ravel()
         self.inner = np.setdiff1d(np.arange(count), np.concatenate([mesh.fixed, self.skin_unknowns]))
-        self.inside = whole[np.ix_(self.inner, self.inner)]
-        self.across = whole[np.ix_(self.inner, self.skin_unknowns)]
+        self.inside = matrix[np.ix_(self.inner, self.inner)]
+        self.across = matrix[np.ix_(self.inner, self.skin_unknowns)]
         self.follow = np.linalg.solve(self.inside, self.across)
-        self.stiffness = whole[np.ix_(self.skin_unknowns, self.skin_unknowns)] - self.across.T @ self.follow
+        self.stiffness = matrix[np.ix_(self.skin_unknowns, self.skin_unknowns)] - self.across.T @ self.follow
         self.load = self.skin_load(self.loads)
 
     def skin_load(self, loads):
