@@ -59,6 +59,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.by is None or options.why is None:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
+    if options.choose and options.trial is None:
+        raise WrongValue("--choose is of a trial, whose stroke --stroke names: give --trial N")
     stored = stored_document(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
     analysis = analyse(recording, settings_of(stored or {}), before)
