@@ -84,13 +84,14 @@ def tau(megapascal: float) -> str:
 
 
 def correlation(r: float) -> str:
-    """Return a coefficient with two decimals, or three where two would make it perfect.
+    """Return a coefficient with two decimals, or as many more as it takes not to look perfect.
 
-    >>> correlation(-0.5), correlation(0.997), correlation(-0.004)
-    ('−0.50', '+0.997', '+0.00')
+    >>> correlation(-0.5), correlation(0.997), correlation(-0.99996), correlation(-0.004), correlation(1.0)
+    ('−0.50', '+0.997', '−0.99996', '+0.00', '+1.00')
     """
-    text = f"{r:+z.2f}" if abs(r) < 0.995 or abs(r) > 0.9995 else f"{r:+.3f}"
-    return text.replace("-", "−")
+    left = 1.0 - abs(r)
+    decimals = -math.floor(math.log10(left)) if 1e-9 < left <= 0.005 else 2
+    return f"{r:+z.{decimals}f}".replace("-", "−")
 
 
 def ends_of(related: Relation) -> str:

@@ -13,6 +13,7 @@ from drivers.arrays import Array
 
 CONFIDENCE = 0.95
 TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the ends of an interval
+LEAST_CASES = 3  # of a jackknife
 _EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
 
 POWER = 0.8  # with which a study should tell two correlations apart (Cohen 1988, p. 56)

@@ -9,6 +9,7 @@ import numpy as np
 from drivers.arrays import Array
 from sessions.prediction import BY_NAME, SED
 from sessions.statistics.correlations import (
+    LEAST_CASES,
     Contrast,
     contrast,
     fisher_interval,
@@ -40,7 +41,6 @@ FIELDS: Mapping[str, str] = {
 }
 NAMES = (*RESPONSES, *FIELDS)
 _NO_LINE = "without one of the surfaces the others do not determine a line"
-_LEAST_SUBJECTS = 3  # of a jackknife over subjects
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     shared = [trial for trial in mine if all(one in trial.values for one in used)]
     covariances = _covariances(shared, used)
     if covariances is None:
-        few = f"it takes {_LEAST_SUBJECTS} subjects with two trials or more that have all of them"
+        few = f"it takes {LEAST_CASES} subjects with two trials or more that have all of them"
         return _because(rival, partial=few, contrast=None if name == model else few)
     if name != model:
         own, models = (_correlations(covariances, 0, column) for column in (1, 2))
@@ -205,7 +205,7 @@ def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | 
     """
     rows = by_key((trial.subject, [trial.score, *(trial.values[name] for name in names)]) for trial in trials)
     columns = [np.array(own) for own in rows.values() if len(own) > 1]
-    if len(columns) < _LEAST_SUBJECTS:
+    if len(columns) < LEAST_CASES:
         return None
     scale = np.abs(np.concatenate(columns)).max(axis=0, initial=1e-300)
     centred = [own / scale - (own / scale).mean(axis=0) for own in columns]

@@ -27,7 +27,7 @@ from scipy import special
 from scipy.sparse import csgraph
 
 from drivers.arrays import Array, Indices
-from sessions.statistics.correlations import jackknife
+from sessions.statistics.correlations import LEAST_CASES, jackknife
 from sessions.statistics.mixed_model import Term, mixed_model
 from sessions.statistics.psychometric import QUARTILE, binomial_deviance
 from sessions.statistics.scores import IntervalEstimate, by_key
@@ -35,7 +35,6 @@ from sessions.statistics.scores import IntervalEstimate, by_key
 Model = Literal["Bradley–Terry", "Thurstone V"]
 MODELS: tuple[Model, ...] = ("Bradley–Terry", "Thurstone V")
 
-LEAST_SUBJECTS = 3  # of a jackknife over subjects
 _STEPS = 50  # of Fisher's scoring, which takes five
 _GOOD = 1e-10
 
@@ -192,8 +191,8 @@ def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | Non
 
 def _without_each(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
     """Return the fits without each subject (s, n + 1), and why they make no interval, "" where they do."""
-    if len(counts) < LEAST_SUBJECTS:
-        return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_SUBJECTS} of them"
+    if len(counts) < LEAST_CASES:
+        return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_CASES} of them"
     indices, rest = range(counts.shape[2]), counts.sum(axis=0) - counts
     fits = [None if _why_none(own, indices) else _fit(own, model, begin) for own in rest]
     scales = [fit for fit in fits if fit is not None]
@@ -243,8 +242,8 @@ def stevens_exponent(
     """
     y, x = np.log(np.asarray(answers, np.float64)), np.log(np.asarray(magnitudes, np.float64))
     people = sorted(set(subjects))
-    if len(people) < LEAST_SUBJECTS or len(set(surfaces)) < LEAST_SUBJECTS:
-        why = f"it takes {LEAST_SUBJECTS} subjects and {LEAST_SUBJECTS} surfaces"
+    if len(people) < LEAST_CASES or len(set(surfaces)) < LEAST_CASES:
+        why = f"it takes {LEAST_CASES} subjects and {LEAST_CASES} surfaces"
         return Exponent(len(people), len(y), None, reason=why)
     model = mixed_model(subjects, y.tolist(), {NAME: x.tolist()})
     plain = None if isinstance(model, str) else model.term(NAME)
@@ -303,7 +302,7 @@ def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, Inte
     own = by_key((subject, (index, value)) for subject, index, value in points)
     indices = sorted({index for _, index, _ in points})
     whole = [[row[i] for i in indices] for row in map(by_key, own.values()) if len(row) == len(indices)]
-    if len(whole) < LEAST_SUBJECTS or len(indices) < 2:
+    if len(whole) < LEAST_CASES or len(indices) < 2:
         return {}
     cells = np.array([[np.mean(cell) for cell in row] for row in whole])
     answered = _AnswerTable(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from drivers.arrays import Array
-from sessions.statistics.correlations import CONFIDENCE, jackknife, t_quantile
+from sessions.statistics.correlations import LEAST_CASES, jackknife, t_quantile
+from sessions.statistics.scores import average, bounds
 
 Table = Mapping[str, Mapping[int, float]]  # subject -> stimulus' index -> score, as `scores.score_matrix` gives it
 
@@ -115,7 +116,7 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
     """
     k = len(xy)
     others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
-    if k < 3 or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
+    if k < LEAST_CASES or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     low, high, p = map(float, jackknife(z, np.arctanh(others_xy / size)))
@@ -153,19 +154,13 @@ class Difference:
 
 def differences(table: Table) -> tuple[Difference, ...]:
     """Return the difference of each pair of stimuli, of the subjects who scored both; at least three of them."""
-    from scipy import stats
-
     indices = sorted({index for row in table.values() for index in row})
     rows: list[Difference] = []
     for a, b in itertools.combinations(indices, 2):
-        pairs = np.array([(row[a], row[b]) for row in table.values() if a in row and b in row]).reshape(-1, 2)
-        steps = pairs[:, 1] - pairs[:, 0]
-        if len(steps) < 3 or float(np.ptp(steps)) <= 1e-12 * float(np.abs(pairs).max()):
-            continue
-        test = stats.ttest_1samp(steps, 0.0)
-        low, high = test.confidence_interval(CONFIDENCE)
-        p = float(test.pvalue)
-        rows.append(Difference(a, b, len(steps), float(steps.mean()), float(low), float(high), p, p))
+        of = average([round(row[b] - row[a], 9) for row in table.values() if a in row and b in row])
+        if of is not None and of.n > 2 and of.sd and (ends := bounds(of.low, of.high)) is not None:
+            p = 2.0 * float(special.stdtr(of.n - 1, -abs(of.mean) * math.sqrt(of.n) / of.sd))
+            rows.append(Difference(a, b, of.n, of.mean, *ends, p, p))
     adjusted = holm([one.p for one in rows])
     return tuple(replace(one, p_holm=p) for one, p in zip(rows, adjusted, strict=True))
 

@@ -196,6 +196,7 @@ def _forces(study: StudyFindings) -> Table | None:
 
 
 _NOT_WITHIN = "no interval: no two subjects scored every surface, or they differ alike between surfaces"
+_NOT_OF_PEOPLE = "no interval of two subjects, of some who are all alike, or of a perfect r"
 _NO_STROKE = "no subject's stroke gives this number"
 
 
@@ -214,9 +215,9 @@ def _relation(study: StudyFindings) -> Table | None:
         return (
             *_of_means("means", one.mean_relation, notes),
             *_of_means("means, standardised", one.normalised.mean_relation, notes),
-            *_within_subjects("within subjects", one.repeated, one.repeated_holm, one.without_subject),
-            *_within_subjects("within, standardised", one.normalised.repeated),
-            *_within_subjects("within, log estimates", estimated),
+            *_within_subjects("within subjects", one.repeated, notes, one.repeated_holm, one.without_subject),
+            *_within_subjects("within, standardised", one.normalised.repeated, notes),
+            *_within_subjects("within, log estimates", estimated, notes),
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
@@ -252,6 +253,7 @@ def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row
 def _within_subjects(
     name: str,
     repeated: RepeatedCorrelation | None,
+    notes: Notes,
     adjusted: float | None = None,
     without: Sequence[tuple[str, float]] = (),
 ) -> Iterable[Row]:
@@ -260,7 +262,7 @@ def _within_subjects(
             name,
             f"{repeated.dof} d.f.",
             correlation(repeated.r),
-            range_cell(*(repeated.people or (None, None)), correlation),
+            notes.interval(*(repeated.people or (None, None)), correlation, _NOT_OF_PEOPLE),
             NONE,
             NONE,
             _or_dash(repeated.people_p, p_value),
