@@ -44,10 +44,14 @@ class Kind(NamedTuple):
 OF_STROKE: Mapping[str, Kind] = {
     "onset": Kind(_Instant, "an instant [s]"),
     "lift": Kind(_Instant, "an instant [s]"),
-    "steady": Kind(tuple[_Instant, _Instant], "two instants [s], the earlier first: where the mean of T/N and the speed are taken"),
+    "steady": Kind(
+        tuple[_Instant, _Instant],
+        "two instants [s], the earlier first: where the mean of T/N and the speed are taken",
+    ),
     "stick": Kind(
         tuple[_Instant, _Instant],
-        "two instants [s], the earlier first: the stick phase, whose greatest T/N is mu_static and whose end the break-away",
+        "two instants [s], the earlier first: the stick phase, whose greatest T/N is mu_static and whose end the "
+        "break-away",
     ),
     "slide_onset": Kind(
         _Instant, "an instant [s]: from which the contact slides; a static peak is looked for up to then"
