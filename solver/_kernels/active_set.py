@@ -139,7 +139,7 @@ def solve_active_set(
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
     one_by_one, may_hold = False, load.mu > 0.0 and load.tau > 0.0
     for turn in range(control.rounds + 1):
-        bounded_length(position.x, skin, states.state, load.mu, system.length)
+        bounded_length(position.x, skin, system.length)
         if by_forces:
             count = assemble_force_system(compliance, skin, states, load, position, unloaded_step, system, answer)
         else:
@@ -160,7 +160,7 @@ def solve_active_set(
         if not regular or turn == control.rounds:
             return UNSETTLED if regular else SINGULAR
         look_ahead(position, steps, motion, dragged and not stuck, ahead, above, slip)
-        bounded_length(ahead, skin, states.state, load.mu, system.length)
+        bounded_length(ahead, skin, system.length)
         if contradictions(states, above, slip, system.length, load, changes) == 0:
             return turn + 1
         change_states(states, changes, slip, entries, one_by_one)
@@ -354,7 +354,7 @@ def update_contact_states(
 
     The anchors are the positions from which nodes have slid. Fills `length` (k,), on which the traction bound acts.
     """
-    bounded_length(position.x, skin, states.state, load.mu, length)
+    bounded_length(position.x, skin, length)
     size, slip = length.shape[0], np.empty(length.shape[0])
     for i in range(size):
         slip[i] = position.x[i] - position.anchor[i]

@@ -42,31 +42,14 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
 
 
 @compile_loop
-def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin on which the traction bound acts at each node.
+def bounded_length(x: Array, skin: Skin, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which the traction bound acts at each node, `x` as for `tributary`.
 
-    It is the skin's `fixed_length` plus the `tributary` length of the edges on which the node `rubs`.
+    Contact ends anywhere between two nodes. The bound acts on the whole length that a touching node stands for.
     """
+    tributary(x, skin.middle, out)
     for i in range(out.shape[0]):
-        out[i] = skin.fixed_length[i]
-    for i in range(out.shape[0]):
-        if skin.middle[i] == 1:
-            for n in range(3):
-                if rubs(state, i, i - 1 + n, mu):
-                    row = LENGTHS[n]
-                    out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
-
-
-@compile_loop
-def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
-    """Return whether the traction bound acts on a node's tributary part of an edge, judged by the edge's middle node.
-
-    With steep friction, skin slips at the bound up to the end of contact, which is a line of the mesh. So the bound
-    does not act on an edge beyond it, whose middle is open. A node that touches alone keeps its tributary length,
-    however small the contact is. With less friction, pressure limits the traction there, and contact may end anywhere.
-    """
-    other = 2 * node - edge
-    return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
+        out[i] += skin.fixed_length[i]
 
 
 @compile_loop
@@ -107,7 +90,7 @@ def assemble_contact_system(
                 for s in range(COLUMNS):
                     right[s] -= value * steps[j, s]
         if state[i] == SHEAR_LIMITED:
-            add_bound(i, sense[i] * load.tau, load.mu, skin.middle, state, spot, system, square[r])
+            add_bound(i, sense[i] * load.tau, skin.middle, spot, system, square[r])
     return f
 
 
@@ -135,9 +118,7 @@ def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: Contact
 
 
 @subroutine
-def add_bound(
-    i: int, drag: float, mu: float, middle: Narrow, state: Narrow, spot: Indices, system: ContactSystem, square: Array
-) -> None:
+def add_bound(i: int, drag: float, middle: Narrow, spot: Indices, system: ContactSystem, square: Array) -> None:
     """Add the traction bound to the row `square` (f,) of node i: `drag` [MPa] times the node's length of skin.
 
     `spot` (2 k,) is the position of each skin unknown in the system, -1 where its step is prescribed.
@@ -145,8 +126,8 @@ def add_bound(
     r, steps = spot[2 * i], system.steps
     right = system.right[r]
     right[0] += drag * system.length[i]
-    for edge in range(max(i - 1, 0), min(i + 2, state.shape[0])):
-        if middle[edge] != 1 or not rubs(state, edge, i, mu):
+    for edge in range(max(i - 1, 0), min(i + 2, middle.shape[0])):
+        if middle[edge] != 1:
             continue
         for n in range(3):
             x = 2 * (edge - 1 + n)

@@ -54,7 +54,7 @@ def audits(
     push = max(float(state.normal.max(initial=0.0)), np.finfo(float).tiny)
     length = np.empty(len(state.state))
     x = np.ascontiguousarray(state.place(condensed)[:, 0])
-    bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
+    bounded_length(x, finger.newton.skin, length)
     # Open skin may overhang, with a negative length along the surface, which has no friction limit.
     limit = FrictionLaw(float(state.load.mu), state.load.tau).limit(state.normal, np.maximum(length, 0.0))
     return {

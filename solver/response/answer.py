@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver._kernels.contact_system import tributary
+from solver._kernels.contact_system import bounded_length
 from solver.accuracy import audits
 from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
@@ -99,10 +99,9 @@ def prediction(
 
 def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
     """Return positions, tractions and contact states of the skin that may touch."""
-    condensed, touching = finger.newton.condensed, state.touching
-    place, length = state.place(condensed), np.empty(len(state.state))
-    tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
-    length = np.where(touching, length + condensed.fixed_length, 1.0)
+    place, touching, length = state.place(finger.newton.condensed), state.touching, np.empty(len(state.state))
+    bounded_length(np.ascontiguousarray(place[:, 0]), finger.newton.skin, length)
+    length = np.where(touching, length, 1.0)
     return Skin(
         x=place[:, 0],
         gap=np.where(touching, 0.0, place[:, 1] - state.load.depth),

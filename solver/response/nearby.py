@@ -89,7 +89,7 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
     system = newton.system
-    bounded_length(x, newton.skin, state.state, load.mu, system.length)
+    bounded_length(x, newton.skin, system.length)
     count = assemble_contact_system(
         newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_arguments(load),
         position, system,

@@ -158,6 +158,13 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
     assert large.sed_ending == pytest.approx(small.sed_ending, rel=0.03)
 
 
+def test_a_shear_limit_acts_alike_on_both_sides_of_a_friction_of_one():
+    capped = Scene(loading=Loading(1.5, "-x"), friction=Friction(1.0, 0.003), solve=Solve("finite", tolerance=0.3))
+    below, above = solve_many(replace(capped, friction=Friction(mu, 0.003)) for mu in (1.0 - 1e-9, 1.0 + 1e-9))
+    assert above.sed_ending == pytest.approx(below.sed_ending, rel=1e-8)
+    assert above.tangential_force == pytest.approx(below.tangential_force, rel=1e-8)
+
+
 @pytest.mark.parametrize(("least_dofs", "known"), [(5_000, True), (1e9, False)])
 def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
     monkeypatch, least_dofs, known

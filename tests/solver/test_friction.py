@@ -134,7 +134,7 @@ def drive_finite(law, newton):
     points, states = [], rub(newton, law)
     for last_state, state in pairwise(states):
         place, bone_travel = state.place(newton.condensed), state.load.travel - last_state.load.travel
-        length = np.maximum(oracle.bounded_length(place[:, 0], state.touching, law.mu), 0.0)
+        length = np.maximum(oracle.tributary(place[:, 0]), 0.0)
         slip = place[:, 0] - last_state.place(newton.condensed)[:, 0] - bone_travel
         drag, push = state.reaction.T
         touching = state.state != OPEN  # elsewhere the body's own unbalanced forces, round-off of the iterations

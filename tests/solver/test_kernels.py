@@ -253,7 +253,7 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
         "state, zero = np.zeros(3, np.int32), np.zeros(3)\n"
         "skin, load = Skin(state, state, zero), LoadArguments(0.1, 0.1, 0.1, 1)\n"
         "contact_system.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
-        "contact_system.bounded_length(zero, skin, state, 0.1, zero)\n"
+        "contact_system.bounded_length(zero, skin, zero)\n"
         "states = ContactStates(state, state.copy(), np.zeros((3, 2)))\n"
         "active_set.update_contact_states(states, SkinPosition(zero, zero, zero), load, skin, zero.copy())\n"
     )

@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from solver._kernels.contact_system import STEEP
-from solver.arrays import Array, Flags, Indices
+from solver.arrays import Array, Indices
 from solver.body.finite import FiniteBody
 from solver.constitutive import shape, slopes
 from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
@@ -142,23 +142,6 @@ def tributary(x: Array) -> Array:
     for start in range(0, len(x) - 2, 2):
         out[start : start + 3] += np.array([1.0, 4.0, 1.0]) / 3.0 * (slopes @ x[start : start + 3])
     return out
-
-
-def bounded_length(x: Array, touching: Flags, mu: float) -> Array:
-    """Return the length of skin on which a bound acts that each node stands for (k,).
-
-    Where friction is steep, without edges whose middle does not touch, but for nodes beside no other.
-    """
-    if mu <= STEEP:
-        return tributary(x)
-    length = np.zeros(len(x))
-    neighbours = np.r_[False, touching, False]
-    isolated = ~neighbours[:-2] & ~neighbours[2:]
-    isolated[1::2] = True
-    for start in range(0, len(x) - 2, 2):
-        edge = slice(start, start + 3)
-        length[edge] += np.where(touching[start + 1] | isolated[edge], tributary(x[edge]), 0.0)
-    return length
 
 
 def update_contact_states(
