@@ -59,7 +59,8 @@ def problems(folder: Path) -> tuple[str, ...]:
     """
     recording = Recording.open(folder)
     if not is_sealed(folder):
-        return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}")
+        seals = "" if recording.end is None else f"; 'daq-app resume {folder} --end' seals it"
+        return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}{seals}")
     return (
         *changed_files(recording),
         *recording.losses,

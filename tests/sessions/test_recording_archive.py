@@ -44,6 +44,11 @@ def writable(path):
 # ---- what sealing makes
 
 
+def never_sealed(folder):
+    """What is said of a session that has ended, with the command that seals it."""
+    return f"the session was never sealed: there is no MANIFEST.json; 'daq-app resume {folder} --end' seals it"
+
+
 def test_a_sealed_session_has_no_problems_and_its_files_are_read_only(sealed):
     assert problems(sealed) == ()
     assert sorted(path.name for path in sealed.iterdir()) == [
@@ -238,7 +243,7 @@ def test_a_copy_that_came_out_different_is_never_called_sealed(tmp_path, monkeyp
     monkeypatch.setattr(archive, "write_copy", wrong_copy)
     with pytest.raises(RecordingError, match=r"could not be sealed: raw of the readings 0 to 99 .* differs"):
         seal(folder)
-    assert problems(folder) == ("the session was never sealed: there is no MANIFEST.json",)
+    assert problems(folder) == (never_sealed(folder),)
     monkeypatch.undo()
     seal(folder)
     assert problems(folder) == ()
@@ -278,7 +283,7 @@ def test_sealing_that_was_cut_short_at_any_step_is_begun_anew(tmp_path, monkeypa
     monkeypatch.setattr(archive, step, killed)
     with pytest.raises(Killed):
         seal(folder)
-    assert problems(folder) == ("the session was never sealed: there is no MANIFEST.json",)
+    assert problems(folder) == (never_sealed(folder),)
     monkeypatch.undo()
     seal(folder)
     assert problems(folder) == ()
@@ -343,7 +348,7 @@ def test_a_copy_whose_bytes_rotted_is_named_by_its_own_check_sum(sealed):
 
 
 def test_a_session_that_was_never_sealed_is_named(tmp_path):
-    assert problems(ended(tmp_path / "s")) == ("the session was never sealed: there is no MANIFEST.json",)
+    assert problems(ended(tmp_path / "s")) == (never_sealed(tmp_path / "s"),)
 
 
 def test_a_manifest_that_cannot_be_read_is_named(sealed):
