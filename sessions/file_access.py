@@ -111,13 +111,18 @@ def failure_sentence(error: OSError) -> str:
 
 @contextmanager
 def name_failure(
-    kind: type[Exception], what: str, more: str = "", failures: tuple[type[Exception], ...] = (OSError,)
+    kind: type[Exception],
+    what: str,
+    more: str = "",
+    failures: tuple[type[Exception], ...] = (OSError,),
+    *,
+    new: bool = False,
 ) -> Generator[None]:
-    """Raise `kind` for a file that cannot be reached inside: what failed, why, what mends it, and what else may."""
+    """Raise `kind` for a file, perhaps a `new` one, that cannot be reached: what, why, what mends it, what else may."""
     try:
         yield
     except failures as error:
-        raise kind(f"{what} ({getattr(error, 'strerror', None) or error}); {remedy(error)}{more}") from error
+        raise kind(f"{what} ({getattr(error, 'strerror', None) or error}); {remedy(error, new=new)}{more}") from error
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:

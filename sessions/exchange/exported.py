@@ -186,5 +186,7 @@ def _remedy(error: Exception) -> str:
 
 
 def _sentence(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return f"{Path(error.filename).name}: {error.strerror.lower()}"
     sentence = " ".join(str(error).split())
     return f"{sentence} is missing" if isinstance(error, KeyError) else sentence

@@ -54,7 +54,7 @@ def _store(folder: Path, name: str, content: bytes) -> Path:
     if name in RECORDED or not re.fullmatch(r"[a-z0-9][a-z0-9_-]*\.[a-z0-9]+", name):
         raise ValueError(f"{name} is no name for a file made from a recording")
     path = folder / name
-    with name_failure(RecordingError, f"{path} cannot be written"):
+    with name_failure(RecordingError, f"{path} cannot be written", new=True):
         write_whole(path, content)
         if is_sealed(folder):
             list_in_manifest(folder, (name,))

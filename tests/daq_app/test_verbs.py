@@ -286,6 +286,13 @@ def test_an_import_that_fills_the_disk_says_that_nothing_is_left_of_it(session, 
         assert not (tmp_path / "again").exists()
 
 
+def test_an_export_that_lacks_a_file_is_refused_by_the_files_name(session, tmp_path, capsys):
+    assert run(["export", str(session), "--format", "csv", "--out", str(tmp_path / "csv")]) == 0
+    (tmp_path / "csv" / "events.csv").unlink()
+    assert run(["import", str(tmp_path / "csv"), "--out", str(tmp_path / "again")]) == 1
+    assert "(events.csv: no such file or directory); export the session anew" in capsys.readouterr().err
+
+
 def test_a_demonstration_that_is_stopped_after_it_recorded_says_where_that_is(tmp_path, capsys, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
