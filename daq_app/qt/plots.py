@@ -1,6 +1,7 @@
 """Plots that the wheel zooms and the mouse moves; a field of the finger as a curve, and which field it is."""
 
 from collections.abc import Callable, Sequence
+from math import floor, log10
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,19 @@ ALL_TRIALS, OWN, FIXED = range(3)
 LARGEST = 1e6  # in a number field: far beyond any stress or strain of tissue
 
 
+class RoomyAxis(pg.AxisItem):
+    """A vertical axis whose numbers are no nearer to each other than a line of them is high."""
+
+    def tickSpacing(self, least: float, greatest: float, size: float) -> list[tuple[float, float]]:  # noqa: N802  Qt's
+        """Return spacings and offsets of the numbers on `size` pixels, the widest first."""
+        spacings = pg.AxisItem.tickSpacing(self, least, greatest, size)
+        needed = QFontMetricsF(self.style["tickFont"]).height() * (greatest - least) / size
+        if not spacings or spacings[0][0] >= needed:
+            return spacings
+        power = 10.0 ** floor(log10(needed))
+        return [(next(step * power for step in (1, 2, 5, 10) if step * power >= needed), 0.0)]
+
+
 def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types
     """Give an axis the colours of a theme and a type face."""
     axis.setTickFont(type_face)
@@ -54,7 +68,7 @@ class ZoomedPlot(pg.PlotWidget):
     read: Callable[[float], str] | None = None
 
     def __init__(self, tokens: Tokens) -> None:
-        pg.PlotWidget.__init__(self, background=tokens.surface)
+        pg.PlotWidget.__init__(self, background=tokens.surface, axisItems={"left": RoomyAxis("left")})
         self._names: Any = None
         self._text = tokens.text
         self.setMinimumSize(120, round(100 + 160 * (type_scale() - 1)))  # the axes take what the type needs

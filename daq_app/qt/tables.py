@@ -84,8 +84,9 @@ class TextTable(CopyableTable):
             self._shown = lines
             with QSignalBlocker(self.selectionModel()):
                 self._cells.setRowCount(0)
+                right = [_is_of_numbers(column) for column in zip(*lines, strict=True)]
                 for cells in lines:
-                    self._cells.appendRow([_item(words) for words in cells])
+                    self._cells.appendRow([_item(*cell) for cell in zip(cells, right, strict=True)])
                 self.resizeColumnsToContents()
         now = self._sorted.mapToSource(self.currentIndex())
         if 0 <= at < len(lines) and at != now.row():
@@ -101,9 +102,14 @@ class TextTable(CopyableTable):
             self.chosen.emit(self._sorted.mapToSource(now).row())
 
 
-def _item(words: str) -> QStandardItem:
+def _is_of_numbers(column: Sequence[str]) -> bool:
+    """Say whether every cell is a number: beside a long text one at the right edge of its column is out of sight."""
+    return all(number_in(words) is not None or words in ("", "–") for words in column)
+
+
+def _item(words: str, right: bool) -> QStandardItem:
     item = QStandardItem(words)
-    if number_in(words) is not None or words == "–":
+    if right:
         item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     return item
 

@@ -1,12 +1,17 @@
 """Letters that Qt's own style writes are whole, and words have as many lines as they need."""
 
+from itertools import pairwise
+
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFontMetricsF
 from PySide6.QtWidgets import QMainWindow, QStyleFactory, QTabWidget, QWidget
 
 from daq_app.qt import tokens
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.parts import WrappedLabel
+from daq_app.qt.plots import ZoomedPlot
+from daq_app.qt.tables import TextTable
 from tests.daq_app.qt.test_window_for_everybody import contrast
 
 pytestmark = pytest.mark.qt
@@ -69,3 +74,25 @@ def test_every_key_is_seen_at_once_where_the_window_has_room_for_the_list(applic
     application.processEvents()
     assert (keys._area.verticalScrollBar().maximum() > 0) is scrolled
     assert keys.height() <= height
+
+
+@pytest.mark.usefixtures("application")
+def test_numbers_stand_at_the_right_of_a_column_of_numbers_and_at_the_left_above_a_long_text():
+    table = TextTable("facts", ("name", "value", "digits"))
+    table.show_lines((("\u00b5", "0.48", "2"), ("material", 20 * "a long text ", "\u2013")))
+    cells = table.model()
+    places = [cells.data(cells.index(0, at), Qt.ItemDataRole.TextAlignmentRole) for at in range(3)]
+    right = Qt.AlignmentFlag.AlignRight
+    assert [place is not None and right in Qt.AlignmentFlag(place) for place in places] == [False, False, True]
+
+
+@pytest.mark.usefixtures("application")
+@pytest.mark.parametrize("greatest", [0.9, 10.0, 28.0])
+@pytest.mark.parametrize("height", [30, 50, 90, 300])
+def test_numbers_of_a_low_plot_do_not_lie_on_each_other(height, greatest):
+    axis = ZoomedPlot(tokens.LIGHT).getPlotItem().getAxis("left")
+    line = QFontMetricsF(axis.style["tickFont"]).height()
+    _, always = axis.tickValues(0.0, greatest, height)[0]  # of finer ones pyqtgraph writes those that find room
+    apart = [(b - a) * height / greatest for a, b in pairwise(always)]
+    assert min(apart, default=line) >= line
+    assert height < 90 or len(always) >= 3
