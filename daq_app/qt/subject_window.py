@@ -323,6 +323,11 @@ class RulerCheck(QWidget):
         screen_name = screen.name() or tr("without a name")
         say(self._wrong, tr("Screen: {name}, {words}.", name=screen_name, words=millimetres(screen).words))
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Let the Enter that keeps a length mean nothing else: the page behind would take it."""
+        if event.key() not in GIVING:
+            super().keyPressEvent(event)
+
     def _keep(self) -> None:
         text = self._measured.text().strip().replace(",", ".")
         try:

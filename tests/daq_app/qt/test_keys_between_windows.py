@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from daq_app.qt.preferences import settings
 from daq_app.qt.start import SIMULATED_BENCH
 from daq_app.recorder.messages import Connect, Disconnect
 from sessions.recording import Recording
@@ -242,6 +244,21 @@ def test_the_page_of_the_next_session_has_no_code_proposes_the_next_and_enter_be
     QTest.keyClick(driver.window.page.subject, ENTER)
     assert "never a name" in driver.window.page.frames["Subject"].words.text()
     assert driver.session is None
+
+
+def test_the_enter_that_keeps_the_rulers_length_begins_no_session(driver):
+    window = driver.window
+    QTest.keyClicks(window.page.subject, "P07")
+    window.act("ruler")
+    measured = window.subject.ruler._measured
+    QTest.keyClicks(measured, "100")
+    QTest.keyClick(measured, ENTER)
+    driver.until(lambda: not window.subject.measuring, "the end of the measuring")
+    end = time.monotonic() + 0.5
+    driver.until(lambda: time.monotonic() > end)
+    settings().clear()
+    assert driver.session is None
+    assert driver.view.lamp.words == "not recording"
 
 
 def test_enter_in_the_address_connects_what_was_typed_and_a_wrong_one_is_named_and_can_be_mended(driver):
