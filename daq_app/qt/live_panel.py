@@ -220,6 +220,7 @@ class LivePanel(Panel):
             self._forces_shown = shown
             self._pictures.setVisible(shown)
             self.bar.show_forces(shown)
+            self._show_acts()
 
     def show_seconds(self, seconds: int) -> None:
         self._seconds = seconds
@@ -303,10 +304,10 @@ class LivePanel(Panel):
         self.finger.show_model(picture, row, words, clock)
 
     def _show_acts(self) -> None:
-        """Show the acts where the pictures keep their least height beneath them; their keys serve everywhere."""
+        """Show the acts where there are pictures that keep their least height beneath them; their keys always serve."""
         inside = self.contentsRect().marginsRemoved(self._rows.contentsMargins())
         least = self.bar.height_with_acts(inside.width()) + self._rows.spacing() + self.drawer.least_height()
-        shown = self.height() >= self._least_for_acts and inside.height() >= least
+        shown = self._forces_shown and self.height() >= self._least_for_acts and inside.height() >= least
         for act in (self.bar.finite, self.bar.length, self.bar.hold):
             act.setVisible(shown)
 
