@@ -46,6 +46,7 @@ def test_the_letters_of_a_tab_that_is_not_chosen_are_whole(application):
     metrics = QFontMetricsF(widget.tabBar().font())
     below = metrics.tightBoundingRect("gjpqy").bottom() - metrics.tightBoundingRect("HHHH").bottom()
     assert rows[1] - rows[0] > below - 0.5
+    widget.hide()
 
 
 @pytest.mark.usefixtures("application")
@@ -62,6 +63,7 @@ def test_words_take_the_lines_they_need_at_the_width_they_have_now(keeps):
     fresh.resize(400, 20)
     fresh.show_text(10 * "several words ")
     assert shown.height() == fresh.height()
+    window.hide()
 
 
 @pytest.mark.parametrize(("height", "scrolled"), [(1000, False), (500, True)])
@@ -74,6 +76,7 @@ def test_every_key_is_seen_at_once_where_the_window_has_room_for_the_list(applic
     application.processEvents()
     assert (keys._area.verticalScrollBar().maximum() > 0) is scrolled
     assert keys.height() <= height
+    window.hide()  # nothing may lie over the windows of other tests
 
 
 @pytest.mark.usefixtures("application")
