@@ -156,6 +156,8 @@ def read_export(path: Path) -> ExportedSession | None:
             except _DAMAGED as error:
                 sentence = f"{path} cannot be read as an export ({_sentence(error)}); {_remedy(error)}"
                 raise ImportRefused(sentence) from error
+    if path.suffix == ".nwb" or any(path.glob("*.nwb")):
+        raise ImportRefused(f"{path} is an export for other programs alone; give one as csv, bids or hdf5")
     if path.is_dir():
         raise ImportRefused(f"{path} holds no export of this program; give one, or a CSV file")
     return None

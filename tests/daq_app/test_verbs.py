@@ -293,6 +293,14 @@ def test_an_export_that_lacks_a_file_is_refused_by_the_files_name(session, tmp_p
     assert "(events.csv: no such file or directory); export the session anew" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["nwb", "nwb/session.nwb"])
+def test_an_export_that_does_not_come_back_is_said_to_be_one(tmp_path, capsys, name):
+    (tmp_path / "nwb").mkdir()
+    (tmp_path / "nwb" / "session.nwb").write_bytes(b"\x89HDF")
+    assert run(["import", str(tmp_path / name), "--out", str(tmp_path / "again")]) == 1
+    assert "is an export for other programs alone; give one as csv, bids or hdf5" in capsys.readouterr().err
+
+
 def test_a_demonstration_that_is_stopped_after_it_recorded_says_where_that_is(tmp_path, capsys, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
