@@ -103,11 +103,15 @@ class Terminal:
             "pause": steps.Pause(),
             "resume": steps.Resume(),
         }
+        if word == "abort" and not rest.strip():  # it seals the session, and nothing goes on after that
+            self._print("say why: abort needs a reason")
+            return None
         if word in orders:
             return orders[word]
         event = self._parse_enter() if line == "" else self._parse_answer(line)
         if event is None:
-            self._print(f"'{line}' means nothing now. {HELP}" if line else "Nothing is waiting for Enter now.")
+            due = (self._command and self._question(self._command)) or HELP
+            self._print(f"'{line}' means nothing now. {due}" if line else f"Nothing is waiting for Enter now. {due}")
         return event
 
     def _parse_enter(self) -> steps.Event | None:

@@ -72,6 +72,19 @@ def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():
     assert "Nothing is waiting for Enter now" in said
 
 
+@pytest.mark.parametrize("line", ["", "good", "1 0"])
+def test_a_line_that_means_nothing_is_told_what_is_asked_for(line):
+    events, said = meant(AskScore(TRIAL, ENDS), line)
+    assert events == ()
+    assert said.count(f"Score from 0 ({ENDS[0]}) to 100 ({ENDS[1]}):") == 2  # as asked, and once more
+
+
+def test_a_session_is_ended_for_good_only_with_a_reason():
+    events, said = meant(AskStroke(TRIAL), "abort ")
+    assert events == ()
+    assert "say why: abort needs a reason" in said
+
+
 def test_a_note_in_another_encoding_than_the_terminals_is_kept_with_escapes_and_the_next_line_is_heard():
     lines = io.TextIOWrapper(io.BytesIO("note müde\npause\n".encode("latin-1")), encoding="utf-8")
     takes_all(lines)
