@@ -63,6 +63,12 @@ def test_a_stimulus_stroked_twice_is_one_point_of_a_correlation_and_not_two(repo
 def test_paths_that_all_agree_are_not_said_to_differ(report):
     alike = [replace(one, r=0.9) for one in report.experiments[0].paths]
     assert paths_sentence("stickiness", alike).endswith("all agree within 0.005.")
+    turned = [
+        replace(one, r=-one.r, within=None) if n else replace(one, within=None, usual=True)
+        for n, one in enumerate(alike)
+    ]
+    said = paths_sentence("stickiness", turned)
+    assert f", {len(alike) - 1} with another sign than the usual path; 2 of these differ" in said
 
 
 def test_a_correlation_over_states_that_no_finger_can_be_in_says_how_many_there_are(report):

@@ -253,15 +253,18 @@ def paths_table(named: Iterable[Named]) -> Table | None:
 
 
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
-    """Return the distribution in a sentence."""
-    whole = spread(correlations(findings))
+    """Return the distribution in a sentence, and how many paths turn the sign of the usual one."""
+    values = correlations(findings)
+    whole, usual = spread(values), next((r for r, one in zip(values, findings, strict=True) if one.usual and r), 0.0)
     start = f"{capital(name)}: of {len(findings)} paths of the analysis"
     if whole is None:
         return f"{start} none gives a correlation."
+    turned = sum(r is not None and r * usual < 0.0 for r in values)
+    turn = f", {turned} with another sign than the usual path" if turned else ""
     differ = "all agree within" if whole.distinct == 1 else f"{whole.distinct} of these differ by more than"
     return (
         f"{start} {whole.correlated} give a correlation, from {correlation(whole.least)} to "
-        f"{correlation(whole.greatest)}, median {correlation(whole.median)}; {differ} {SAME:g}."
+        f"{correlation(whole.greatest)}, median {correlation(whole.median)}{turn}; {differ} {SAME:g}."
     )
 
 
