@@ -60,7 +60,8 @@ class Psychometric:
     # From there to three choices of four, lapses taken away, in log ratio; 0 where answers step between two levels [-].
     jnd: IntervalEstimate | None = None
     lapse: IntervalEstimate | None = None  # share of answers by chance [-]
-    correlation: IntervalEstimate | None = None  # of answers to one pair in one order; 0: binomial scatter [-]
+    # Of answers to one pair in one order; 0: binomial scatter; None where no scatter makes them likelier [-]
+    correlation: IntervalEstimate | None = None
     order: IntervalEstimate | None = None  # log ratio that coming second adds; None where orders are not known [-]
     rises: bool = True  # choices go with the magnitude; False: against it
     log_likelihood: float | None = None
@@ -85,7 +86,7 @@ def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychom
         pse=task.profile(_PSE),
         jnd=_jnd(slope, task.steepest, task.reach),
         lapse=task.profile(_LAPSE),
-        correlation=_correlation(task.profile(_SCATTER)),
+        correlation=_correlation(task.profile(_SCATTER)) if task.scatters else None,
         order=task.profile(_ORDER) if task.ordered else None,
         rises=slope.value > 0.0,
         log_likelihood=task.likelihood,
@@ -140,6 +141,12 @@ class _Task:
         """Say whether all answers are alike, or the JND lies beyond everything that was compared."""
         return self.k.sum() in (0.0, self.n.sum()) or abs(float(self.best[_SLOPE])) * self.reach < QUARTILE
 
+    @property
+    def scatters(self) -> bool:
+        """Say whether the likelihood depends on the scatter: neither a step does nor single answers."""
+        none, most = (self._at({_SCATTER: end}, self.best)[1] for end in (0.0, self.bounds[_SCATTER][1]))
+        return abs(most - none) > _SAME
+
     def profile(self, which: int) -> IntervalEstimate:
         """Return a parameter with its interval of the profile likelihood."""
         value = float(self.best[which])
@@ -174,8 +181,9 @@ class _Task:
         """Return where the adjusted likelihood has dropped to an end; the edge of what may be; None beyond."""
         edge = self.bounds[which][1 if sense > 0.0 else 0]
         value, near = float(self.top[which]), self.top
+        beyond = None if which in (_PSE, _ORDER) else edge
         if value == edge:
-            return edge
+            return beyond
         drops = {value: -self.drop}
 
         def drop(at: float) -> float:
@@ -194,7 +202,7 @@ class _Task:
             if outer == edge:
                 break
             inner, step = outer, 2.0 * step
-        return None if which in (_PSE, _ORDER) else edge
+        return beyond
 
     def _at(
         self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False

@@ -192,3 +192,19 @@ def test_a_jnd_that_the_answers_do_not_bound_has_no_upper_end():
     found = psychometric([Level(-0.3, 3, 10), Level(-0.1, 4, 10), Level(0.1, 6, 10), Level(0.3, 7, 10)], lapse=0.0)
     assert found.jnd.high is None
     assert found.jnd.low > 0.0
+
+
+def test_answers_that_are_single_or_all_one_way_tell_no_scatter():
+    """A step has the same likelihood, 1, whatever the scatter; one answer has no other to go with."""
+    sides = [(x, side) for x in (-0.4, -0.2, 0.2, 0.4) for side in (1, -1)]
+    step = psychometric([Level(x, 10 * (x > 0.0), 10, side) for x, side in sides])
+    single = psychometric([Level(x, int(x > 0.0), 1) for x, side in sides if side > 0])
+    assert (step.correlation, single.correlation) == (None, None)
+    assert step.pse is not None
+    assert psychometric([Level(x, 2 + 6 * (x > 0.0), 10, side) for x, side in sides]).correlation is not None
+
+
+def test_an_order_at_the_end_of_what_was_searched_is_bounded_on_one_side():
+    found = psychometric([Level(x, 10 * (side > 0), 10, side) for x in (-0.4, -0.2, 0.2, 0.4) for side in (1, -1)])
+    assert found.order.low is None
+    assert found.order.high < 0.0

@@ -204,15 +204,20 @@ def _row(who: str, one: Psychometric, notes: Notes) -> Row:
         _cell(one.jnd, one, _percent, 0, notes),
         _cell(one.lapse, one, lambda share: 100.0 * share, 1, notes),
         _cell(one.order, one, _percent, 1, notes),
-        _cell(one.correlation, one, float, 2, notes),
+        _cell(one.correlation, one, float, 2, notes, "answers to a pair are single, or all one way"),
     )
 
 
 def _cell(
-    profile: IntervalEstimate | None, one: Psychometric, unit: Callable[[float], float], after: int, notes: Notes
+    profile: IntervalEstimate | None,
+    one: Psychometric,
+    unit: Callable[[float], float],
+    after: int,
+    notes: Notes,
+    missing: str = "orders are not known",
 ) -> Cell:
     if profile is None:
-        return notes.number(None, str, one.reason or "orders are not known")
+        return notes.number(None, str, one.reason or missing)
     ends = None if profile.ends is None else (unit(profile.ends[0]), unit(profile.ends[1]))
     sides = [f"above {digits(unit(profile.low), after)}"] if profile.low is not None else []
     sides += [f"below {digits(unit(profile.high), after)}"] if profile.high is not None else []
