@@ -23,7 +23,7 @@ from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, scroll_area, vbox
+from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, say, scroll_area, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, MODEL, Tokens, px, theme_of
@@ -304,11 +304,14 @@ class TrialsColumn(QWidget):
         self.points: Any = pg.ScatterPlotItem()
         self.points.sigClicked.connect(self._point_clicked)
         self.relation.addItem(self.points)
-        self.none = label(tr("No trial has both a score and an answer of the model."), wrap=True)
+        self.none = label("", wrap=True)
         self.none.setAlignment(Qt.AlignmentFlag.AlignTop)
-        head, below = label(tr("Trials"), "section"), label(tr("At the plan's depth, against the score"), "section")
+        head, self._below = (
+            label(tr("Trials"), "section"),
+            label(tr("At the plan's depth, against the score"), "section"),
+        )
         plot = (self.relation, 2), (self.none, 2)
-        vbox(head, (self.list, 3), below, self.responses, self.errors, *plot, on=self)
+        vbox(head, (self.list, 3), self._below, self.responses, self.errors, *plot, on=self)
 
     def show_state(self, state: AnalystState) -> None:
         listed = tuple(words_of(row) for row in rows(state))
@@ -330,6 +333,11 @@ class TrialsColumn(QWidget):
         self.points.setData([spot | alike for spot in shown])
         self.relation.setVisible(bool(shown))
         self.none.setVisible(not shown)
+        empty = state.report is not None and not listed
+        for widget in (self.list, self._below, self.responses):
+            widget.setHidden(empty)
+        words = tr("No trial has both a score and an answer of the model.")
+        say(self.none, tr("This session has no stroke. Its answers are kept: Export… writes them.") if empty else words)
 
     def _choose(self, row: int) -> None:
         if row >= 0:

@@ -43,6 +43,15 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(w
     assert m.Choose(point.row) in window._work.asked
 
 
+def test_a_session_without_strokes_says_so_and_where_its_answers_are(window):
+    window.take(m.ReportReady("analysed", replace(example(), strokes=(), predictions=())))
+    assert window.trials.none.isVisible()
+    assert window.trials.none.text() == "This session has no stroke. Its answers are kept: Export\u2026 writes them."
+    assert not window.trials.list.isVisible()
+    window.take(m.ReportReady("analysed", example()))
+    assert window.trials.list.isVisible()
+
+
 def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_among_the_numbers(window):
     report = example()
     pressures = {said.stroke: -0.001 * at for at, said in enumerate(report.predictions, 1)}  # [MPa]
