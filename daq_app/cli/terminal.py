@@ -23,6 +23,7 @@ HELP = (
     "undo, of a redo, until the next stroke. "
     "An answer is a number, or 1 or 2 for the first or second of two, or - for no answer."
 )
+PAUSED = "The session is paused. Type resume to go on."
 KEYBOARD = "keyboard"
 CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
 WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
@@ -36,6 +37,7 @@ class Terminal:
         self._forces = forces
         self._print = console.note
         self._command: steps.Command | None = None
+        self._paused = False
         self._lines: deque[str] = deque()
         self.closed = False  # nobody can type any more
         # A daemon: a blocked read of stdin must not keep the program alive.
@@ -60,6 +62,12 @@ class Terminal:
                 self._print(f"The session ends: {reason}.")
             case _:
                 pass
+
+    def follow(self, state: str) -> None:
+        """Say that the session is paused, once it is."""
+        before, self._paused = self._paused, state == "paused"
+        if self._paused and not before:
+            self._print(PAUSED)
 
     def _question(self, command: steps.Command) -> str | None:
         """Return what a command asks for in words; None for one that asks for nothing."""
@@ -110,13 +118,13 @@ class Terminal:
             return orders[word]
         event = self._parse_enter() if line == "" else self._parse_answer(line)
         if event is None:
-            due = (self._command and self._question(self._command)) or HELP
+            due = PAUSED if self._paused else (self._command and self._question(self._command)) or HELP
             self._print(f"'{line}' means nothing now. {due}" if line else f"Nothing is waiting for Enter now. {due}")
         return event
 
     def _parse_enter(self) -> steps.Event | None:
         """Return what Enter alone means."""
-        match self._command:
+        match None if self._paused else self._command:
             case steps.AskBegin():
                 return steps.Begin()
             case steps.AskMount(trial):
@@ -285,7 +293,9 @@ class _Attendance:
             self._terminal = Terminal(self._console, forces=begun.plan.forces)
 
     def _show_status(self, status: Status) -> None:
-        if self._terminal is None and self._begun is not None:
+        if self._terminal is not None:
+            self._terminal.follow(status.state)
+        elif self._begun is not None:
             done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
             who = self._begun.plan.subject
             self._console.progress(done, f"{who}: {status.state}, {status.safe.readings} readings safe")

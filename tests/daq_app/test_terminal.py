@@ -79,6 +79,19 @@ def test_a_line_that_means_nothing_is_told_what_is_asked_for(line):
     assert said.count(f"Score from 0 ({ENDS[0]}) to 100 ({ENDS[1]}):") == 2  # as asked, and once more
 
 
+def test_a_pause_is_told_once_with_how_it_ends_and_enter_does_nothing_meanwhile():
+    out = io.StringIO()
+    terminal = Terminal(Console(as_json=False, err=out), forces=False, lines=io.StringIO("\n"))
+    while not terminal.closed:
+        time.sleep(0.001)
+    terminal.show(AskStroke(TRIAL))
+    for state in ("ready", "paused", "paused"):
+        terminal.follow(state)
+    assert out.getvalue().count("The session is paused. Type resume to go on.") == 1
+    assert terminal.poll() == ()
+    assert out.getvalue().endswith("Nothing is waiting for Enter now. The session is paused. Type resume to go on.\n")
+
+
 def test_a_session_is_ended_for_good_only_with_a_reason():
     events, said = meant(AskStroke(TRIAL), "abort ")
     assert events == ()
