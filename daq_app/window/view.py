@@ -122,7 +122,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
-        silent=_is_silent(bench),
+        silent=bench.link == "lost" or _is_silent(bench),
         counters=(*((name, f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),

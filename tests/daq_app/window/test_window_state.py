@@ -247,6 +247,7 @@ def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_st
     assert silent.bench.silent
     assert silent.banner.grade == "wrong"
     assert silent.banner.sentence.startswith("No readings for 2 s: check power and cable")
+    assert derive_view(after(m.Device(INFO, None), m.LinkDown("the cable is out"))).bench.silent
     before = shown(2.2)  # nothing is lost where nothing is recorded
     assert (before.bench.lamp, before.banner) == ("look", None)
 
