@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 
-import numpy as np
-
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation.existence import doubts, folded, refuse_far_beyond, sound, steep
+from solver.continuation.existence import doubts, folded, refuse_far_beyond, sound
 from solver.continuation.finite_states import nearby, roughly, settled_state
 from solver.continuation.small_states import within_reach
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
@@ -36,7 +34,6 @@ from solver.response.answer import (
 )
 from solver.scene import Scene
 
-OFFSET_FINENESS = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
 NEAR_SLIDE = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
@@ -178,22 +175,9 @@ def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: 
 def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes, times: int = 1) -> MeshSolution:
     """Return the settled state on a mesh of `sizing`, started from the coarser solution `below`.
 
-    A load path takes so many `times` the usual steps. Under steep friction a mesh may have no state, because its last
-    node can be neither open nor in contact. Then a mesh with nodes at other places is solved. Raises NoSteadyState,
-    NotConverged, Cancelled.
+    A load path takes so many `times` the usual steps. Raises NoSteadyState, NotConverged, Cancelled.
     """
     start = _starting_solution(scene, sizing, below, meshes)
-    try:
-        return replace(start, state=settled_state(start.finger, scene, start.state, times))
-    except NotConverged:
-        if not steep(sliding_load(scene)):
-            raise
-    lines = sizing.fineness
-    if isinstance(lines, Lines):
-        offset = lines.divide(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
-    else:
-        offset = OFFSET_FINENESS * lines
-    start = _starting_solution(scene, replace(sizing, fineness=offset), below, meshes)
     return replace(start, state=settled_state(start.finger, scene, start.state, times))
 
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
+from solver import Friction, Loading, NoSteadyState, Scene, Solve, solve, solve_many
 from solver.accuracy import adaptivity
 from solver.accuracy.adaptivity import MOST_UNKNOWNS, NestedGrid, adjoint, refine_lines
 from solver.continuation.small_states import WIDE, settled_state
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
-from solver.response import finite_answers, solution
+from solver.response import solution
 from solver.scene.published import scenes
 
 SLIDES = {
@@ -132,26 +132,6 @@ def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monke
     assert all(answer.dofs > 2000 for answer in answers)
     assert not rounds[-1]
     assert len(rounds) < 5
-
-
-def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
-    scene = Scene(friction=Friction(3.0, 0.004), loading=Loading(1.0, "+x"), solve=Solve("finite", evidence="quick"))
-    solve_state, fingers = finite_answers.settled_state, []
-
-    def fail_on_second(finger, *arguments):
-        fingers.append(finger)
-        if len(fingers) == 2:
-            raise NotConverged("the last node is neither open nor touching")
-        return solve_state(finger, *arguments)
-
-    monkeypatch.setattr(finite_answers, "settled_state", fail_on_second)
-    meshes = finite_answers.Meshes()
-    low = finite_answers.coarse_solution(scene, 1.0, 4.0, meshes)
-    fingers[:] = [low.finger]
-    lines = refine_lines(low.finger.geometry, None)
-    top = finite_answers.solution_on(scene, replace(low.sizing, fineness=lines), low, meshes)
-    assert len(top.finger.geometry.lines.arcs) == 2 * len(lines.arcs) - 1
-    assert top.finger.geometry.lines.rows == lines.rows
 
 
 def test_a_tolerance_is_met_with_few_unknowns():
