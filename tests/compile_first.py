@@ -11,9 +11,9 @@ from solver.scene.published import SLIPPERINESS, scene
 if __name__ == "__main__":
     for kinematics in ("small", "finite"):
         published = scene(SLIPPERINESS[-1])
-        asked = replace(published, solve=replace(published.solve, kinematics=kinematics))
-        solve(asked)
-        solve(replace(asked, solve=replace(asked.solve, course="history")))
-        stepper(asked).step(0.05, 0.01)
+        variant = replace(published, solve=replace(published.solve, kinematics=kinematics))
+        solve(variant)
+        solve(replace(variant, solve=replace(variant.solve, course="history")))
+        stepper(variant).step(0.05, 0.01)
     if not any(Path(__file__).parent.rglob("*-pytest-*.pyc")):  # pytest keeps bytecode of its own of every test
         subprocess.run([sys.executable, "-m", "pytest", "-q", "--collect-only"], stdout=subprocess.DEVNULL, check=False)

@@ -19,7 +19,7 @@ STATIC = [
     ("imports go one way", ["lint-imports", "--no-cache"]),
 ]
 # One thread works for a minute and a half. It runs beside all the others, and what it prints comes after theirs.
-BESIDE = [("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES])]
+BACKGROUND = [("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES])]
 # A file's tests stay together, so that what they share is made once. On two cores a third worker runs while the others
 # wait for devices, whose tests go by the clock.
 PARALLEL = ["pytest", "-n", "3", "--dist", "loadfile"]
@@ -37,7 +37,7 @@ LONG = [
 def main() -> int:
     """Run the checks, all of them even when one fails, and return the exit code."""
     long = "--long" in sys.argv[1:]
-    checks, beside = (LONG, []) if long else ([*STATIC, *QUICK], BESIDE)
+    checks, unhurried = (LONG, []) if long else ([*STATIC, *QUICK], BACKGROUND)
     environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # without bytecode each process takes seconds to begin
 
@@ -45,16 +45,16 @@ def main() -> int:
         """Run one check; return whether it passed, what to say of that, and its output if it is to be `quiet`."""
         began = time.monotonic()
         out, err = (subprocess.PIPE, subprocess.STDOUT) if quiet else (None, None)
-        ended = subprocess.run(
+        process = subprocess.run(
             installed(command), cwd=ROOT, env=environment, stdout=out, stderr=err, text=True, check=False
         )
-        passed = ended.returncode == 0
-        return passed, f"{'passed' if passed else 'FAILED'} in {time.monotonic() - began:.0f} s", ended.stdout or ""
+        passed = process.returncode == 0
+        return passed, f"{'passed' if passed else 'FAILED'} in {time.monotonic() - began:.0f} s", process.stdout or ""
 
     compiling = subprocess.Popen([sys.executable, "-m", "tests.compile_first"], cwd=ROOT, env=environment)
     failed = 0
     with ThreadPoolExecutor() as pool:
-        others = [(sentence, command, pool.submit(passes, command, quiet=True)) for sentence, command in beside]
+        background = [(sentence, command, pool.submit(passes, command, quiet=True)) for sentence, command in unhurried]
         for sentence, command in checks:
             if command[0] == "pytest":
                 compiling.wait()
@@ -62,8 +62,8 @@ def main() -> int:
             passed, verdict, _ = passes(command)
             failed += not passed
             print(f"── {verdict}", flush=True)
-        for sentence, command, other in others:
-            passed, verdict, output = other.result()
+        for sentence, command, future in background:
+            passed, verdict, output = future.result()
             failed += not passed
             print(f"── {sentence}: {' '.join(command)}\n{output}── {verdict}", flush=True)
     return 1 if failed else 0
@@ -71,10 +71,10 @@ def main() -> int:
 
 def installed(command: list[str]) -> list[str]:
     """Return the command as installed beside this interpreter, so that no path has to be set."""
-    found = shutil.which(command[0], path=str(Path(sys.executable).parent))
-    if found is None:
+    program = shutil.which(command[0], path=str(Path(sys.executable).parent))
+    if program is None:
         sys.exit(f"{command[0]} is not installed beside {sys.executable}: run 'make test', which installs it")
-    return [found, *command[1:]]
+    return [program, *command[1:]]
 
 
 if __name__ == "__main__":

@@ -40,8 +40,8 @@ def test_every_file_of_code_that_a_page_names_is_there(page):
 
 
 def test_readme_names_every_verb():
-    told = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert [verb for verb in VERBS if not re.search(rf"`(\w+`, `)*{verb}\b", told)] == []
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [verb for verb in VERBS if not re.search(rf"`(\w+`, `)*{verb}\b", readme)] == []
 
 
 def test_readme_names_an_address_of_every_driver():
@@ -53,8 +53,8 @@ def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
     marks = [
         mark for page in PAGES for mark in re.findall(r"<!-- ([\w-]+): begin -->", page.read_text(encoding="utf-8"))
     ]
-    of_the_survey = ["judged"]  # which fills its own table
-    assert sorted(marks) == sorted([*of_the_survey, *(name for names in TABLES.values() for name in names)])
+    survey_marks = ["judged"]  # which fills its own table
+    assert sorted(marks) == sorted([*survey_marks, *(name for names in TABLES.values() for name in names)])
     for page, names in TABLES.items():
         text = (ROOT / "docs" / page).read_text(encoding="utf-8")
         assert all("new" in fill_marks(text, name, "new") for name in names), page

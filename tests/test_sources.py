@@ -10,7 +10,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("daq_app", "drivers", "sessions", "simulators", "solver")
 SCRIPTS = ("benchmarks", "docs")  # no packages of the program, but with the same words
-TESTS = ("tests/drivers", "tests/simulators", "tests/solver")  # whose names say what a value is
 PRIVATE_IN = ("sessions", "daq_app", "drivers", "simulators")  # packages whose underscore names stay in their files
 GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 ROWS = [line.split("|") for line in GLOSSARY.splitlines() if line.startswith("|")]
@@ -60,24 +59,22 @@ def test_the_glossary_names_what_a_thing_is_not_called():
 
 
 def test_no_name_says_only_what_happened_to_a_value(trees):
-    every = trees | parsed((*SCRIPTS, *TESTS))
+    every = trees | parsed((*SCRIPTS, "tests"))
     names = {
         file: {name.strip("_").lower() for name in identifiers(file, tree)}
         & (PARTICIPLES - HELD_NODES if "solver" in file.parts else PARTICIPLES)
         for file, tree in every.items()
     }
     assert len(every) > 300
-    assert {str(file): found for file, found in names.items() if found} == {}
+    assert {str(file): participles for file, participles in names.items() if participles} == {}
 
 
 def test_no_name_of_the_column_not_this_is_used(trees):
-    found = []
+    uses = []
     for file, tree in (trees | parsed(SCRIPTS)).items():
         names = {name.strip("_") for name in identifiers(file, tree)} & set(NOT_THIS)
-        found += [
-            f"{file}: {name}" for name in sorted(names - (ONLY_IN_SOLVER if file.parts[0] == "solver" else set()))
-        ]
-    assert found == []
+        uses += [f"{file}: {name}" for name in sorted(names - (ONLY_IN_SOLVER if file.parts[0] == "solver" else set()))]
+    assert uses == []
 
 
 # ---- names that begin with an underscore belong to the file or the class that defines them
@@ -117,13 +114,13 @@ def inherited_private_names(classes: dict[str, ast.ClassDef]) -> Iterator[str]:
     """Yield each underscore name of a base class that a class derived from it overrides or uses."""
     for name, body in classes.items():
         bases = [base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "") for base in body.bases]
-        theirs = {one: base for base in bases if base in classes for one in defined_in(classes[base])}
+        theirs = {member: base for base in bases if base in classes for member in defined_in(classes[base])}
         used = {node.attr for node in of_self(body)} | defined_in(body)
-        yield from (f"{name} takes {one} of {theirs[one]}" for one in sorted(used & set(theirs)))
+        yield from (f"{name} takes {member} of {theirs[member]}" for member in sorted(used & set(theirs)))
 
 
 def test_no_file_imports_a_private_name_of_another(trees):
-    assert not [f"{path} {said}" for path, tree in private(trees) for said in imported_private_names(tree)]
+    assert not [f"{path} {sentence}" for path, tree in private(trees) for sentence in imported_private_names(tree)]
 
 
 def test_no_class_overrides_or_uses_a_private_name_of_its_base(trees):
@@ -171,23 +168,23 @@ def imported(tree):
 
 
 def test_no_module_reads_a_format_that_can_run(trees):
-    found = []
+    uses = []
     for path, tree in trees.items():
-        found += [(path, name) for name in imported(tree) if name in RUNS]
+        uses += [(path, name) for name in imported(tree) if name in RUNS]
         for name, node in called(tree):
             plain = isinstance(node.func, ast.Name) or name == "read_pickle"  # `re.compile` is none of these
             pickles = any(keyword.arg == "allow_pickle" for keyword in node.keywords)
             if (name in CALLS and plain) or pickles:
-                found.append((path, name))
-    assert found == []
+                uses.append((path, name))
+    assert uses == []
 
 
 def test_nothing_but_a_simulated_box_and_the_tablets_server_listens(trees):
-    found = [
+    uses = [
         (path, name)
         for path, tree in trees.items()
         if path.parts[0] != SIMULATORS and path != TABLET
         for name, node in called(tree)
         if name in LISTENS and isinstance(node.func, ast.Attribute)
     ]
-    assert found == []
+    assert uses == []

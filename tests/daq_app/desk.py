@@ -20,7 +20,7 @@ class Desk:
     def __init__(self, recorder, instead=None):
         self.recorder = recorder
         self.instead = instead or {}
-        self.seen = []
+        self.reports = []
         self.waiting = []
 
     def begin(self, folder, people="simulated hand"):
@@ -28,19 +28,19 @@ class Desk:
         self.recorder.send(Connect("sim:?seed=7"))
         self.recorder.send(StartSession(SHORT, str(folder), People(people, 7)))
 
-    def until(self, wanted, number=1):
+    def until(self, kind, number=1):
         """Go on until so many more reports of a kind came, and return the last."""
         deadline = time.monotonic() + DEADLINE
         while time.monotonic() < deadline:
             self.waiting += self.recorder.poll(0.0 if self.waiting else 0.05)
             while self.waiting:
                 report = self.waiting.pop(0)
-                self.seen.append(report)
+                self.reports.append(report)
                 self.answer(report)
-                number -= isinstance(report, wanted)
+                number -= isinstance(report, kind)
                 if number == 0:
                     return report
-        raise AssertionError(f"no {wanted} came; the last were {[type(r).__name__ for r in self.seen[-8:]]}")
+        raise AssertionError(f"no {kind} came; the last were {[type(r).__name__ for r in self.reports[-8:]]}")
 
     def answer(self, report):
         if type(report) in self.instead:
@@ -57,4 +57,4 @@ class Desk:
                 self.recorder.send(Finish())
 
     def of(self, kind):
-        return [report for report in self.seen if isinstance(report, kind)]
+        return [report for report in self.reports if isinstance(report, kind)]

@@ -25,15 +25,15 @@ def answer():
 def main():
     from PySide6.QtCore import QSocketNotifier
 
-    built = start.open_window
+    open_usual = start.open_window
 
-    def opened(*given, **named):
-        window = built(*given, **named)
-        window.asked = QSocketNotifier(sys.stdin.fileno(), QSocketNotifier.Type.Read, window)
-        window.asked.activated.connect(answer)
+    def open_answering(*arguments, **options):
+        window = open_usual(*arguments, **options)
+        window.notifier = QSocketNotifier(sys.stdin.fileno(), QSocketNotifier.Type.Read, window)
+        window.notifier.activated.connect(answer)
         return window
 
-    start.open_window = opened
+    start.open_window = open_answering
     sys.exit(start.window([]))
 
 

@@ -28,10 +28,10 @@ FLAW = Remark("refused", "no steady window", "", "")
 BAD = Quality((FLAW,), replace(STROKE, steady=None, mu_dynamic=None), fell=0.08)
 
 
-def drawn(time):
+def stroke_at(time):
     """Return a stroke whose course is known at n times, with means that are not its own."""
-    one, two = np.ones(time.size), np.ones((time.size, 2))
-    curve = StrokeCurve(time, one, one, one, two, one, two, one, (0.0, 0.0), 1.0)
+    ones, pairs = np.ones(time.size), np.ones((time.size, 2))
+    curve = StrokeCurve(time, ones, ones, ones, pairs, ones, pairs, ones, (0.0, 0.0), 1.0)
     means = {"normal_force": 1.234, "tangential_force": 0.5, "mu_dynamic": 0.41, "speed": 20.6}
     return replace(STROKE, onset=time[0] + 0.5, lift=time[-1] - 0.5, curve=curve, **means)
 
@@ -43,7 +43,7 @@ def after(*messages, state=None):
     return state
 
 
-def logged(kind, trial=None, **data):
+def log(kind, trial=None, **data):
     return LoggedEvent(1, 0, kind, trial, 0, data)
 
 
@@ -55,9 +55,9 @@ BEGUN = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", 
 MOUNT = (*BEGUN, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
 TARE = (*MOUNT, steps.StartTake(1, 1), steps.MeasureZero())
 READY = (*TARE, steps.AskStroke(FIRST))
-TOUCH = (*READY, logged("contact_onset", 1, time=1.5, noticed=1.51))
-SCORE = (*TOUCH, logged("finger_lifted", 1, time=3.6, noticed=3.7), steps.AskScore(FIRST, ("low end", "high end")))
-PAUSED = (*MOUNT, logged("pause", 1))
+TOUCH = (*READY, log("contact_onset", 1, time=1.5, noticed=1.51))
+SCORE = (*TOUCH, log("finger_lifted", 1, time=3.6, noticed=3.7), steps.AskScore(FIRST, ("low end", "high end")))
+PAUSED = (*MOUNT, log("pause", 1))
 CLOSING = (*BEGUN, steps.AskFinish())
 END = SessionEnd("every trial is done", "finished", True, 100, Health())
 LOST = SessionEnd("the cable was pulled", "device", False, 100, Health(lost=3))

@@ -38,7 +38,7 @@ FOREVER = Request(quick=True, until=perf_counter() + 1e6, host=HOST)
 OVER = Request(quick=True, until=perf_counter() - 1.0, host=HOST)
 
 
-def knowing(*rows, request=FOREVER):
+def with_rows(*rows, request=FOREVER):
     """Return a request whose subject may use these rows."""
     return replace(request, rows=rows)
 
@@ -86,19 +86,19 @@ ROWS = {
 
 @pytest.fixture(scope="module")
 def example():
-    found = knowing(*(row for rows in ROWS.values() for row in rows))
-    rows = {**ROWS, "targets": tuple(targets.measure(found))}
-    took = dict.fromkeys(rows, 1.0)
-    return RunResults("2026-11-21T20:00:00+00:00", False, False, took, rows, ("Growth was not followed further.",))
+    request = with_rows(*(row for rows in ROWS.values() for row in rows))
+    rows = {**ROWS, "targets": tuple(targets.measure(request))}
+    seconds = dict.fromkeys(rows, 1.0)
+    return RunResults("2026-11-21T20:00:00+00:00", False, False, seconds, rows, ("Growth was not followed further.",))
 
 
 @pytest.fixture(scope="module")
-def written(example, tmp_path_factory):
+def paths(example, tmp_path_factory):
     return write(example, tmp_path_factory.mktemp("accuracy") / "out")
 
 
-def test_the_page_asks_nothing_of_any_network_and_holds_every_number_of_the_tables(example, written):
-    text = written[0].read_text(encoding="utf-8")
+def test_the_page_asks_nothing_of_any_network_and_holds_every_number_of_the_tables(example, paths):
+    text = paths[0].read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
     assert not re.search(r"""(src|href)\s*=\s*["'](?!#)""", text)
     assert "<script" not in text
@@ -108,8 +108,8 @@ def test_the_page_asks_nothing_of_any_network_and_holds_every_number_of_the_tabl
         assert f'id="{name}"' in text
 
 
-def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
-    pictures = [path for path in written if path.suffix == ".svg"]
+def test_pictures_are_files_of_their_own_and_the_data_is_json(paths):
+    pictures = [path for path in paths if path.suffix == ".svg"]
     assert {path.stem for path in pictures} >= {
         "speed-first",
         "speed-next",
@@ -121,7 +121,7 @@ def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
     }
     for path in pictures:
         ET.fromstring(path.read_text(encoding="utf-8"))
-    data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
+    data = json.loads((paths[0].parent / "accuracy.json").read_text(encoding="utf-8"))
     assert data["truth"][0]["numbers"] == [5e-3, 0.1, 0.06]
     assert data["speed"][0]["kind"] == "Speed"
 
@@ -135,20 +135,20 @@ def test_time_is_drawn_against_the_error_that_is_guaranteed_and_against_the_true
 
 def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
     scene = next(s for s in cases("finite") if s.title == "slipperiness 100")
-    timed_way = FiniteMethod(scene, FIRST_FINENESS, False)
-    found = timed_way.numbers(timed_way.solve(scene))
+    method = FiniteMethod(scene, FIRST_FINENESS, False)
+    numbers = method.numbers(method.solve(scene))
     answer = solve(replace(scene, solve=replace(scene.solve, tolerance=0.5)))
-    assert found == pytest.approx([answer.sed_ending, answer.normal_force, answer.tangential_force], rel=1e-9)
+    assert numbers == pytest.approx([answer.sed_ending, answer.normal_force, answer.tangential_force], rel=1e-9)
 
 
 def test_an_aim_met_by_a_part_of_what_was_asked_says_by_which_part(example):
-    small = [r for r in targets.measure(knowing(speed("small", 900, 0.005, 3e-4))) if r.reach == 5.0]
+    small = [r for r in targets.measure(with_rows(speed("small", 900, 0.005, 3e-4))) if r.reach == 5.0]
     assert [row.verdict for row in small] == ["aim met by 6 of them"]
     assert verdict(example, "warm stepper, finite strain, p99 of a reading").verdict == "aim met by 1 of 4 surfaces"
 
 
-def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, written):
-    data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
+def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, paths):
+    data = json.loads((paths[0].parent / "accuracy.json").read_text(encoding="utf-8"))
     again = restore(data)
     assert again == example
     assert tables(again) == tables(example)
@@ -161,19 +161,19 @@ def test_a_number_that_is_none_comes_back_from_the_data_and_is_told_as_missed(ex
 
 
 def test_a_surface_that_is_refused_on_the_fine_meshes_keeps_no_figure_from_being_drawn(example):
-    refused = Truth("finite", "slipperiness 0", (), (), (), 1.0, "On an overkill mesh: it folds.")
-    found = replace(example, rows={**example.rows, "truth": (*example.rows["truth"], refused)})
-    assert plates(found).keys() == plates(example).keys()
+    refusal = Truth("finite", "slipperiness 0", (), (), (), 1.0, "On an overkill mesh: it folds.")
+    results = replace(example, rows={**example.rows, "truth": (*example.rows["truth"], refusal)})
+    assert plates(results).keys() == plates(example).keys()
 
 
 def test_pages_of_the_docs_hold_the_tables_of_one_run_alone(example, tmp_path):
     shutil.copytree(Path(__file__).parents[2] / "docs", tmp_path, dirs_exist_ok=True)
     short = replace(example, rows={name: rows for name, rows in example.rows.items() if name != "orders"})
-    filled = {path.name: text for path, text in filled_pages(tmp_path, tables(short)).items()}
-    between = filled["convergence.md"].partition("<!-- orders: begin -->")[2].partition("<!-- orders: end -->")[0]
+    pages = {path.name: text for path, text in filled_pages(tmp_path, tables(short)).items()}
+    between = pages["convergence.md"].partition("<!-- orders: begin -->")[2].partition("<!-- orders: end -->")[0]
     assert between.strip() == "Not measured."
-    assert "| mu 9 | answer | FAILED" in filled["hard-cases-finite.md"]
-    assert "| not measured | Growth was not followed further. |" in filled["benchmarks.md"]
+    assert "| mu 9 | answer | FAILED" in pages["hard-cases-finite.md"]
+    assert "| not measured | Growth was not followed further. |" in pages["benchmarks.md"]
 
 
 @pytest.mark.parametrize("spoil", [lambda page: page.write_text("no marks"), Path.unlink], ids=["no marks", "no page"])
@@ -183,9 +183,9 @@ def test_a_folder_that_is_not_the_docs_is_refused_before_anything_is_measured(sp
     spoil(docs / "benchmarks/convergence.md")
     monkeypatch.setattr("solver.verification.measuring.measure", lambda *_: pytest.fail("three minutes are spent"))
     assert run(["accuracy", "--docs", str(docs), "--out", str(tmp_path / "out")]) in {1, 2}
-    told = capsys.readouterr().err
-    assert "docs" in told
-    assert "unexpected" not in told
+    output = capsys.readouterr().err
+    assert "docs" in output
+    assert "unexpected" not in output
 
 
 def test_a_run_that_was_stopped_leaves_the_docs_as_they_are_and_is_drawn_again_without_a_failure(example, tmp_path):
@@ -218,7 +218,7 @@ def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_told(example):
 
 
 def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over_before_them():
-    coarse = knowing(speed("finite", 900, 0.02, 4e-3))
+    coarse = with_rows(speed("finite", 900, 0.02, 4e-3))
     rows = [row for row in targets.measure(coarse) if row.work.startswith("finite strain, one")]
     assert {row.verdict for row in rows} == {"not measured"}
     assert all("2 %" in row.how for row in rows)
@@ -227,7 +227,7 @@ def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over
 def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
     lame = speed("finite", 900, 1e-6, 1e-3, failed=("slipperiness 55",))
     assert lame.judged_error is None
-    rows = {r.work: r for r in targets.measure(knowing(lame))}
+    rows = {r.work: r for r in targets.measure(with_rows(lame))}
     assert rows["finite strain, one surface from undeformed"].measured is None
 
 
@@ -242,8 +242,8 @@ def test_the_truth_is_of_meshes_that_are_finer_than_all_whose_error_is_held_agai
 def test_an_error_that_the_truth_is_too_uncertain_to_tell_is_neither_met_nor_missed():
     truths = [Truth("finite", name, (5e-3, 0.1, 0.06), (4e-4, 0.0, 0.0), (9,) * 3, 1.0, "") for name in JUDGED]
     meshes = [speed("finite", 900 + n, 5e-4, 1e-2) for n in range(len(QUICK["finite"]))]
-    found = knowing(*truths, *meshes)
-    rows = {r.at_error: r for r in targets.measure(found) if r.work == "finite strain, one surface"}
+    request = with_rows(*truths, *meshes)
+    rows = {r.at_error: r for r in targets.measure(request) if r.work == "finite strain, one surface"}
     assert rows["0.15 %"].verdict == "aim met"
     assert rows["0.06 %"].verdict == "not measured"
     assert rows["0.06 %"].how == "the truth is too uncertain to tell: 0.05 %, 0.09 % at most"
@@ -252,9 +252,9 @@ def test_an_error_that_the_truth_is_too_uncertain_to_tell_is_neither_met_nor_mis
 def test_a_guaranteed_tolerance_has_no_true_error_where_the_truth_of_one_surface_cannot_tell(monkeypatch):
     small = cases("small")[:2]
     doubts = ((0.0,) * 3, (0.1,) * 3)
-    truths = [Truth("small", one.title, (5e-3, 0.1, 0.06), doubts[n], (9,) * 3, 1.0, "") for n, one in enumerate(small)]
+    truths = [Truth("small", c.title, (5e-3, 0.1, 0.06), doubts[n], (9,) * 3, 1.0, "") for n, c in enumerate(small)]
     monkeypatch.setattr(estimates, "TOLERANCES", (0.1,))
-    rows = [list(estimates.measure(knowing(*truths[:count], request=OVER))) for count in (1, 2)]
+    rows = [list(estimates.measure(with_rows(*truths[:count], request=OVER))) for count in (1, 2)]
     worst = [row.worst_error for part in rows for row in part if isinstance(row, GuaranteedCost)]
     assert worst[0] is not None
     assert worst[1] is None
@@ -269,7 +269,7 @@ def test_a_mesh_without_the_truth_of_one_of_the_surfaces_meets_nothing():
 def test_a_cold_start_at_one_kinematics_says_that_it_is_only_one():
     (row,) = [
         row
-        for row in targets.measure(knowing(Cold("daq-app solve, small strain", 5, 0.3, 0.3)))
+        for row in targets.measure(with_rows(Cold("daq-app solve, small strain", 5, 0.3, 0.3)))
         if row.work.startswith("`daq-app solve`")
     ]
     assert row.verdict == "aim met by 1 of 2 processes"
@@ -286,13 +286,13 @@ def test_a_cold_start_for_which_time_is_over_is_named(monkeypatch):
 
 def test_a_published_surface_without_an_answer_is_named_and_not_counted(monkeypatch):
     small = cases("small")
-    truths = [Truth("small", one.title, (5e-3, 0.1, 0.06), (0.0,) * 3, (9,) * 3, 1.0, "") for one in small[:2]]
+    truths = [Truth("small", case.title, (5e-3, 0.1, 0.06), (0.0,) * 3, (9,) * 3, 1.0, "") for case in small[:2]]
     monkeypatch.setattr(
         estimates,
         "solve_many",
-        lambda scenes: [NotConverged("It folds.") if n else solve(one) for n, one in enumerate(scenes)],
+        lambda scenes: [NotConverged("It folds.") if n else solve(case) for n, case in enumerate(scenes)],
     )
-    rows = list(estimates.measure(knowing(*truths, request=OVER)))
+    rows = list(estimates.measure(with_rows(*truths, request=OVER)))
     assert [row.surfaces for row in rows if isinstance(row, GuaranteedCost)] == [1]
     assert LeftOut(f"{small[1].title} at small strain has no answer at 1 %: It folds.") in rows
 

@@ -27,10 +27,10 @@ def test_random_scenes_are_the_same_every_time_and_differ_from_each_other():
 
 
 def test_when_time_is_over_one_thing_is_still_measured_and_the_rest_is_named():
-    ample, over = (Request(quick=True, until=perf_counter() + left, host=HOST) for left in (1e6, -1.0))
+    ample, over = (Request(quick=True, until=perf_counter() + seconds, host=HOST) for seconds in (1e6, -1.0))
     assert list(rows_within(ample, [1, 2, 3], "things", lambda n: [n, -n])) == [1, -1, 2, -2, 3, -3]
-    named = LeftOut("Time was over after 1 of 3 things.")
-    assert list(rows_within(over, [1, 2, 3], "things", lambda n: [n])) == [1, named]
+    rest = LeftOut("Time was over after 1 of 3 things.")
+    assert list(rows_within(over, [1, 2, 3], "things", lambda n: [n])) == [1, rest]
 
 
 def test_a_time_is_the_median_of_runs_and_slow_work_is_run_once():
@@ -65,20 +65,20 @@ def unloaded(monkeypatch):
 @pytest.mark.usefixtures("unloaded")
 def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
     parts = [subject("one", ONE), subject("two", TWO, KeyboardInterrupt), subject("three", ONE)]
-    found = measure(True, quiet, HOST, parts, seconds=5.0)
-    assert found.stopped
-    assert found.rows == {"one": (ONE,), "two": (TWO,)}
-    assert found.left_out == ("Stopped during: the two.", "Stopped before: the three.")
-    assert "Stopped by hand" in page(found)
+    results = measure(True, quiet, HOST, parts, seconds=5.0)
+    assert results.stopped
+    assert results.rows == {"one": (ONE,), "two": (TWO,)}
+    assert results.left_out == ("Stopped during: the two.", "Stopped before: the three.")
+    assert "Stopped by hand" in page(results)
 
 
 @pytest.mark.usefixtures("unloaded")
 @pytest.mark.parametrize("kind", [ValueError, MemoryError])
 def test_a_subject_that_breaks_off_loses_nothing_of_the_others(kind):
     parts = [subject("one", ONE, kind("bad luck")), subject("two", TWO)]
-    found = measure(True, quiet, HOST, parts, seconds=5.0)
-    assert found.rows == {"one": (ONE,), "two": (TWO,)}
-    assert found.left_out == ("The one broke off: bad luck",)
+    results = measure(True, quiet, HOST, parts, seconds=5.0)
+    assert results.rows == {"one": (ONE,), "two": (TWO,)}
+    assert results.left_out == ("The one broke off: bad luck",)
 
 
 def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_for_its_caller():
@@ -89,9 +89,9 @@ def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_
     )
     calls = {mesher: (1, 1, 3.0, 4.0), contact: (1, 1, 1.0, 3.0)}
     profile = {mesher: (1, 1, 2.0, 6.0, {}), contact: (1, 1, 1.0, 4.0, {}), library: (2, 2, 4.0, 7.0, calls)}
-    found = shares(type("Profile", (), {"__init__": lambda self: vars(self).update(stats=profile)})())
-    assert found["mesh and tables"] == pytest.approx((2 + 4 * 4 / 7) / 7)
-    assert found["contact"] == pytest.approx((1 + 4 * 3 / 7) / 7)
+    results = shares(type("Profile", (), {"__init__": lambda self: vars(self).update(stats=profile)})())
+    assert results["mesh and tables"] == pytest.approx((2 + 4 * 4 / 7) / 7)
+    assert results["contact"] == pytest.approx((1 + 4 * 3 / 7) / 7)
 
 
 def test_every_part_of_the_solver_whose_time_is_counted_is_there():
@@ -109,16 +109,16 @@ def test_every_part_of_the_solver_whose_time_is_counted_is_there():
 
 @pytest.mark.slow
 def test_a_quick_run_measures_something_of_every_subject(tmp_path):
-    found = measure(True, quiet, HOST, seconds=1.0)
-    assert {name for name, rows in found.rows.items() if not rows} == set()
-    assert not [told for told in found.left_out if "broke off" in told]
-    write(found, tmp_path)
-    assert {row.kinematics for row in found.of(estimates.Estimate)} == {"small", "finite"}
+    results = measure(True, quiet, HOST, seconds=1.0)
+    assert {name for name, rows in results.rows.items() if not rows} == set()
+    assert not [reason for reason in results.left_out if "broke off" in reason]
+    write(results, tmp_path)
+    assert {row.kinematics for row in results.of(estimates.Estimate)} == {"small", "finite"}
 
 
 def test_a_folder_that_nothing_can_be_written_into_is_named_before_anything_is_measured(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("os.access", lambda *_: False)
     assert run(["accuracy", "--quick", "--out", str(tmp_path)]) == 1
-    said = capsys.readouterr().err.splitlines()
-    assert "cannot be written into" in said[-1]
-    assert len(said) <= 2  # that it loads, and this
+    lines = capsys.readouterr().err.splitlines()
+    assert "cannot be written into" in lines[-1]
+    assert len(lines) <= 2  # that it loads, and this

@@ -5,7 +5,7 @@ from functools import partial
 from itertools import product
 
 import pytest
-from test_constant_stimuli import felt
+from test_constant_stimuli import true_friction
 
 from daq_app.console import Console
 from daq_app.simulation.synthetic import conduct
@@ -34,12 +34,12 @@ def recording(tmp_path_factory):
     people = SimulatedPeople(
         SimulatedSubject(3), clock, None, partial(planted_surface, planted=ADAPTIVE.planted_friction)
     )
-    planned = plan(ADAPTIVE, "S03", 3, forces=False)
-    conduct(planned, folder, people, Console(as_json=True), durable=False)
+    session_plan = plan(ADAPTIVE, "S03", 3, forces=False)
+    conduct(session_plan, folder, people, Console(as_json=True), durable=False)
     return Recording.open(folder)
 
 
-def compared(trials):
+def comparisons(trials):
     """Index of what was compared with the standard in each pair, and whether it came first."""
     pairs = zip(trials[::2], trials[1::2], strict=True)
     return [(second if first.standard else first).stimulus.index for first, second in pairs]
@@ -53,30 +53,30 @@ def test_each_comparison_leaves_the_least_entropy_that_can_be_expected():
     spreads = [40.0 / 3.0 / 5.0 * 15.0 ** (n / 14.0) for n in range(15)]  # a fifth of the mean step, to the range
     possible = list(product(pses, spreads, (1.0, -1.0), (0.0, 0.05)))
 
-    def chance(one, index):
-        pse, spread, sense, lapse = one
+    def chance(subject, index):
+        pse, spread, sense, lapse = subject
         return lapse / 2 + (1 - lapse) * 0.5 * math.erfc(-sense * (index - pse) / spread / math.sqrt(2.0))
 
     def entropy(weights):
         return -sum(w * math.log(w) for w in weights if w > 0.0)
 
     answers, weights = [], [1.0 / len(possible)] * len(possible)
-    for chosen in (True, False, False, True):
+    for answer in (True, False, False, True):
         expected = []
         for index in indices:
-            left = 0.0
+            remaining = 0.0
             for yes in (True, False):
                 joint = [
                     w * (p if yes else 1 - p)
                     for w, p in zip(weights, [chance(o, index) for o in possible], strict=True)
                 ]
                 total = sum(joint)
-                left += total * entropy([w / total for w in joint])
-            expected.append(left)
-        told = next_comparison(candidates, answers)
-        assert expected[indices.index(told.index)] == pytest.approx(min(expected), abs=1e-6)
-        answers.append((told, chosen))
-        likely = [chance(one, told.index) if chosen else 1 - chance(one, told.index) for one in possible]
+                remaining += total * entropy([w / total for w in joint])
+            expected.append(remaining)
+        stimulus = next_comparison(candidates, answers)
+        assert expected[indices.index(stimulus.index)] == pytest.approx(min(expected), abs=1e-6)
+        answers.append((stimulus, answer))
+        likely = [chance(s, stimulus.index) if answer else 1 - chance(s, stimulus.index) for s in possible]
         total = sum(w * p for w, p in zip(weights, likely, strict=True))
         weights = [w * p / total for w, p in zip(weights, likely, strict=True)]
 
@@ -87,35 +87,35 @@ def test_a_session_compares_what_its_answers_ask_for_and_its_recording_says_so(r
     assert [trial.stimulus.code for trial in trials] == mounted
     candidates, answers = recording.plan.blocks[0].candidates, []
     for first, second in zip(recording.trials[::2], recording.trials[1::2], strict=True):
-        one = second if first.trial.standard else first
-        assert one.trial.stimulus == next_comparison(candidates, answers)
-        answers.append((one.trial.stimulus, second.choice == ("second" if one is second else "first")))
+        comparison = second if first.trial.standard else first
+        assert comparison.trial.stimulus == next_comparison(candidates, answers)
+        answers.append((comparison.trial.stimulus, second.choice == ("second" if comparison is second else "first")))
     assert sum(trial.standard for trial in trials[::2]) == 20  # half of the pairs begin with the standard
-    assert len({*compared(trials)}) > 4
+    assert len({*comparisons(trials)}) > 4
     assert problems(recording.folder) == ()
 
 
 def test_the_function_of_an_adaptive_session_holds_what_was_planted_in_the_subject(recording):
-    judged = experiments(recording.plan, [], {}, None, FIXED)
-    (found,) = with_psychometric(judged, recording, felt(recording, ADAPTIVE.planted_friction))
-    function, planted = found.psychometric, SubjectSettings()
+    outcomes = experiments(recording.plan, [], {}, None, FIXED)
+    (experiment,) = with_psychometric(outcomes, recording, true_friction(recording, ADAPTIVE.planted_friction))
+    function, truth = experiment.psychometric, SubjectSettings()
     assert function.answers == 40
     assert function.pse.low < 0.0 < function.pse.high
-    assert function.jnd.low < QUARTILE * planted.discrimination < (function.jnd.high or 9.0)
+    assert function.jnd.low < QUARTILE * truth.discrimination < (function.jnd.high or 9.0)
 
 
 def test_a_session_that_was_cut_short_goes_on_with_the_comparison_its_answers_ask_for(recording):
-    given = [n for n, event in enumerate(recording.events) if event.kind == "chosen"]
+    answered_at = [n for n, event in enumerate(recording.events) if event.kind == "chosen"]
     for answers in (1, 7, 23):
-        told = resumption(plan(ADAPTIVE, "S03", 3, forces=False), recording.events[: given[answers - 1] + 2])
-        assert isinstance(told.state, Mounting)
-        assert told.state.place.trial == recording.trials[2 * answers].trial
+        next_part = resumption(plan(ADAPTIVE, "S03", 3, forces=False), recording.events[: answered_at[answers - 1] + 2])
+        assert isinstance(next_part.state, Mounting)
+        assert next_part.state.place.trial == recording.trials[2 * answers].trial
 
 
 def test_a_recording_of_a_later_kind_of_plan_is_not_read_by_a_program_that_would_not_follow_the_answers(recording):
     assert recording.head["format"]["version"] == 3
     stood_for = [trial["stimulus"]["index"] for trial in recording.head["plan"]["blocks"][0]["trials"]]
-    assert {*stood_for} == {50, compared([record.trial for record in recording.trials])[0]}
+    assert {*stood_for} == {50, comparisons([record.trial for record in recording.trials])[0]}
 
 
 def test_a_blinded_study_refuses_an_adaptive_block(tmp_path):

@@ -52,9 +52,9 @@ def steady(state):
 
 
 def test_every_stroke_has_a_line_that_names_its_trial(state):
-    listed = rows(state)
-    assert [row.stroke for row in listed if row.stroke] == list(state.report.strokes)
-    for row, words in zip(listed, [words_of(row) for row in rows(state)], strict=True):
+    lines = rows(state)
+    assert [row.stroke for row in lines if row.stroke] == list(state.report.strokes)
+    for row, words in zip(lines, [words_of(row) for row in rows(state)], strict=True):
         assert row.prediction is None or row.stroke is None or row.prediction.stroke == row.stroke.number
         assert row.trial is None or words.startswith(str(row.trial))
 
@@ -62,24 +62,24 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
 def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state):
     second = state.report.strokes[1]
     bare = replace(state.report, strokes=tuple(s for s in state.report.strokes if s is not second), predictions=())
-    opened = fold(fold(AnalystState(Path("x")), m.ReportReady("analysed", bare)), m.Choose(1))
-    assert selected_row(opened).trial == 3
-    said = replace(state.report.predictions[1], stroke=None, sed=None)
-    for message in (m.Answered(said, None), m.ReportReady("predicted", replace(bare, predictions=(said,)))):
-        after = fold(opened, message)
+    chosen_third = fold(fold(AnalystState(Path("x")), m.ReportReady("analysed", bare)), m.Choose(1))
+    assert selected_row(chosen_third).trial == 3
+    prediction = replace(state.report.predictions[1], stroke=None, sed=None)
+    for message in (m.Answered(prediction, None), m.ReportReady("predicted", replace(bare, predictions=(prediction,)))):
+        after = fold(chosen_third, message)
         assert [row.trial for row in rows(after)] == list(range(1, 11))
         assert rows(after)[1].stroke is None
         assert selected_row(after).trial == 3
 
 
 def test_a_point_of_prediction_against_score_chooses_its_trial_everywhere(state):
-    found = points(state)
-    assert found
-    for point in found:
+    all_points = points(state)
+    assert all_points
+    for point in all_points:
         after = fold(state, m.Choose(point.row))
-        said = selected_row(after).prediction
-        assert (said.experiment, said.index) == (point.experiment, point.index)
-        assert 1000.0 * said.sed == pytest.approx(point.response)
+        prediction = selected_row(after).prediction
+        assert (prediction.experiment, prediction.index) == (point.experiment, point.index)
+        assert 1000.0 * prediction.sed == pytest.approx(point.response)
 
 
 def test_a_choice_beyond_the_list_is_its_end(state):
@@ -97,12 +97,12 @@ def test_a_number_is_walked_back_to_its_readings_link_by_link(state, steady):
 def test_a_number_that_is_withheld_says_why(state):
     first = state.report.strokes[0]
     bare = replace(first, mu_max=None, reasons={"mu_max": "the zero drifted"})
-    told = replace(state, report=replace(state.report, strokes=(bare,)), row=0)
-    assert dict(numbers(told))["µ at its greatest"] == "–  the zero drifted"
+    withheld = replace(state, report=replace(state.report, strokes=(bare,)), row=0)
+    assert dict(numbers(withheld))["µ at its greatest"] == "–  the zero drifted"
 
 
 @pytest.mark.parametrize(
-    ("message", "going_on", "told"),
+    ("message", "going_on", "outcome"),
     [
         (m.Step(0.3, "predicting"), True, ""),
         (m.Write("csv", "out"), True, ""),
@@ -111,10 +111,10 @@ def test_a_number_that_is_withheld_says_why(state):
         (m.Cancelled(), False, "Stopped. What was done before is kept."),
     ],
 )
-def test_what_was_found_stays_whatever_comes_after(state, message, going_on, told):
+def test_what_was_found_stays_whatever_comes_after(state, message, going_on, outcome):
     after = fold(state, message)
     assert after.report == state.report
-    assert (after.step is not None, after.outcome) == (going_on, told)
+    assert (after.step is not None, after.outcome) == (going_on, outcome)
 
 
 def test_nothing_is_shown_of_a_session_before_it_is_open():
@@ -129,23 +129,23 @@ def test_nothing_is_shown_of_a_session_before_it_is_open():
 
 def test_answers_are_shown_as_they_come_and_stay_when_the_work_is_stopped(state):
     bare = fold(AnalystState(Path("x")), m.ReportReady("analysed", replace(state.report, predictions=())))
-    said = state.report.predictions[1]
-    after = fold(fold(bare, m.Answered(said, FINGER)), m.Cancelled())
-    assert after.report.predictions == (said,)
-    assert after.fingers == {(said.trial, said.stroke): FINGER}
+    prediction = state.report.predictions[1]
+    after = fold(fold(bare, m.Answered(prediction, FINGER)), m.Cancelled())
+    assert after.report.predictions == (prediction,)
+    assert after.fingers == {(prediction.trial, prediction.stroke): FINGER}
     assert after.halted
     assert "stopped" in finger_words(fold(after, m.Choose(0)))
 
 
 def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady):
     with_fingers = state
-    for said in state.report.predictions:
-        with_fingers = fold(with_fingers, m.Answered(said, FINGER))
-    moved = replace(steady, mu_dynamic=steady.mu_dynamic + 0.01)
-    strokes = tuple(moved if s is steady else s for s in state.report.strokes)
+    for prediction in state.report.predictions:
+        with_fingers = fold(with_fingers, m.Answered(prediction, FINGER))
+    changed_stroke = replace(steady, mu_dynamic=steady.mu_dynamic + 0.01)
+    strokes = tuple(changed_stroke if s is steady else s for s in state.report.strokes)
     after = fold(with_fingers, m.ReportReady("analysed", replace(state.report, strokes=strokes, predictions=())))
-    left = {s.number for s in strokes} - {p.stroke for p in after.report.predictions}
-    assert left == {steady.number}
+    unanswered = {s.number for s in strokes} - {p.stroke for p in after.report.predictions}
+    assert unanswered == {steady.number}
     assert {stroke for _, stroke in after.fingers} == {s.number for s in strokes} - {steady.number}
 
 
@@ -154,65 +154,65 @@ def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady)
 
 def test_edges_stand_in_order_of_time_and_say_who_moved_them(steady):
     decided = replace(steady, decided={"steady": "decision 1 by E02"})
-    placed = edges_of(decided)
-    assert [one.edge for one in placed] == list(EDGES)
-    assert [one.time for one in placed] == sorted(one.time for one in placed)
-    assert [bool(one.decided) for one in placed] == [False, True, True, False]
+    edges = edges_of(decided)
+    assert [edge.edge for edge in edges] == list(EDGES)
+    assert [edge.time for edge in edges] == sorted(edge.time for edge in edges)
+    assert [bool(edge.decided) for edge in edges] == [False, True, True, False]
 
 
 def test_a_stroke_without_a_steady_window_is_offered_one(steady):
-    placed = edges_of(replace(steady, steady=None))
-    assert [one.present for one in placed] == [True, False, False, True]
-    assert placed[0].time < placed[1].time < placed[2].time < placed[3].time
+    edges = edges_of(replace(steady, steady=None))
+    assert [edge.present for edge in edges] == [True, False, False, True]
+    assert edges[0].time < edges[1].time < edges[2].time < edges[3].time
 
 
 @given(at=st.sampled_from(EDGES), time=st.floats(-10.0, 1000.0))
 def test_an_edge_never_passes_its_neighbours(steady, at, time):
-    moved = within(steady, at, time)
-    times = {one.edge: one.time for one in edges_of(steady)} | {at: moved}
+    limit = within(steady, at, time)
+    times = {one.edge: one.time for one in edges_of(steady)} | {at: limit}
     ordered = [times[edge] for edge in EDGES]
     assert all(b - a >= APART * (1 - 1e-6) for a, b in itertools.pairwise(ordered))
 
 
 def test_a_moved_edge_is_a_decision_with_who_why_and_what_stood_there(steady):
     begin, end = steady.steady
-    made = decision_of(steady, "steady begin", begin + 0.1, "E02", "a ramp")
-    assert (made.by, made.why, made.what, made.old) == ("E02", "a ramp", "steady", (begin, end))
-    assert made.new == pytest.approx((begin + 0.1, end))
-    assert (made.trial, made.stroke) == (steady.trial, steady.within)
-    lifted = decision_of(steady, "lift", steady.lift + 0.05, "E02", "late")
-    assert (lifted.what, lifted.old) == ("lift", steady.lift)
-    assert lifted.new == pytest.approx(steady.lift + 0.05)
+    decision = decision_of(steady, "steady begin", begin + 0.1, "E02", "a ramp")
+    assert (decision.by, decision.why, decision.what, decision.old) == ("E02", "a ramp", "steady", (begin, end))
+    assert decision.new == pytest.approx((begin + 0.1, end))
+    assert (decision.trial, decision.stroke) == (steady.trial, steady.within)
+    lift = decision_of(steady, "lift", steady.lift + 0.05, "E02", "late")
+    assert (lift.what, lift.old) == ("lift", steady.lift)
+    assert lift.new == pytest.approx(steady.lift + 0.05)
 
 
 def test_undo_and_redo_go_back_and_forth_over_every_decision_and_all_of_it_stays_written():
-    def value(kept):
-        return [one.new for one in kept.in_force]
+    def value(decisions):
+        return [line.new for line in decisions.in_force]
 
-    kept = Decisions()
+    decisions = Decisions()
     for new in (1.0, 2.0):
-        kept = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 0.5, new))
-    seen = [value(kept)]
+        decisions = decisions.with_line(Decision("E02", "dragged", "onset", 1, 1, 0.5, new))
+    values = [value(decisions)]
     for step in (undo, undo, redo, redo, undo):
-        kept = kept.with_line(step(kept, "E03"))
-        seen.append(value(kept))
-    assert seen == [[2.0], [1.0], [], [1.0], [2.0], [1.0]]
-    assert len(kept.lines) == 7
+        decisions = decisions.with_line(step(decisions, "E03"))
+        values.append(value(decisions))
+    assert values == [[2.0], [1.0], [], [1.0], [2.0], [1.0]]
+    assert len(decisions.lines) == 7
     assert undo(Decisions(), "E03") is None
-    again = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 1.0, 3.0))
+    again = decisions.with_line(Decision("E02", "dragged", "onset", 1, 1, 1.0, 3.0))
     assert redo(again, "E03") is None
 
 
 def test_the_history_names_what_undo_and_redo_would_do_next():
-    kept = Decisions()
+    decisions = Decisions()
     for what in ("onset", "lift"):
-        kept = kept.with_line(Decision("E02", "dragged", what, 1, 1, 0.5, 1.0))
+        decisions = decisions.with_line(Decision("E02", "dragged", what, 1, 1, 0.5, 1.0))
     onset, lift = "onset of stroke 1 of trial 1", "lift of stroke 1 of trial 1"
-    seen = [history(kept)]
+    histories = [history(decisions)]
     for step in (undo, undo, redo):
-        kept = kept.with_line(step(kept, "E03"))
-        seen.append(history(kept))
-    assert [(one.done, one.undone) for one in seen] == [
+        decisions = decisions.with_line(step(decisions, "E03"))
+        histories.append(history(decisions))
+    assert [(entry.done, entry.undone) for entry in histories] == [
         ((onset, lift), ()),
         ((onset,), (lift,)),
         ((), (onset, lift)),
@@ -228,9 +228,9 @@ def test_two_sessions_are_held_against_each_other_stimulus_by_stimulus(state):
     first = report.predictions[0]
     higher = replace(first, mu=first.mu + 0.1, sed=first.sed + 0.001)
     other = replace(report, predictions=(higher, *report.predictions[1:]))
-    found = dict(compare_reports(report, other))
-    assert len(found) == len({(p.experiment, p.index) for p in report.predictions})
-    for key, (mu, sed, score) in found.items():
+    pairs = dict(compare_reports(report, other))
+    assert len(pairs) == len({(p.experiment, p.index) for p in report.predictions})
+    for key, (mu, sed, score) in pairs.items():
         same = key != f"{first.experiment} {first.index}"
         assert mu[1] - mu[0] == pytest.approx(0.0 if same else 0.1)
         assert sed[1] - sed[0] == pytest.approx(0.0 if same else 1.0)
@@ -239,9 +239,9 @@ def test_two_sessions_are_held_against_each_other_stimulus_by_stimulus(state):
 
 def test_a_stimulus_that_one_session_lacks_has_no_number_of_it(state):
     report = state.report
-    rest = replace(report, predictions=report.predictions[1:])
-    gone = report.predictions[0]
-    first, second = dict(compare_reports(report, rest))[f"{gone.experiment} {gone.index}"][0]
+    shorter = replace(report, predictions=report.predictions[1:])
+    missing = report.predictions[0]
+    first, second = dict(compare_reports(report, shorter))[f"{missing.experiment} {missing.index}"][0]
     assert first is not None
     assert second is None
 
@@ -252,90 +252,90 @@ def test_a_stimulus_that_one_session_lacks_has_no_number_of_it(state):
 @pytest.fixture
 def at_work(tmp_path):
     """A recorded session, opened, and how its window's state follows what is done with it."""
-    said = [AnalystState(tmp_path / "session")]
+    states = [AnalystState(tmp_path / "session")]
     shutil.copytree(SESSION, tmp_path / "session")
-    work = Work(tmp_path / "session", lambda message: said.append(fold(said[-1], message)))
-    return work, said
+    work = Work(tmp_path / "session", lambda message: states.append(fold(states[-1], message)))
+    return work, states
 
 
 def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_follow(at_work, tmp_path):
-    work, said = at_work
-    before = said[-1].report.strokes[0]
+    work, states = at_work
+    before = states[-1].report.strokes[0]
     work.do(m.Move(1, "steady begin", before.steady[0] + 0.1, "E02", "a ramp"))
-    after = said[-1].report.strokes[0]
+    after = states[-1].report.strokes[0]
     assert after.steady == pytest.approx((before.steady[0] + 0.1, before.steady[1]))
     assert "E02" in after.decided["steady"]
     assert "a ramp" in after.decided["steady"]
     assert after.normal_force != before.normal_force
     work.do(m.Undo("E03"))
-    assert said[-1].report.strokes[0].steady == before.steady
-    assert said[-1].outcome.startswith("Undone, as decision 2: decision 1 by E02: steady of stroke 1 of trial 1")
+    assert states[-1].report.strokes[0].steady == before.steady
+    assert states[-1].outcome.startswith("Undone, as decision 2: decision 1 by E02: steady of stroke 1 of trial 1")
     work.do(m.Undo("E03", again=True))
-    assert said[-1].report.strokes[0].steady == after.steady
+    assert states[-1].report.strokes[0].steady == after.steady
     assert len(read(tmp_path / "session").lines) == 3
 
 
 def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
-    work, said = at_work
+    work, states = at_work
     work.do(m.Compare(str(SESSION)))
-    other = said[-1].compared
-    answered = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
-    assert set(other.fingers) == set(answered) != set()
+    other = states[-1].compared
+    predictions = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
+    assert set(other.fingers) == set(predictions) != set()
     for key, finger in other.fingers.items():
-        np.testing.assert_allclose(finger.frame.row, list(answered[key].row.values()))
+        np.testing.assert_allclose(finger.frame.row, list(predictions[key].row.values()))
 
 
 def test_a_file_that_cannot_be_written_is_told_with_its_name_and_what_to_do(at_work, tmp_path):
     work, _ = at_work
-    with pytest.raises(FileNotFoundError) as refused:
+    with pytest.raises(FileNotFoundError) as refusal:
         work.do(m.Write("picture course", str(tmp_path / "nowhere" / "course.png")))
-    assert sentence_of(refused.value) == f"{tmp_path}/nowhere/course.png: no such file or directory; check its name"
+    assert sentence_of(refusal.value) == f"{tmp_path}/nowhere/course.png: no such file or directory; check its name"
 
 
 def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):
-    said = fold(state, m.Problem("Trial 1 has no history."))
-    assert fold(said, m.Choose(state.row)).outcome == "Trial 1 has no history."
-    assert fold(said, m.Choose(state.row + 1)).outcome == ""
+    told_state = fold(state, m.Problem("Trial 1 has no history."))
+    assert fold(told_state, m.Choose(state.row)).outcome == "Trial 1 has no history."
+    assert fold(told_state, m.Choose(state.row + 1)).outcome == ""
 
 
 def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):
-    work, said = at_work
+    work, states = at_work
     work.do(m.ShowReadings(1))
-    shown = said[-1].read.readings
+    readings = states[-1].read.readings
     with h5py.File(SESSION / "session.h5") as file:
-        first, last = map(int, shown.place.split("rows ")[1].split(" to "))
-        np.testing.assert_array_equal(file["readings/raw"][first : last + 1], shown.block.raw)
-        np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], shown.block.sequence)
-        np.testing.assert_array_equal(file["readings/counter"][first : last + 1], shown.block.counter)
+        first, last = map(int, readings.place.split("rows ")[1].split(" to "))
+        np.testing.assert_array_equal(file["readings/raw"][first : last + 1], readings.block.raw)
+        np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], readings.block.sequence)
+        np.testing.assert_array_equal(file["readings/counter"][first : last + 1], readings.block.counter)
 
 
 def test_the_zero_of_shown_readings_is_that_of_the_last_moments_before_contact_whatever_the_rate_is_said_to_be():
     recording = Recording.open(SESSION)
     finding = findings(recording, analyse(recording, AnalysisSettings())).strokes[0]
-    shown = RawFile(recording).around(finding)
+    readings = RawFile(recording).around(finding)
     unknown = replace(recording, info=replace(recording.info, rate=float("nan")))
-    assert RawFile(unknown).around(finding).zero == shown.zero
-    time = shown.block.time
+    assert RawFile(unknown).around(finding).zero == readings.zero
+    time = readings.block.time
     free = (time < finding.onset) & (time > time[time < finding.onset][-1] - 0.3)
-    assert shown.zero == f"mean before contact, readings: {free.sum()}"
-    assert shown.normal[free].mean() == pytest.approx(0.0, abs=1e-9)
+    assert readings.zero == f"mean before contact, readings: {free.sum()}"
+    assert readings.normal[free].mean() == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_calibration_error_that_was_set_for_a_session_is_followed_in_its_window_too(tmp_path):
-    session, said = shutil.copytree(SESSION, tmp_path / "session"), []
+    session, messages = shutil.copytree(SESSION, tmp_path / "session"), []
     set_gain_error(session, 0.003)
-    Work(session, said.append)
-    assert "0.3 % of each axis, set" in said[-1].report.interval_kind
+    Work(session, messages.append)
+    assert "0.3 % of each axis, set" in messages[-1].report.interval_kind
 
 
-def wait(analyst, wanted):
-    said = []
+def wait(analyst, kind):
+    messages = []
     end = time.monotonic() + 120.0  # of a machine that hangs, not of a slow one
-    while not any(isinstance(message, wanted) for message in said):
+    while not any(isinstance(message, kind) for message in messages):
         assert time.monotonic() < end
-        said += analyst.poll()
+        messages += analyst.poll()
         time.sleep(0.01)
-    return said
+    return messages
 
 
 def test_a_folder_that_is_no_session_is_told_in_a_sentence(tmp_path):
@@ -349,9 +349,9 @@ def test_a_folder_that_is_no_session_is_told_in_a_sentence(tmp_path):
 def test_a_written_picture_says_the_condition_and_the_errors_of_its_sed(at_work, tmp_path):
     work, _ = at_work
     work.go_on()
-    said = next(said for said in work._report.predictions if said.sed is not None)
-    words = f"SED at {said.indentation:.3g} mm, small strain {1000.0 * said.sed:.3f} kPa ± "
-    for name in (f"finger {said.stroke}", f"contact {said.stroke}"):
+    prediction = next(prediction for prediction in work._report.predictions if prediction.sed is not None)
+    words = f"SED at {prediction.indentation:.3g} mm, small strain {1000.0 * prediction.sed:.3f} kPa ± "
+    for name in (f"finger {prediction.stroke}", f"contact {prediction.stroke}"):
         work.do(m.Write(f"picture {name}", str(tmp_path / "written.csv")))
         (head, *_) = (tmp_path / "written.csv").read_text().splitlines()
         assert words in head
@@ -359,6 +359,6 @@ def test_a_written_picture_says_the_condition_and_the_errors_of_its_sed(at_work,
         work.do(m.Write(f"picture {name}", str(tmp_path / "written.svg")))
         lines = re.findall(r">([^<>]+)</text>", (tmp_path / "written.svg").read_text())
         assert words.strip() in " ".join(lines)
-    work.do(m.ShowHistory((said.trial, said.stroke)))
-    work.do(m.Write(f"picture finger {said.stroke} 0", str(tmp_path / "written.csv")))
+    work.do(m.ShowHistory((prediction.trial, prediction.stroke)))
+    work.do(m.Write(f"picture finger {prediction.stroke} 0", str(tmp_path / "written.csv")))
     assert "Step 1 of " in (tmp_path / "written.csv").read_text().splitlines()[0]

@@ -19,34 +19,34 @@ from daq_app.simulation.wiring import WIRES
 
 def test_without_arguments_the_verbs_are_listed_and_the_command_line_counts_as_wrong(capsys):
     assert run([]) == 2
-    listed = capsys.readouterr().err
-    assert all(verb in listed for verb in VERBS)
+    output = capsys.readouterr().err
+    assert all(verb in output for verb in VERBS)
 
 
 def test_an_unknown_verb_is_one_sentence_and_exit_code_2(capsys):
     assert run(["fly"]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    assert "fly" in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
+    assert "fly" in output.err
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_explains_itself_with_an_example(verb, capsys):
     assert run([verb, "--help"]) == 0
-    told = capsys.readouterr().out
+    output = capsys.readouterr().out
     module = importlib.import_module(f"daq_app.cli.verbs.{verb.replace('import', 'import_').replace('-', '_')}")
-    assert module.EXAMPLE in told
-    assert "--json" in told
+    assert module.EXAMPLE in output
+    assert "--json" in output
 
 
 @pytest.mark.parametrize("verb", ["analyse", "predict", "report", "verify"])
 def test_a_missing_session_is_one_sentence_and_exit_code_1(verb, tmp_path, capsys):
     assert run([verb, str(tmp_path / "nowhere")]) == 1
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    assert "nowhere" in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
+    assert "nowhere" in output.err
 
 
 def test_a_missing_scene_is_one_sentence_and_exit_code_1(tmp_path, capsys):
@@ -55,7 +55,7 @@ def test_a_missing_scene_is_one_sentence_and_exit_code_1(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("text", "named"),
+    ("text", "key"),
     [
         (
             "[friction]\nmu = 0.3\n[loading]\nindentation = 1.5\n[materials.fat]\nE = 0.034\nnu = 0.5\n",
@@ -68,13 +68,13 @@ def test_a_missing_scene_is_one_sentence_and_exit_code_1(tmp_path, capsys):
         ("mu = \n", "TOML"),
     ],
 )
-def test_a_wrong_scene_names_key_value_and_what_is_allowed_with_exit_code_2(text, named, tmp_path, capsys):
+def test_a_wrong_scene_names_key_value_and_what_is_allowed_with_exit_code_2(text, key, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(text)
     assert run(["solve", str(scene)]) == 2
-    said = capsys.readouterr()
-    assert named in said.err
-    assert said.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert key in output.err
+    assert output.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -96,9 +96,9 @@ def test_a_wrong_scene_names_key_value_and_what_is_allowed_with_exit_code_2(text
 )
 def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys):
     assert run(arguments) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", ["none.csv", "none.h5"])
@@ -119,7 +119,7 @@ def test_the_simulated_device_of_a_wire_answers_at_the_address_that_is_printed_u
     monkeypatch.setattr(simulate, "time", SimpleNamespace(sleep=look))
     ports = [f"--{name}-port=0" for name in ("rdt", "tcp", "http")] if wire == "net-ft" else []
     assert run(["simulate", wire, "--json", "--seed", "7", *ports]) == 130
-    assert [(one.driver, one.serial, one.simulated) for one in answers] == [(wire, "SIM00007", True)]
+    assert [(answer.driver, answer.serial, answer.simulated) for answer in answers] == [(wire, "SIM00007", True)]
 
 
 @pytest.mark.parametrize("name", [*cli._WRONG, *cli._FAILED])
@@ -132,11 +132,11 @@ def test_every_failure_the_command_line_tells_of_exists_where_it_is_looked_for(n
 @pytest.mark.parametrize("words", [["--help"], ["solve", "--help"], ["window", "--help"]])
 def test_help_that_cannot_be_written_is_exit_code_1_and_a_sentence(words):
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-m", "daq_app", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
-    assert done.returncode == 1
-    assert "could not be written to standard output" in done.stderr
+    assert process.returncode == 1
+    assert "could not be written to standard output" in process.stderr
 
 
 @pytest.mark.skipif(os.name != "posix", reason="asks a shell")
@@ -178,8 +178,8 @@ name = "daq_app.cli.verbs.solve"
 sys.modules[name] = types.SimpleNamespace(run=verb, add_arguments=lambda parser: None, EXAMPLE="")
 main()
 """
-    done = subprocess.run([sys.executable, "-c", code, "solve"], capture_output=True, timeout=20, check=False)
-    assert (done.returncode, done.stderr) == (130, b"daq-app: stopped\n")
+    process = subprocess.run([sys.executable, "-c", code, "solve"], capture_output=True, timeout=20, check=False)
+    assert (process.returncode, process.stderr) == (130, b"daq-app: stopped\n")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no process dies of a signal there")
@@ -201,6 +201,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start what ru
 sys.meta_path.insert(0, Stop())
 main()
 """
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, timeout=60, check=False)
-    assert done.returncode == -signal.SIGINT  # which shells tell as 130
-    assert done.stderr == b""
+    process = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, timeout=60, check=False)
+    assert process.returncode == -signal.SIGINT  # which shells tell as 130
+    assert process.stderr == b""

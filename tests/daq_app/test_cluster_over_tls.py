@@ -30,16 +30,16 @@ def certificate(tmp_path):
 def address(tmp_path, certificate):
     """Return the address of a scheduler that speaks to holders of the certificate alone."""
     cert, key = map(str, certificate)
-    told = tmp_path / "scheduler.json"
+    file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "tls://127.0.0.1:0", "--no-dashboard"]
-    command += ["--tls-ca-file", cert, "--tls-cert", cert, "--tls-key", key, "--scheduler-file", str(told)]
+    command += ["--tls-ca-file", cert, "--tls-cert", cert, "--tls-key", key, "--scheduler-file", str(file)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ) as scheduler:
         try:
             start = time.monotonic()
-            while not told.is_file() or not told.read_text().endswith("}"):
+            while not file.is_file() or not file.read_text().endswith("}"):
                 assert time.monotonic() - start < 60.0
                 time.sleep(0.05)
-            yield json.loads(told.read_text())["address"]
+            yield json.loads(file.read_text())["address"]
         finally:
             scheduler.kill()
 

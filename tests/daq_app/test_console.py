@@ -85,8 +85,8 @@ def test_a_package_that_is_missing_is_named_with_what_to_install(monkeypatch, ca
 
     monkeypatch.setattr("daq_app.cli.main._dispatch", needs)
     assert run(["solve", "scene.toml"]) == 1
-    said = capsys.readouterr().err
-    assert said.startswith("daq-app: the Python package llvmlite is not installed; 'pip install ")
+    output = capsys.readouterr().err
+    assert output.startswith("daq-app: the Python package llvmlite is not installed; 'pip install ")
 
 
 def test_a_number_that_is_none_never_becomes_json():
@@ -96,14 +96,14 @@ def test_a_number_that_is_none_never_becomes_json():
 
 
 def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back_nor_ends_before_it():
-    work, shown = Underway("solving"), []
+    work, states = Underway("solving"), []
     for doing, part in [("solving on a mesh", 0.0), ("following", 0.5), ("following", 1.0), ("following", 0.2)]:
         with listening(work.hear):
             report_progress(doing, part)
-        shown.append((work.doing, work.part))
+        states.append((work.doing, work.part))
     work.hear("estimating", 0.5)
     work.reach(1.0)
-    assert shown == [("solving on a mesh", 0.0), ("following", 0.25), ("following", 0.5), ("following", 0.5)]
+    assert states == [("solving on a mesh", 0.0), ("following", 0.25), ("following", 0.5), ("following", 0.5)]
     assert (work.doing, work.part) == ("estimating", 0.99)
 
 
@@ -173,8 +173,8 @@ def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_b
     speaker, _, err = console(as_json=False)
 
     def work():
-        with speaker.working("solving") as told:
-            assert told(0.4)
+        with speaker.working("solving") as goes_on:
+            assert goes_on(0.4)
             while "solving" not in err.getvalue():
                 pass
             raise KeyboardInterrupt

@@ -29,12 +29,12 @@ def session(folder, seed):
     """Return a visit that only compares, run and read again."""
     clock = SimulatedClock()
     people = SimulatedPeople(SimulatedSubject(seed), clock)
-    planned = plan(protocol("constant-stimuli"), f"S{seed:02d}", seed, forces=False)
-    conduct(planned, folder, people, Console(as_json=True), durable=False)
+    session_plan = plan(protocol("constant-stimuli"), f"S{seed:02d}", seed, forces=False)
+    conduct(session_plan, folder, people, Console(as_json=True), durable=False)
     return Recording.open(folder)
 
 
-def felt(recording, planted=()):
+def true_friction(recording, planted=()):
     """Return as an analysis the friction that the simulated bench plants in every stroke."""
     surfaces = {record.trial.number: planted_surface(record.trial, planted) for record in recording.trials}
     return SimpleNamespace(friction=[SimpleNamespace(trial=n, mu=surface.mu) for n, surface in surfaces.items()])
@@ -46,29 +46,29 @@ def recording(tmp_path_factory):
 
 
 def test_the_function_of_a_session_holds_what_was_planted_in_the_subject(recording):
-    judged = experiments(recording.plan, [], {}, None, FIXED)
-    found = with_psychometric(judged, recording, felt(recording))
-    planted = SubjectSettings()
-    for one in found:
-        function = one.psychometric
+    outcomes = experiments(recording.plan, [], {}, None, FIXED)
+    judged = with_psychometric(outcomes, recording, true_friction(recording))
+    truth = SubjectSettings()
+    for outcome in judged:
+        function = outcome.psychometric
         assert function.answers == 40
         assert function.pse.low < 0.0 < function.pse.high
-        assert function.jnd.low < QUARTILE * planted.discrimination < (function.jnd.high or 9.0)
-        assert function.lapse.low <= planted.lapse <= function.lapse.high
-    report = SimpleNamespace(experiments=found)
-    shown = psychometric_table(session_functions(report))
-    assert [group.name for group in shown.groups] == ["friction, pushed", "friction, pulled"]
-    assert shown.groups[0].rows[0][1].text == "40"
-    said = psychometric_sentences(session_functions(report)[0])
-    assert said[0].startswith("Friction, pushed: by 40 answers the surface felt equal to the standard has ")
+        assert function.jnd.low < QUARTILE * truth.discrimination < (function.jnd.high or 9.0)
+        assert function.lapse.low <= truth.lapse <= function.lapse.high
+    report = SimpleNamespace(experiments=judged)
+    table = psychometric_table(session_functions(report))
+    assert [group.name for group in table.groups] == ["friction, pushed", "friction, pulled"]
+    assert table.groups[0].rows[0][1].text == "40"
+    sentences = psychometric_sentences(session_functions(report)[0])
+    assert sentences[0].startswith("Friction, pushed: by 40 answers the surface felt equal to the standard has ")
 
 
 def test_without_forces_a_study_has_no_function_and_says_why(recording):
     visit = visit_of(recording, VisitOptions(), {})
     assert Counter(row.standard for row in visit.rows) == {50: 80, 55: 80}
-    found = constant_stimuli([(visit, row) for row in visit.rows if row.descriptor == "stickiness"])
-    assert "no friction was measured" in found.functions["S03"].reason
-    study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=found)])
+    stimuli = constant_stimuli([(visit, row) for row in visit.rows if row.descriptor == "stickiness"])
+    assert "no friction was measured" in stimuli.functions["S03"].reason
+    study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=stimuli)])
     assert "no friction was measured" in psychometric_sentences(study_functions(study)[0])[0]
     (row,) = psychometric_table(study_functions(study)).groups[0].rows
     assert [cell.text for cell in row[2:]] == ["–"] * 5
@@ -76,9 +76,9 @@ def test_without_forces_a_study_has_no_function_and_says_why(recording):
 
 def test_a_study_has_the_geometric_means_of_its_subjects(recording, tmp_path):
     trials = []
-    for number, one in enumerate([recording, session(tmp_path / "4", 4), session(tmp_path / "5", 5)]):
-        visit = visit_of(one, VisitOptions(), {})
-        mu = {friction.trial: friction.mu for friction in felt(one).friction}
+    for number, session_recording in enumerate([recording, session(tmp_path / "4", 4), session(tmp_path / "5", 5)]):
+        visit = visit_of(session_recording, VisitOptions(), {})
+        mu = {friction.trial: friction.mu for friction in true_friction(session_recording).friction}
         visit = SimpleNamespace(session=str(number), subject=visit.subject, rows=visit.rows)
         for row in visit.rows:
             if row.descriptor == "stickiness":
@@ -86,12 +86,12 @@ def test_a_study_has_the_geometric_means_of_its_subjects(recording, tmp_path):
                     index=row.index, before=row.before, choice=row.choice, standard=row.standard, mu=mu[row.trial]
                 )
                 trials.append((visit, copy))
-    found = constant_stimuli(trials)
-    assert list(found.functions) == ["S03", "S04", "S05"]
-    assert found.pse.n == 3
-    assert found.pse.mean == pytest.approx(sum(one.pse.value for one in found.functions.values()) / 3)
-    study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=found)])
-    shown = psychometric_table(study_functions(study))
-    assert [row[0].text for row in shown.groups[0].rows] == ["S03", "S04", "S05", "geometric mean"]
-    (said,) = psychometric_sentences(study_functions(study)[0])
-    assert said.startswith("Stickiness: over 3 of 3 subjects the surface felt equal to the standard has ")
+    stimuli = constant_stimuli(trials)
+    assert list(stimuli.functions) == ["S03", "S04", "S05"]
+    assert stimuli.pse.n == 3
+    assert stimuli.pse.mean == pytest.approx(sum(s.pse.value for s in stimuli.functions.values()) / 3)
+    study = SimpleNamespace(descriptors=[SimpleNamespace(descriptor="stickiness", constant_stimuli=stimuli)])
+    table = psychometric_table(study_functions(study))
+    assert [row[0].text for row in table.groups[0].rows] == ["S03", "S04", "S05", "geometric mean"]
+    (sentence,) = psychometric_sentences(study_functions(study)[0])
+    assert sentence.startswith("Stickiness: over 3 of 3 subjects the surface felt equal to the standard has ")

@@ -41,11 +41,11 @@ def malicious(tmp_path, monkeypatch):
     assert not (tmp_path / "run").exists(), (tmp_path / "run").read_text()
 
 
-def wait_for(said):
+def wait_for(poll):
     start = time.monotonic()
     while time.monotonic() - start < DEADLINE:
-        if (found := said()) is not None:
-            return found
+        if (answer := poll()) is not None:
+            return answer
         time.sleep(0.02)
     raise AssertionError("nothing was said in time")
 
@@ -93,8 +93,8 @@ def test_the_analysts_work_runs_nothing_that_lies_in_the_current_folder(tmp_path
     analyst = Analyst(tmp_path / "no session")
     process = analyst._child.process
     try:
-        said = wait_for(lambda: next((one for one in analyst.poll() if isinstance(one, Problem)), None))
-        assert "holds no recording" in said.sentence
+        problem = wait_for(lambda: next((message for message in analyst.poll() if isinstance(message, Problem)), None))
+        assert "holds no recording" in problem.sentence
     finally:
         analyst.close()
         process.join()
@@ -111,8 +111,8 @@ def test_the_pool_of_a_study_runs_nothing_that_lies_in_the_current_folder(tmp_pa
 def test_processes_that_are_timed_run_nothing_that_lies_in_the_current_folder(malicious):
     commands = [command for _, command in processes._commands(malicious, tuple(interpreter()))]
     for command in (commands[1], commands[2], [*commands[-1][:-3], "verify", "--help"]):
-        done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
-        assert done.returncode == 0, done.stderr
+        process = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+        assert process.returncode == 0, process.stderr
 
 
 def run(words, **more):
@@ -126,8 +126,8 @@ def test_the_command_line_runs_nothing_that_lies_in_the_current_folder(tmp_path)
     program = Path(sys.executable).with_name("daq-app")
     session = ("run", "sensotact-friction", "--scores-only", "--subject", "P01", "--headless")
     out = ("--simulate-subject", "1", "--pace", "200", "--out", tmp_path / "P01", "--json")
-    done = run([program, *session, *out], timeout=2 * DEADLINE)
-    assert done.returncode == 0, done.stderr
+    process = run([program, *session, *out], timeout=2 * DEADLINE)
+    assert process.returncode == 0, process.stderr
     assert (tmp_path / "P01" / "MANIFEST.json").exists()
 
 
@@ -135,8 +135,8 @@ def test_the_program_started_as_a_module_leaves_the_current_folder(malicious):
     for path in malicious.iterdir():
         if path.stem not in LATE:
             path.unlink()
-    done = run([sys.executable, "-m", "daq_app", "verify", "nothing"], timeout=DEADLINE)
-    assert "holds no recording" in done.stderr
+    process = run([sys.executable, "-m", "daq_app", "verify", "nothing"], timeout=DEADLINE)
+    assert "holds no recording" in process.stderr
 
 
 @pytest.mark.slow
@@ -158,5 +158,5 @@ def test_the_window_and_its_processes_run_nothing_that_lies_in_the_current_folde
 def test_child_processes_start_in_one_place():
     starts = ("sys.executable", "get_context(", "multiprocessing.Process(", "fork(")
     files = [path for folder in sorted(OURS) for path in (PROGRAM / folder).rglob("*.py")]
-    found = {path.name for path in files if any(words in path.read_text(encoding="utf-8") for words in starts)}
-    assert found == {"child_process.py"}
+    names = {path.name for path in files if any(words in path.read_text(encoding="utf-8") for words in starts)}
+    assert names == {"child_process.py"}

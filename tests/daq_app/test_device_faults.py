@@ -39,30 +39,30 @@ class Nobody:
 
 
 @pytest.fixture
-def recorded(tmp_path, monkeypatch):
+def record_faults(tmp_path, monkeypatch):
     """Return a function that records two seconds of a box on which this goes wrong, and the end of the session."""
 
     def record(*faults):
         monkeypatch.setattr(wiring, "NetFtBox", partial(NetFtBox, faults=Faults(faults)))
         clock, folder = RealClock(), tmp_path / "session"
-        planned = plan(protocol("sensotact-friction"), "P01", 1)
+        session_plan = plan(protocol("sensotact-friction"), "P01", 1)
         with connect("sim:?seed=3", clock) as bench:
             writer = SessionWriter.create(
-                folder, planned, bench.transducer.info, provenance(clock), subject_simulated=True, clock=clock
+                folder, session_plan, bench.transducer.info, provenance(clock), subject_simulated=True, clock=clock
             )
             until = clock.now_ns() + 2_500_000_000
 
             def stop():
                 return ("stopped", "the test is over") if clock.now_ns() > until else None
 
-            end = run_session(planned, writer, Nobody(), bench.transducer, stop=stop)
+            end = run_session(session_plan, writer, Nobody(), bench.transducer, stop=stop)
         return folder, end
 
     return record
 
 
-def test_a_fault_of_the_device_is_named_in_health_events_and_by_verify(recorded, capsys):
-    folder, end = recorded(Fault("status", 0.0, 1e6, status=0x80000100))
+def test_a_fault_of_the_device_is_named_in_health_events_and_by_verify(record_faults, capsys):
+    folder, end = record_faults(Fault("status", 0.0, 1e6, status=0x80000100))
     words = "gauge excitation current too low"
     assert end.health.doubtful == end.health.flagged[words] == end.readings > 0
     recording = Recording.open(folder)
@@ -77,8 +77,8 @@ def test_a_fault_of_the_device_is_named_in_health_events_and_by_verify(recorded,
     assert any(problem.startswith(f"device_fault: {len(block)} readings") and words in problem for problem in problems)
 
 
-def test_a_session_in_which_the_units_change_ends_and_names_the_readings_in_doubt(recorded, capsys):
-    folder, end = recorded(Fault("units", 1.0, 1e6, share=1e-6))
+def test_a_session_in_which_the_units_change_ends_and_names_the_readings_in_doubt(record_faults, capsys):
+    folder, end = record_faults(Fault("units", 1.0, 1e6, share=1e-6))
     assert end.cause == "device"
     assert "counts in other units than before" in end.reason
     assert end.health.off_units > 0
@@ -102,17 +102,17 @@ def test_a_signal_ends_a_run_within_a_second_while_its_transducer_sends_no_readi
     device = net_ft(bytes(35))
     command = ["run", "sensotact-friction", "--device", device.uri, "--subject", "P01", "--headless", "--any-folder"]
     command += ["--out", str(tmp_path / "session")]
-    ran = subprocess.Popen([sys.executable, "-m", "daq_app", *command], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    child = subprocess.Popen([sys.executable, "-m", "daq_app", *command], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
         while not device.stream_request.wait(0.1):
-            assert ran.poll() is None, ran.stderr.read()
-        began = time.monotonic()
-        ran.send_signal(number)
-        ran.communicate(timeout=20)
-        elapsed_s = time.monotonic() - began
+            assert child.poll() is None, child.stderr.read()
+        start = time.monotonic()
+        child.send_signal(number)
+        child.communicate(timeout=20)
+        elapsed_s = time.monotonic() - start
     finally:
-        ran.kill()
-        ran.communicate()
+        child.kill()
+        child.communicate()
         device.close()
     assert elapsed_s < 1.0
-    assert ran.returncode == 130
+    assert child.returncode == 130

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from planted_fingers import law
+from finger_presses import law
 
 from daq_app.cli.main import run
 from daq_app.cli.verbs.fit_finger import SCENE_HEAD
@@ -12,7 +12,7 @@ from sessions.prediction import finger_in
 from sessions.prediction.press_model import PressModel
 from sessions.recording.derived import check_replaceable
 
-PLANTED = (0.25, 0.1, 0.025)  # [MPa]
+STIFFNESSES = (0.25, 0.1, 0.025)  # [MPa]
 RATE, DEEP, TOUCH = 200.0, 1.4, 3.2  # [Hz], [mm], displacement of the stage at the touch [mm]
 
 
@@ -22,14 +22,14 @@ def stage(time, begin):
 
 
 @pytest.fixture(scope="module")
-def pressed(tmp_path_factory):
+def presses(tmp_path_factory):
     """Files of forces and of a stage, on one clock, of three presses of a planted finger without friction."""
     folder = tmp_path_factory.mktemp("pressed")
     time = np.arange(round(14.0 * RATE)) / RATE
     depth = np.max([stage(time, begin) for begin in (1.5, 5.5, 9.5)], axis=0)
     rng = np.random.default_rng(8)
     force = np.zeros((len(time), 6))
-    force[:, 2] = -law(PLANTED)(depth)
+    force[:, 2] = -law(STIFFNESSES)(depth)
     force += rng.standard_normal(force.shape) * 0.003
     header = "t_s,Fx_N,Fy_N,Fz_N,Tx_Nmm,Ty_Nmm,Tz_Nmm"
     np.savetxt(folder / "forces.csv", np.column_stack([time, force]), "%.6f", ",", header=header, comments="")
@@ -39,33 +39,33 @@ def pressed(tmp_path_factory):
     return folder
 
 
-def test_the_scene_of_a_finger_is_never_written_over_one_that_somebody_wrote(pressed, tmp_path, capsys):
+def test_the_scene_of_a_finger_is_never_written_over_one_that_somebody_wrote(presses, tmp_path, capsys):
     mine = tmp_path / "mine.toml"
     mine.write_text("[friction]\nmu = 0.3\n")
-    words = ["fit-finger", str(pressed / "session"), "--displacement", str(pressed / "stage.csv"), "--scene", str(mine)]
+    words = ["fit-finger", str(presses / "session"), "--displacement", str(presses / "stage.csv"), "--scene", str(mine)]
     assert run(words) == 1
     assert "mine.toml holds something else, so it is left alone" in capsys.readouterr().err
     assert mine.read_text() == "[friction]\nmu = 0.3\n"
 
 
 @pytest.mark.slow
-def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict(pressed, tmp_path, capsys):
+def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict(presses, tmp_path, capsys):
     out = tmp_path / "own.toml"
-    words = ["fit-finger", str(pressed / "session"), "--displacement", str(pressed / "stage.csv"), "--mu", "0"]
+    words = ["fit-finger", str(presses / "session"), "--displacement", str(presses / "stage.csv"), "--mu", "0"]
     capsys.readouterr()
     assert run([*words, "--relaxation", "--scene", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert len(told["presses"]) == 3
-    for layer, true in zip(told["layers"], PLANTED, strict=True):
+    document = json.loads(capsys.readouterr().out)
+    assert len(document["presses"]) == 3
+    for layer, true in zip(document["layers"], STIFFNESSES, strict=True):
         assert layer["stiffness"]["low"] < true < layer["stiffness"]["high"]
-    for touch in told["touch"]:
+    for touch in document["touch"]:
         assert touch == pytest.approx(TOUCH, abs=0.05)
-    assert told["check"]["deviation"] < 0.02
-    assert told["relaxation"]["part"]["low"] < 0.02  # what was planted does not relax
+    assert document["check"]["deviation"] < 0.02
+    assert document["relaxation"]["part"]["low"] < 0.02  # what was planted does not relax
     scene, _ = finger_in(out)
     depth = np.array([0.4, 0.8, 1.1])
     own = law([scene.materials.of(name).E for name in ("epidermis", "dermis", "fat")], depths=depth)
-    np.testing.assert_allclose(own(depth), law(PLANTED)(depth), rtol=0.05)
+    np.testing.assert_allclose(own(depth), law(STIFFNESSES)(depth), rtol=0.05)
     check_replaceable(out, SCENE_HEAD)  # the next fit may replace it
     assert run(["solve", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["normal_force"] > 0.0
@@ -83,7 +83,7 @@ def quick(monkeypatch):
 
 @pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize(
-    ("content", "words", "code", "named"),
+    ("content", "words", "code", "sentence"),
     [
         ("time_s,x\n0,1\n1,2\n", [], 1, "displacement_mm"),
         ("time_s,displacement_mm\n0,1\n0,2\n", [], 1, "line 3: time_s does not grow"),
@@ -93,27 +93,27 @@ def quick(monkeypatch):
         ("time_s,displacement_mm\n0,1\n1,2\n", ["--prior", "0.5"], 2, "--prior 0.5"),
     ],
 )
-def test_a_log_or_option_that_cannot_be_taken_is_one_sentence(pressed, tmp_path, capsys, content, words, code, named):
+def test_a_log_or_option_that_cannot_be_used_is_one_sentence(presses, tmp_path, capsys, content, words, code, sentence):
     log = tmp_path / "log.csv"
     log.write_text(content)
     capsys.readouterr()
-    assert run(["fit-finger", str(pressed / "session"), "--displacement", str(log), *words]) == code
-    said = capsys.readouterr().err
-    assert named in said
-    assert said.count("\n") == 1 or "left out" in said
+    assert run(["fit-finger", str(presses / "session"), "--displacement", str(log), *words]) == code
+    output = capsys.readouterr().err
+    assert sentence in output
+    assert output.count("\n") == 1 or "left out" in output
 
 
 @pytest.mark.usefixtures("quick")
-def test_a_stage_that_moves_the_other_way_is_named(pressed, tmp_path, capsys):
-    rows = np.loadtxt(pressed / "stage.csv", delimiter=",", skiprows=1)
+def test_a_stage_that_moves_the_other_way_is_named(presses, tmp_path, capsys):
+    rows = np.loadtxt(presses / "stage.csv", delimiter=",", skiprows=1)
     rows[:, 1] *= -1.0
     np.savetxt(tmp_path / "back.csv", rows, "%.6f", ",", header="time_s,displacement_mm", comments="")
-    words = ["fit-finger", str(pressed / "session"), "--displacement", str(tmp_path / "back.csv")]
+    words = ["fit-finger", str(presses / "session"), "--displacement", str(tmp_path / "back.csv")]
     assert run(words) == 1
     assert "positive into the finger" in capsys.readouterr().err
 
 
-def test_a_visit_without_forces_holds_no_press_that_can_be_fitted(pressed, tmp_path, capsys):
-    words = ["fit-finger", str(tmp_path / "nowhere"), "--displacement", str(pressed / "stage.csv")]
+def test_a_visit_without_forces_holds_no_press_that_can_be_fitted(presses, tmp_path, capsys):
+    words = ["fit-finger", str(tmp_path / "nowhere"), "--displacement", str(presses / "stage.csv")]
     assert run(words) == 1
     assert "nowhere" in capsys.readouterr().err

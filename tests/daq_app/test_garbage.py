@@ -9,7 +9,7 @@ import zlib
 from contextlib import closing
 
 import pytest
-from recordings import ended
+from recordings import record_session
 
 from daq_app.cli.main import run
 from sessions.plan.protocols import protocol_file
@@ -47,30 +47,30 @@ NONSENSE = [
 JSON = [None, True, -1, 1e300, 10**30, "", "x", [], [None], {}, {"a": {}}, [[[[]]]]]
 
 
-def mutated_bytes(chance, content):
+def mutate_bytes(chance, content):
     """Return bytes of which a few were changed, cut out, doubled, or replaced by nonsense."""
-    made = bytearray(content)
+    mutant = bytearray(content)
     for _ in range(chance.choice([1, 1, 2, 5, 40])):
-        at = chance.randrange(len(made) + 1)
+        at = chance.randrange(len(mutant) + 1)
         length = chance.choice([1, 2, 8, 100, 4096])
         match chance.randrange(5):
             case 0:
-                made[at : at + length] = chance.randbytes(min(length, len(made) - at))
+                mutant[at : at + length] = chance.randbytes(min(length, len(mutant) - at))
             case 1:
-                del made[at : at + length]
+                del mutant[at : at + length]
             case 2:
-                made[at:at] = made[at : at + length]
+                mutant[at:at] = mutant[at : at + length]
             case 3:
-                made[at : at + length] = bytes(length)
+                mutant[at : at + length] = bytes(length)
             case _:
-                made[at:at] = chance.choice(NONSENSE).encode("latin-1")
-    return bytes(made)
+                mutant[at:at] = chance.choice(NONSENSE).encode("latin-1")
+    return bytes(mutant)
 
 
-def mutated_toml(chance, content):
+def mutate_toml(chance, content):
     """Return a TOML text of which lines were dropped, doubled, or given nonsense for a value; or changed bytes."""
     if chance.random() < 0.3:
-        return mutated_bytes(chance, content)
+        return mutate_bytes(chance, content)
     lines = content.decode().splitlines()
     for _ in range(chance.choice([1, 1, 3])):
         at = chance.randrange(len(lines))
@@ -87,18 +87,18 @@ def mutated_toml(chance, content):
     return "\n".join(lines).encode()
 
 
-def mutated_json(chance, value):
+def mutate_json(chance, value):
     """Return a JSON value with nonsense in one place of it."""
     if not isinstance(value, dict | list) or not value or chance.random() < 0.2:
         return chance.choice(JSON)
     names = list(value) if isinstance(value, dict) else range(len(value))
     name = chance.choice(list(names))
-    made = value.copy()
+    copy = value.copy()
     if isinstance(value, dict) and chance.random() < 0.2:
-        del made[name]
+        del copy[name]
     else:
-        made[name] = mutated_json(chance, made[name])
-    return made
+        copy[name] = mutate_json(chance, copy[name])
+    return copy
 
 
 def mutate_rows(chance, path):
@@ -109,19 +109,19 @@ def mutate_rows(chance, path):
         rows = connection.execute(f"SELECT rowid, * FROM {table}").fetchall()
         names = [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
         rowid, *row = chance.choice(rows)
-        told = dict(zip(names, row, strict=True))
-        text = next((name for name in ("data", "value") if name in told), None)
-        if text and str(told[text]).startswith(("{", "[")) and chance.random() < 0.7:
-            told[text] = json.dumps(mutated_json(chance, json.loads(told[text])))
+        fields = dict(zip(names, row, strict=True))
+        text = next((name for name in ("data", "value") if name in fields), None)
+        if text and str(fields[text]).startswith(("{", "[")) and chance.random() < 0.7:
+            fields[text] = json.dumps(mutate_json(chance, json.loads(fields[text])))
         else:
             name = chance.choice([name for name in names if name != "crc32"])
-            told[name] = chance.choice([None, -1, 2**62, 0.5, "", "x", b"\xff\xfe", "[" * 3000, told[name]])
-        if "crc32" in told and text and isinstance(told[text], str):
-            held = [told[name] for name in names[:-1]] if table == "events" else [told[text]]
-            told["crc32"] = zlib.crc32("\n".join("" if one is None else str(one) for one in held).encode())
-        changed = ", ".join(f"{name}=?" for name in names)
+            fields[name] = chance.choice([None, -1, 2**62, 0.5, "", "x", b"\xff\xfe", "[" * 3000, fields[name]])
+        if "crc32" in fields and text and isinstance(fields[text], str):
+            texts = [fields[name] for name in names[:-1]] if table == "events" else [fields[text]]
+            fields["crc32"] = zlib.crc32("\n".join("" if value is None else str(value) for value in texts).encode())
+        assignments = ", ".join(f"{name}=?" for name in names)
         try:
-            connection.execute(f"UPDATE OR REPLACE {table} SET {changed} WHERE rowid=?", (*told.values(), rowid))
+            connection.execute(f"UPDATE OR REPLACE {table} SET {assignments} WHERE rowid=?", (*fields.values(), rowid))
             connection.commit()
         except sqlite3.Error:  # what SQLite itself refuses is no file that can be met
             connection.rollback()
@@ -135,17 +135,17 @@ def state(folder):
     }
 
 
-def checked(capsys, room, arguments):
+def run_checked(capsys, room, arguments):
     """Run a command line and hold what it said against what may be said; files in `room` stay as they are."""
     before = state(room)
     code = run(arguments)
-    said = capsys.readouterr()
-    where = f"{arguments}: {code} {said.err[:2000]}"
+    output = capsys.readouterr()
+    where = f"{arguments}: {code} {output.err[:2000]}"
     assert code in {0, 1, 2, 3}, where
-    assert "unexpected" not in said.err, where
-    assert "Traceback" not in said.err, where
-    assert code not in {1, 2} or len(said.err.splitlines()) == 1, where
-    assert len(said.err) < 2000, where
+    assert "unexpected" not in output.err, where
+    assert "Traceback" not in output.err, where
+    assert code not in {1, 2} or len(output.err.splitlines()) == 1, where
+    assert len(output.err) < 2000, where
     after = state(room)
     assert {path: after.get(path) for path in before} == before, where
 
@@ -154,7 +154,7 @@ def checked(capsys, room, arguments):
 def originals(tmp_path_factory):
     """A session, and a study with a subject."""
     folder = tmp_path_factory.mktemp("originals")
-    ended(folder / "session")
+    record_session(folder / "session")
     protocol = "magnitude-estimation"
     assert run(["enrol", str(folder / "study"), "--protocol", protocol, "--seed", "1", "--subject", "P1"]) == 0
     assert run(["enrol", str(folder / "study"), "--subject", "P2", "--finger", "tip_radius=6"]) == 0
@@ -165,41 +165,41 @@ def originals(tmp_path_factory):
 def garbage_session(chance, originals, room, capsys):
     folder = shutil.copytree(originals / "session", room / "s")
     spoil_database(chance, folder / "session.sqlite")
-    checked(capsys, folder, ["verify", str(folder)])
-    checked(capsys, folder, ["export", str(folder), "--format", "csv", "--out", str(room / "out")])
+    run_checked(capsys, folder, ["verify", str(folder)])
+    run_checked(capsys, folder, ["export", str(folder), "--format", "csv", "--out", str(room / "out")])
 
 
 def garbage_study(chance, originals, room, capsys):
     folder = shutil.copytree(originals / "study", room / "study")
     spoil_database(chance, folder / "study.sqlite")
-    checked(capsys, folder, ["enrol", str(folder)])
+    run_checked(capsys, folder, ["enrol", str(folder)])
 
 
 def spoil_database(chance, path):
     if chance.random() < 0.5:
         mutate_rows(chance, path)
     else:
-        path.write_bytes(mutated_bytes(chance, path.read_bytes()))
+        path.write_bytes(mutate_bytes(chance, path.read_bytes()))
 
 
 def garbage_protocol(chance, _, room, capsys):
     path = room / "p.toml"
-    path.write_bytes(mutated_toml(chance, protocol_file("sensotact-friction").read_bytes()))
-    checked(capsys, room, ["enrol", str(room / "new"), "--protocol", str(path), "--seed", "1"])
+    path.write_bytes(mutate_toml(chance, protocol_file("sensotact-friction").read_bytes()))
+    run_checked(capsys, room, ["enrol", str(room / "new"), "--protocol", str(path), "--seed", "1"])
 
 
 def garbage_scene(chance, _, room, capsys):
     path = room / "s.toml"
-    path.write_bytes(mutated_toml(chance, SCENE.encode()))
-    checked(capsys, room, ["solve", str(path)])
+    path.write_bytes(mutate_toml(chance, SCENE.encode()))
+    run_checked(capsys, room, ["solve", str(path)])
 
 
 def garbage_exclusions(chance, originals, room, capsys):
     folder = room / "sessions"
     shutil.copytree(originals / "session", folder / "s")
     text = '[[exclude]]\nsubject = "S01"\nwhy = "ill"\nwho = "A"\n'
-    (folder / "exclusions.toml").write_bytes(mutated_toml(chance, text.encode()))
-    checked(capsys, folder, ["study", str(folder), "--out", str(room / "out")])
+    (folder / "exclusions.toml").write_bytes(mutate_toml(chance, text.encode()))
+    run_checked(capsys, folder, ["study", str(folder), "--out", str(room / "out")])
 
 
 KINDS = [garbage_session, garbage_study, garbage_protocol, garbage_scene, garbage_exclusions]
@@ -223,7 +223,7 @@ def _nothing_is_computed(monkeypatch):
     monkeypatch.setattr(study, "visits", failing(RecordingError))
 
 
-def tried(kind, seeds, originals, tmp_path, capsys):
+def try_seeds(kind, seeds, originals, tmp_path, capsys):
     for seed in seeds:
         room = tmp_path / str(seed)
         room.mkdir()
@@ -233,10 +233,10 @@ def tried(kind, seeds, originals, tmp_path, capsys):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_garbage_ends_in_one_sentence_and_changes_no_other_file(originals, tmp_path, capsys, kind):
-    tried(kind, range(10), originals, tmp_path, capsys)
+    try_seeds(kind, range(10), originals, tmp_path, capsys)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_much_garbage_ends_in_one_sentence_and_changes_no_other_file(originals, tmp_path, capsys, kind):
-    tried(kind, range(1000, 1400), originals, tmp_path, capsys)
+    try_seeds(kind, range(1000, 1400), originals, tmp_path, capsys)

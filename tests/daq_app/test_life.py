@@ -23,7 +23,7 @@ INFO = TransducerInfo(
 
 
 @pytest.fixture(autouse=True)
-def kept(tmp_path, monkeypatch):
+def data_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(life.platformdirs, "user_data_dir", lambda *_, **__: str(tmp_path))
     return tmp_path
 
@@ -36,28 +36,28 @@ def test_drift_noise_and_overloads_are_those_that_were_kept():
     remember_zero(INFO, (1e6, 0, 0, 0, 0, 0), (4e3,) * 6)
     remember_zero(INFO, (1.25e6, -1e5, 0, 0, 0, 50), (4e3,) * 6)
     remember_overload(INFO, (1.2, 0, 0, 0, 0, 0, 1.2))
-    known = life_of("FT1234")
-    assert known is not None
-    assert (known.zeros, known.overloads) == (2, 1)
-    np.testing.assert_allclose(known.drift, [0.25, -0.1, 0.0, 0.0, 0.0, 0.05])
-    np.testing.assert_allclose(known.noise, [0.004] * 3 + [4.0] * 3)
-    assert known.since == known.last_overload != ""
+    transducer_life = life_of("FT1234")
+    assert transducer_life is not None
+    assert (transducer_life.zeros, transducer_life.overloads) == (2, 1)
+    np.testing.assert_allclose(transducer_life.drift, [0.25, -0.1, 0.0, 0.0, 0.0, 0.05])
+    np.testing.assert_allclose(transducer_life.noise, [0.004] * 3 + [4.0] * 3)
+    assert transducer_life.since == transducer_life.last_overload != ""
 
 
 @pytest.mark.parametrize("end", [b"\n", b""])
-def test_a_torn_line_costs_itself_alone(kept, end):
+def test_a_torn_line_costs_itself_alone(data_folder, end):
     remember_overload(INFO, (1.2, 0, 0, 0, 0, 0, 1.2))
-    (file,) = (kept / "transducers").iterdir()
+    (file,) = (data_folder / "transducers").iterdir()
     with file.open("ab") as torn:
         torn.write(b'{"time": "2026-11-21", "kind": "zero", "wrench": [1, \xff' + end)
     remember_overload(INFO, (1.3, 0, 0, 0, 0, 0, 1.3))
-    known = life_of("FT1234")
-    assert known is not None
-    assert known.overloads == 2
+    transducer_life = life_of("FT1234")
+    assert transducer_life is not None
+    assert transducer_life.overloads == 2
 
 
-def test_a_simulated_transducer_has_no_life_and_a_serial_number_is_no_path(kept):
+def test_a_simulated_transducer_has_no_life_and_a_serial_number_is_no_path(data_folder):
     remember_overload(replace(INFO, simulated=True), (1.2,) * 7)
-    assert not list(kept.iterdir())
+    assert not list(data_folder.iterdir())
     remember_overload(replace(INFO, serial="../../x y"), (1.2,) * 7)
-    assert [file.name for file in (kept / "transducers").iterdir()] == ["______x_y.jsonl"]
+    assert [file.name for file in (data_folder / "transducers").iterdir()] == ["______x_y.jsonl"]

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from examples import SCENE
+from json_answer import answer
 from page_numbers import estimates
 from report_session import record
 
@@ -35,7 +36,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def two(tmp_path_factory):
+def two_trials(tmp_path_factory):
     """A sealed session of two trials; tests that change it take a copy."""
     folder, _ = record(tmp_path_factory.mktemp("two") / "P01", per_block=1)
     seal(folder)
@@ -43,15 +44,15 @@ def two(tmp_path_factory):
 
 
 @pytest.fixture
-def small(two, tmp_path):
-    return shutil.copytree(two, tmp_path / "P01")
+def small(two_trials, tmp_path):
+    return shutil.copytree(two_trials, tmp_path / "P01")
 
 
 @pytest.fixture(scope="module")
-def reported(two, tmp_path_factory):
+def report_dir(two_trials, tmp_path_factory):
     """A session analysed and predicted otherwise than usual, and then reported; tests that change it take a copy."""
     room = tmp_path_factory.mktemp("reported")
-    session = shutil.copytree(two, room / "P01")
+    session = shutil.copytree(two_trials, room / "P01")
     (room / "mine.toml").write_text(f"{SCENE}\n[finger]\ntip_radius = 5.5\n[materials.fat]\nE = 0.03\nnu = 0.48\n")
     words = ["--beside", "none", "--indentation", "1.2", "--tau", "as-printed", "--scene", str(room / "mine.toml")]
     seeded = ["--bootstrap-seed", "7"]
@@ -61,29 +62,29 @@ def reported(two, tmp_path_factory):
     return session
 
 
-def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(reported):
-    found = list(estimates((reported / "report.html").read_text(encoding="utf-8")))
-    assert len(found) > 50
-    assert [place for place, unit, _, _ in found if not unit] == []
+def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(report_dir):
+    numbers = list(estimates((report_dir / "report.html").read_text(encoding="utf-8")))
+    assert len(numbers) > 50
+    assert [place for place, unit, _, _ in numbers if not unit] == []
     # One subject gave the scores, and with tau_max as printed no trial is solved under the measured force. A state that
     # no finger can be in has none either.
-    told = [(place, why) for place, _, interval, why in found if not interval and "turned inside out" not in why]
-    without = {(place.split(",")[1].strip(), why.split(";")[0]) for place, why in told}
+    notes = [(place, why) for place, _, interval, why in numbers if not interval and "turned inside out" not in why]
+    without = {(place.split(",")[1].strip(), why.split(";")[0]) for place, why in notes}
     assert without == {
         ("mean score", "one subject alone has no interval"),
         ("depth to match", "no interval: found on a rough mesh"),
     }
 
 
-def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(reported):
-    computed, document = (json.loads((reported / f"{name}.json").read_text()) for name in ("analysis", "prediction"))
+def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(report_dir):
+    computed, document = (json.loads((report_dir / f"{name}.json").read_text()) for name in ("analysis", "prediction"))
     assert document["options"]["tau_reading"] == "as-printed"
     for row, other in zip(document["trials"], computed["friction"], strict=True):
         assert row["tau_max"] == pytest.approx(other["tau_max"] / 100)
 
 
-def test_exports_carry_the_error_of_calibration_that_their_intervals_hold(reported, tmp_path):
-    assert run(["export", str(reported), "--format", "csv", "--out", str(tmp_path / "csv")]) == 0
+def test_exports_carry_the_error_of_calibration_that_their_intervals_hold(report_dir, tmp_path):
+    assert run(["export", str(report_dir), "--format", "csv", "--out", str(tmp_path / "csv")]) == 0
     with (tmp_path / "csv" / "strokes.csv").open(newline="") as file:  # a table that every format writes
         rows = list(csv.DictReader(file))
     assert {(row["gain_error"], row["gain_error_origin"]) for row in rows} == {("0.003", "set")}
@@ -103,13 +104,9 @@ def test_a_finger_alone_does_for_a_scene_and_what_is_not_taken_is_said(tmp_path)
         finger_in(file)
 
 
-def printed(capsys):
-    return json.loads(capsys.readouterr().out)
-
-
 def test_predict_gives_a_row_a_trial_and_every_number_comes_out_again_in_another_process_to_the_last_bit(small, capsys):
     assert run(["predict", str(small), "--intervals", "--json"]) == 0
-    document = printed(capsys)
+    document = answer(capsys)
     for row in document["trials"]:
         assert row["interval"]["method"] in ("derivatives", "sampling")
         assert row["interval"]["low"] < row["sed"] < row["interval"]["high"]
@@ -131,9 +128,9 @@ def test_predict_gives_a_row_a_trial_and_every_number_comes_out_again_in_another
 
 
 def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_keeps_what_was_asked_before(
-    reported, tmp_path, capsys
+    report_dir, tmp_path, capsys
 ):
-    session = shutil.copytree(reported, tmp_path / "P01")
+    session = shutil.copytree(report_dir, tmp_path / "P01")
     stored = {name: json.loads((session / f"{name}.json").read_text()) for name in ("analysis", "prediction")}
     assert stored["analysis"]["settings"]["area"]["law"] == stored["prediction"]["area"]["law"] == "hertz"
     assert stored["analysis"]["bootstrap"]["settings"]["gain_error"] == 0.003
@@ -151,13 +148,13 @@ def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_kee
     page.write_text("<p>another page</p>")
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
-    assert any("report.html" in problem for problem in printed(capsys)["problems"])
+    assert any("report.html" in problem for problem in answer(capsys)["problems"])
 
 
-def test_the_commands_and_the_scene_at_the_end_of_a_report_give_its_numbers_again(reported, two, tmp_path, monkeypatch):
-    text = (reported / "report.html").read_text()
+def test_commands_and_scene_at_the_end_of_a_report_give_its_numbers(report_dir, two_trials, tmp_path, monkeypatch):
+    text = (report_dir / "report.html").read_text()
     scene, commands = (html.unescape(part) for part in re.findall(r"<pre>(.*?)</pre>", text, re.DOTALL))
-    shutil.copytree(two, tmp_path / "P01")
+    shutil.copytree(two_trials, tmp_path / "P01")
     (tmp_path / "P01-scene.toml").write_text(scene)
     assert hashlib.sha256(scene.encode()).hexdigest() in text
     monkeypatch.chdir(tmp_path)
@@ -166,27 +163,27 @@ def test_the_commands_and_the_scene_at_the_end_of_a_report_give_its_numbers_agai
     assert "--tau as-printed --indentation 1.2 --scene P01-scene.toml" in prediction
     for line in (analysis, prediction):
         assert run(shlex.split(line)[1:]) == 0
-    then, now = (json.loads((folder / "prediction.json").read_bytes()) for folder in (reported, tmp_path / "P01"))
+    then, now = (json.loads((folder / "prediction.json").read_bytes()) for folder in (report_dir, tmp_path / "P01"))
     assert [row["sed"] for row in now["trials"]] == [row["sed"] for row in then["trials"]]
     for name in ("area", "gain_error", "scene", "bootstrap_seed"):
         assert now[name] == then[name]
     assert now["afferent"]["settings"] == then["afferent"]["settings"]
-    before, after = (json.loads((folder / "analysis.json").read_bytes()) for folder in (reported, tmp_path / "P01"))
+    before, after = (json.loads((folder / "analysis.json").read_bytes()) for folder in (report_dir, tmp_path / "P01"))
     assert after["bootstrap"] == before["bootstrap"]
     assert after["bootstrap"]["settings"]["seed"] == now["bootstrap_seed"] == 7
     assert "seed 7" in text
 
 
 def test_an_exported_prediction_tells_its_model_and_friction_the_interval_of_the_number_the_model_got(
-    reported, tmp_path
+    report_dir, tmp_path
 ):
-    assert run(["export", str(reported), "--format", "csv", "--out", str(tmp_path / "out")]) == 0
+    assert run(["export", str(report_dir), "--format", "csv", "--out", str(tmp_path / "out")]) == 0
     friction, predictions = (
         list(csv.DictReader((tmp_path / "out" / f"{name}.csv").read_text().splitlines()))
         for name in ("friction", "predictions")
     )
-    told = json.loads((reported / "analysis.json").read_bytes())["bootstrap"]["strokes"]
-    for row, stroke, number in zip(friction, told, ("mu_max", "mu_dynamic"), strict=True):
+    document = json.loads((report_dir / "analysis.json").read_bytes())["bootstrap"]["strokes"]
+    for row, stroke, number in zip(friction, document, ("mu_max", "mu_dynamic"), strict=True):
         assert [float(row["mu_interval_low"]), float(row["mu_interval_high"])] == stroke[number]
         assert row["mu_interval_by"] == f"95 % block bootstrap of {number}"
         assert float(row["mu_interval_low"]) < float(row["mu"]) < float(row["mu_interval_high"])
@@ -194,7 +191,7 @@ def test_an_exported_prediction_tells_its_model_and_friction_the_interval_of_the
     model = ("small", "as-printed", "hertz", "set", "assumed")
     columns = ("kinematics", "tau_reading", "area_law", "indentation_origin", "width_origin")
     assert [tuple(row[name] for name in columns) for row in predictions] == [model, model]
-    assert all(row["scene_sha256"] in (reported / "report.html").read_text() for row in predictions)
+    assert all(row["scene_sha256"] in (report_dir / "report.html").read_text() for row in predictions)
     assert all(int(row["dofs"]) > 100 for row in predictions)
 
 
@@ -209,8 +206,8 @@ def test_an_analysis_of_an_older_program_keeps_the_settings_of_its_intervals(sma
     assert bootstrap_settings(settings) == now
 
 
-def test_the_options_of_a_prediction_of_an_older_program_are_read_by_their_present_names(reported, tmp_path):
-    folder = shutil.copytree(reported, tmp_path / "P01")
+def test_the_options_of_a_prediction_of_an_older_program_are_read_by_their_present_names(report_dir, tmp_path):
+    folder = shutil.copytree(report_dir, tmp_path / "P01")
     now = json.loads((folder / "prediction.json").read_bytes())
     older = {name: dict(now[name]) for name in ("options", "options_origin")}
     for part in older.values():
@@ -225,35 +222,35 @@ def test_the_options_of_a_prediction_of_an_older_program_are_read_by_their_prese
 
 def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, capsys, tmp_path):
     run(["analyse", str(small), "--json"])
-    before = printed(capsys)
+    before = answer(capsys)
     older = (small / "analysis.json").read_bytes()
     manifest = (small / "session.sqlite").read_bytes()
     start, stop = before["strokes"][0]["steady"]
     window = [str(start + 0.2), str(stop - 0.3)]
     decide = ["decide", str(small), "--by", "E02", "--why", "a ramp", "--json"]
     assert run([*decide, "--trial", "1", "--steady", *window]) == 0
-    assert printed(capsys)["decision"]["old"] == [start, stop]
+    assert answer(capsys)["decision"]["old"] == [start, stop]
     assert run([*decide, "--trial", "2", "--drop"]) == 0
-    assert printed(capsys)["changes"] == ["stroke 1 of trial 2: the model does not get it"]
+    assert answer(capsys)["changes"] == ["stroke 1 of trial 2: the model does not get it"]
     run(["analyse", str(small), "--json"])
-    after = printed(capsys)
+    after = answer(capsys)
     assert after["strokes"][0]["steady"] == pytest.approx([start + 0.2, stop - 0.3], abs=0.006)
     assert [(row["trial"], row["stroke"]) for row in after["friction"]] == [(1, 0)]
     assert run(["verify", str(small), "--json"]) == 0
-    assert "decisions.jsonl" in printed(capsys)["checked"]
+    assert "decisions.jsonl" in answer(capsys)["checked"]
     assert run(["export", str(small), "--format", "csv", "--out", str(tmp_path / "csv"), "--json"]) == 0
     capsys.readouterr()
     assert "a ramp" in (tmp_path / "csv" / "decisions.csv").read_text()
     (small / "analysis.json").write_bytes(older)
     assert run(["verify", str(small), "--json"]) == 3
-    assert any("analysis.json was made under other decisions" in problem for problem in printed(capsys)["problems"])
+    assert any("analysis.json was made under other decisions" in problem for problem in answer(capsys)["problems"])
     for number in ("1", "2"):
         assert run([*decide, "--undo", number]) == 0
         capsys.readouterr()
     assert run(["decide", str(small), "--list", "--json"]) == 0
-    assert [line["in_force"] for line in printed(capsys)["decisions"]] == [False] * 4
+    assert [line["in_force"] for line in answer(capsys)["decisions"]] == [False] * 4
     run(["analyse", str(small), "--json"])
-    assert printed(capsys)["strokes"] == before["strokes"]
+    assert answer(capsys)["strokes"] == before["strokes"]
     assert (small / "session.sqlite").read_bytes() == manifest
 
 
@@ -270,10 +267,10 @@ def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, 
         (["--trial", "1", "--drop", "--by", "Ada Lovelace", "--why", "w"], 2, "never a name"),
     ],
 )
-def test_a_decision_that_cannot_be_is_refused_in_one_sentence(two, capsys, words, code, sentence):
-    assert run(["decide", str(two), *words]) == code
+def test_a_decision_that_cannot_be_is_refused_in_one_sentence(two_trials, capsys, words, code, sentence):
+    assert run(["decide", str(two_trials), *words]) == code
     assert sentence in capsys.readouterr().err
-    assert not (two / "decisions.jsonl").exists()
+    assert not (two_trials / "decisions.jsonl").exists()
 
 
 def test_a_decision_is_not_recorded_where_a_damaged_setting_would_keep_it_from_being_followed(small, capsys):
@@ -283,36 +280,36 @@ def test_a_decision_is_not_recorded_where_a_damaged_setting_would_keep_it_from_b
     assert "set it anew" in capsys.readouterr().err
     assert not (small / "decisions.jsonl").exists()
     assert run(["verify", str(small), "--json"]) == 3
-    assert any("calibration-error.json is damaged" in problem for problem in printed(capsys)["problems"])
+    assert any("calibration-error.json is damaged" in problem for problem in answer(capsys)["problems"])
 
 
 def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, capsys):
     run(["analyse", str(small), "--json"])
-    fixed = printed(capsys)["strokes"]
+    fixed = answer(capsys)["strokes"]
     assert run(["analyse", str(small), "--area", "hertz", "--area-force", "1", "--json"]) == 0
-    document = printed(capsys)
+    document = answer(capsys)
     assert document["settings"]["area"] == {"law": "hertz", "exponent": pytest.approx(2 / 3), "force": 1.0}
-    for one, other in zip(document["strokes"], fixed, strict=True):
-        assert one["tau_max"] * one["contact_area"] <= other["tau_max"] * 100.0 * (1 + 1e-9)
-        assert one["contact_area"] > 100.0  # every stroke of the simulated subject presses harder than 1 N
+    for stroke, fixed_stroke in zip(document["strokes"], fixed, strict=True):
+        assert stroke["tau_max"] * stroke["contact_area"] <= fixed_stroke["tau_max"] * 100.0 * (1 + 1e-9)
+        assert stroke["contact_area"] > 100.0  # every stroke of the simulated subject presses harder than 1 N
     assert run(["verify", str(small)]) == 0
 
 
 def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_is_set(small, capsys):
     run(["analyse", str(small), "--json"])
-    assumed = printed(capsys)["bootstrap"]
+    assumed = answer(capsys)["bootstrap"]
     assert assumed["settings"]["gain_error_origin"] == "assumed"
     run(["analyse", str(small), "--calibration-error", "0.1", "--json"])
-    known = printed(capsys)["bootstrap"]
-    for one, other in zip(known["strokes"], assumed["strokes"], strict=True):
+    bootstrap = answer(capsys)["bootstrap"]
+    for stroke, assumed_stroke in zip(bootstrap["strokes"], assumed["strokes"], strict=True):
         # What is not known of the lean is in both.
-        assert np.ptp(one["normal_force"]) < np.ptp(other["normal_force"])
+        assert np.ptp(stroke["normal_force"]) < np.ptp(assumed_stroke["normal_force"])
     (small / "analysis.json").write_text("torn")  # what was set is no part of what can be made anew
     run(["analyse", str(small), "--json"])
-    assert printed(capsys)["bootstrap"] == known
+    assert answer(capsys)["bootstrap"] == bootstrap
     assert run(["predict", str(small), "--beside", "none", "--json"]) == 0
-    assert printed(capsys)["gain_error"] == 0.001
-    assert json.loads((small / "analysis.json").read_text())["bootstrap"] == known
+    assert answer(capsys)["gain_error"] == 0.001
+    assert json.loads((small / "analysis.json").read_text())["bootstrap"] == bootstrap
     assert run(["verify", str(small)]) == 0
     recording = Recording.open(small)
     analysis = analyse(recording, AnalysisSettings(gain_error=gain_error_set(small)))
@@ -338,17 +335,17 @@ def test_what_was_set_is_exported_without_an_analysis_and_a_damaged_setting_is_n
 
 
 def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_is_named(small, capsys):
-    asked = ["--afferent", "--afferent-set", "static_gain=30", "--intervals", "--beside", "none"]
-    assert run(["predict", str(small), *asked, "--json"]) == 0
-    shown = printed(capsys)["afferent"]
-    assert json.loads((small / "prediction.json").read_text())["afferent"] == shown
+    options = ["--afferent", "--afferent-set", "static_gain=30", "--intervals", "--beside", "none"]
+    assert run(["predict", str(small), *options, "--json"]) == 0
+    afferent = answer(capsys)["afferent"]
+    assert json.loads((small / "prediction.json").read_text())["afferent"] == afferent
     assert run(["verify", str(small)]) == 0
     capsys.readouterr()
     run(["predict", str(small), "--beside", "none"])
     assert "intervals of the SED (--intervals)" in capsys.readouterr().err
-    kept = json.loads((small / "prediction.json").read_text())["afferent"]
-    assert (kept["settings"], kept["reference_sed"]) == (shown["settings"], shown["reference_sed"])
-    assert [one["rate"] for one in kept["trials"]] == [one["rate"] for one in shown["trials"]]
+    document = json.loads((small / "prediction.json").read_text())["afferent"]
+    assert (document["settings"], document["reference_sed"]) == (afferent["settings"], afferent["reference_sed"])
+    assert [trial["rate"] for trial in document["trials"]] == [trial["rate"] for trial in afferent["trials"]]
 
 
 def test_a_prediction_made_with_another_calibration_error_is_named(small, capsys):
@@ -365,8 +362,8 @@ def test_a_study_computes_a_session_again_once_another_calibration_error_was_set
     assert shelf.key(small) == before  # nobody set one
     run(["analyse", str(small), "--calibration-error", "0.1"])
     assert shelf.key(small) != before
-    sent = content_of(small)
-    assert json.loads(sent["calibration-error.json"])["gain_error"] == 0.001
+    content = content_of(small)
+    assert json.loads(content["calibration-error.json"])["gain_error"] == 0.001
 
 
 def test_a_study_computes_a_session_again_once_something_was_decided_about_it(small, tmp_path):
@@ -380,7 +377,7 @@ def test_an_analysis_of_odd_parts_is_refused_in_a_sentence_and_made_anew_where_t
     (small / "analysis.json").write_text('{"strokes": [], "friction": [], "flaws": [], "bootstrap": 7}')
     assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "out")]) == 1
     assert run(["decide", str(small), "--trial", "1", "--drop", "--by", "E02", "--why", "pulled away"]) == 1
-    told = capsys.readouterr().err.splitlines()
-    assert [line for line in told if "analysis.json is damaged" in line and "daq-app analyse" in line] == told
+    lines = capsys.readouterr().err.splitlines()
+    assert [line for line in lines if "analysis.json is damaged" in line and "daq-app analyse" in line] == lines
     assert run(["analyse", str(small)]) == 0
     assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "out")]) == 0

@@ -37,10 +37,10 @@ def documents(session):
     return {name: json.loads((session / name).read_text()) for name in (ANALYSIS, PREDICTION)}
 
 
-def spoilt(data, document):
+def spoil(data, document):
     """Return a document with nonsense at one place of it, of those that are no long column of numbers."""
-    found = copy.deepcopy(document)
-    inside = found
+    damaged = copy.deepcopy(document)
+    inside = damaged
     while True:
         names = list(inside) if isinstance(inside, dict) else list(range(min(len(inside), 3)))
         name = data.draw(st.sampled_from(names))
@@ -53,7 +53,7 @@ def spoilt(data, document):
         del inside[name]
     else:
         inside[name] = nonsense
-    return found
+    return damaged
 
 
 @pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])
@@ -63,17 +63,17 @@ def test_a_stored_document_with_nonsense_is_named_with_its_verb_or_makes_every_t
     session, documents, tmp_path_factory, name, data
 ):
     room = tmp_path_factory.mktemp("room")
-    (room / name).write_text(json.dumps(spoilt(data, documents[name])))
+    (room / name).write_text(json.dumps(spoil(data, documents[name])))
     try:
-        found = stored_document(room, name)
+        document = stored_document(room, name)
     except RecordingError as damaged:
-        told = str(damaged)
-        found = None
-    if found is None:
-        assert f"{name} is damaged" in told
-        assert VERB[name] in told
+        sentence = str(damaged)
+        document = None
+    if document is None:
+        assert f"{name} is damaged" in sentence
+        assert VERB[name] in sentence
         return
-    source = {ANALYSIS: documents[ANALYSIS], PREDICTION: documents[PREDICTION], name: found}
+    source = {ANALYSIS: documents[ANALYSIS], PREDICTION: documents[PREDICTION], name: document}
     for table in tables(ExportSource(reveal(Recording.open(session)), source[ANALYSIS], source[PREDICTION])):
         assert all(isinstance(cell, str | int | float | None) for column in table.columns for cell in column.values)
 
@@ -92,10 +92,10 @@ def test_an_export_of_nonsense_ends_in_one_sentence(session, tmp_path, capsys, n
     folder = shutil.copytree(session, tmp_path / "P01")
     (folder / name).write_text(content)
     assert run(["export", str(folder), "--format", form, "--out", str(tmp_path / "out")]) == 1
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 1
-    assert f"{name} is damaged" in told[0]
-    assert VERB[name] in told[0]
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert f"{name} is damaged" in lines[0]
+    assert VERB[name] in lines[0]
 
 
 @pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])
@@ -132,14 +132,14 @@ def test_a_document_that_lacks_a_number_is_damaged_and_the_sentence_names_it(doc
 def test_a_seal_with_nonsense_proves_nothing_and_stands_in_nobodys_way(session, data):
     numbers = [{"trial": 1, "mu": 0.3, "tau_max": 0.01, "indentation": 2.0, "direction": 1, "sed": 0.008}]
     seal = {"sealed_utc": "2026-01-01", "blinded": False, "sha256": digest(numbers), "numbers": numbers}
-    (session / SEAL).write_text(json.dumps(spoilt(data, seal)))
+    (session / SEAL).write_text(json.dumps(spoil(data, seal)))
     try:
         assert sealed_sentence(Recording.open(session), numbers).endswith(".")
     finally:
         (session / SEAL).unlink()
 
 
-PLANTED = {
+TRUTH = {
     "score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0, "friction": {"stickiness": 52.0}},
     "people": {"gain_spread": 0.05, "offset_spread": 3.0, "judgement_noise": 4.0, "moisture": 0.08},
     "calibration_sd": 0.01,
@@ -157,11 +157,11 @@ def pooled_study():
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_what_was_planted_is_refused_as_a_whole_or_held_against_what_was_found(pooled_study, data):
-    planted = spoilt(data, PLANTED)
+    truth = spoil(data, TRUTH)
     try:
-        held = check_ground_truth(planted)
+        checked = check_ground_truth(truth)
     except ValueError:
         return
-    planted_effects(pooled_study.descriptors, held)
-    planted_friction(pooled_study.visits, held["strokes"])
-    assert len(planted_flaws(pooled_study.visits, {}, held.get("spoilt", {}))) == len(held.get("spoilt", {}))
+    planted_effects(pooled_study.descriptors, checked)
+    planted_friction(pooled_study.visits, checked["strokes"])
+    assert len(planted_flaws(pooled_study.visits, {}, checked.get("spoilt", {}))) == len(checked.get("spoilt", {}))

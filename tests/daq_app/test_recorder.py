@@ -84,7 +84,7 @@ def test_a_session_run_through_the_recorder_is_whole_and_sealed(whole):
 def test_the_client_is_told_every_event_of_the_log_once_it_is_safe(whole):
     desk, recording, _ = whole
     assert tuple(desk.of(LoggedEvent)) == recording.events
-    order = [report for report in desk.seen if isinstance(report, LoggedEvent | AskStroke | MeasureZero)]
+    order = [report for report in desk.reports if isinstance(report, LoggedEvent | AskStroke | MeasureZero)]
     for before, after in itertools.pairwise(order):
         if isinstance(after, AskStroke):
             assert before.kind == "stroke_asked"
@@ -92,34 +92,34 @@ def test_the_client_is_told_every_event_of_the_log_once_it_is_safe(whole):
 
 def test_the_lamp_is_fed_by_what_the_disk_has_acknowledged(whole):
     desk, recording, _ = whole
-    told = desk.of(Status)
-    assert told[-1].safe.readings <= len(recording.readings())
-    assert max(status.safe.events for status in told) > 9 * len(SHORT.trials)
-    assert all(status.safe.readings <= status.readings for status in told)
+    statuses = desk.of(Status)
+    assert statuses[-1].safe.readings <= len(recording.readings())
+    assert max(status.safe.events for status in statuses) > 9 * len(SHORT.trials)
+    assert all(status.safe.readings <= status.readings for status in statuses)
 
 
 def test_every_reading_is_shown_live_as_it_is_recorded(whole):
     desk, recording, _ = whole
     live = [report for report in desk.of(Live) if report.stream == 2]
-    shown = np.concatenate([report.sequence for report in live])
-    recorded = recording.readings()
+    sequence = np.concatenate([report.sequence for report in live])
+    block = recording.readings()
     assert sum(report.left_out for report in live) == 0
-    np.testing.assert_array_equal(shown, recorded.sequence[: len(shown)])
-    assert len(shown) > 0.99 * len(recorded)
+    np.testing.assert_array_equal(sequence, block.sequence[: len(sequence)])
+    assert len(sequence) > 0.99 * len(block)
     zero = np.array(live[-1].zero)
     assert zero.tolist() == [e for e in recording.events if e.kind == "zeroed"][-1].data["mean"]
     n = len(live[-1].wrench)
-    wrench = recording.info.calibration.wrench(recorded.raw[len(shown) - n : len(shown)], zero)
+    wrench = recording.info.calibration.wrench(block.raw[len(sequence) - n : len(sequence)], zero)
     np.testing.assert_allclose(live[-1].wrench, wrench, rtol=0, atol=1e-9)
 
 
 def test_the_bench_is_shown_before_and_after_a_session_with_its_own_zero(whole):
     desk, _, _ = whole
     assert {report.stream for report in desk.of(Live)} == {1, 2, 3}
-    tared = desk.of(Tared)[0]
-    assert tared.duration == pytest.approx(2.0, abs=0.006)  # a reading's step, by a counter good to 0.5 %
-    assert tared.noise[2] == pytest.approx(0.004, rel=0.4)  # planted: 4 mN
-    before = [report for report in desk.of(Live) if report.stream == 1 and report.zero == tared.mean]
+    tare = desk.of(Tared)[0]
+    assert tare.duration == pytest.approx(2.0, abs=0.006)  # a reading's step, by a counter good to 0.5 %
+    assert tare.noise[2] == pytest.approx(0.004, rel=0.4)  # planted: 4 mN
+    before = [report for report in desk.of(Live) if report.stream == 1 and report.zero == tare.mean]
     assert np.abs(np.concatenate([report.wrench[:, 2] for report in before])).max() < 0.05
 
 
@@ -153,15 +153,15 @@ def sockets_of(pid):
             continue
         if target.startswith("socket:["):
             inodes.add(target[8:-1])
-    found = []
+    addresses = []
     for table in ("tcp", "udp", "tcp6", "udp6"):
         path = Path(f"/proc/net/{table}")
         rows = path.read_text().splitlines()[1:] if path.exists() else []
-        found += [row.split()[1] for row in rows if row.split()[9] in inodes]
-    return found
+        addresses += [row.split()[1] for row in rows if row.split()[9] in inodes]
+    return addresses
 
 
-def started(desk, folder, people="simulated hand"):
+def start_stroke(desk, folder, people="simulated hand"):
     """Have a session running, and return once its first stroke is felt."""
     desk.begin(folder, people)
     while desk.until(LoggedEvent).kind != "contact_onset":
@@ -178,7 +178,7 @@ def wait_for(folder, holds):
 def test_a_client_that_goes_leaves_a_session_recorded_until_the_lift_which_a_new_one_resumes(tmp_path):
     folder = tmp_path / "s"
     first = Recorder.start(PACE)
-    started(Desk(first), folder)
+    start_stroke(Desk(first), folder)
     first.leave()
     wait_for(folder, lambda recording: recording.end is not None)
     before = Recording.open(folder)
@@ -190,8 +190,8 @@ def test_a_client_that_goes_leaves_a_session_recorded_until_the_lift_which_a_new
     with Recorder.start(PACE) as second:
         desk = Desk(second)
         second.send(ResumeSession(str(folder)))  # device and people are those it began with
-        begun = desk.until(SessionBegun)
-        assert begun.events == before.events
+        report = desk.until(SessionBegun)
+        assert report.events == before.events
         assert desk.until(AskMount).trial.number == 1
         second.send(Stop())
         assert desk.until(SessionEnded).end.cause == "stopped"
@@ -201,7 +201,7 @@ def test_a_client_that_goes_leaves_a_session_recorded_until_the_lift_which_a_new
 
 def test_a_session_begun_after_one_that_was_resumed_has_readings_and_events_by_one_clock(tmp_path):
     first = Recorder.start(PACE)
-    started(Desk(first), tmp_path / "s")
+    start_stroke(Desk(first), tmp_path / "s")
     first.leave()
     wait_for(tmp_path / "s", lambda recording: recording.end is not None)
     with Recorder.start(PACE) as second:
@@ -213,9 +213,9 @@ def test_a_session_begun_after_one_that_was_resumed_has_readings_and_events_by_o
         second.send(StartSession(SHORT, str(tmp_path / "next"), People("simulated hand", 7)))
         desk.until(Sealed)
     recording = Recording.open(tmp_path / "next")
-    arrived = recording.readings().received_ns
-    assert recording.events[0].time_ns <= arrived[0]
-    assert arrived[-1] <= recording.events[-1].time_ns
+    received_ns = recording.readings().received_ns
+    assert recording.events[0].time_ns <= received_ns[0]
+    assert received_ns[-1] <= recording.events[-1].time_ns
 
 
 @pytest.mark.skipif(os.name != "posix", reason="kill -9 needs POSIX")
@@ -223,18 +223,18 @@ def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_g
     folder = tmp_path / "s"
     with Recorder.start(PACE) as first:
         desk = Desk(first)
-        started(desk, folder)
+        start_stroke(desk, folder)
         with Recorder.start(PACE) as another:
             another.send(ResumeSession(str(folder)))
             assert "is in use" in Desk(another).until(Failed).sentence
         os.kill(first.pid, signal.SIGKILL)
-        gone = desk.until(Gone)
-    assert not gone.requested
-    assert "signal 9" in gone.sentence
-    assert "resume the session" in gone.sentence
-    told = desk.of(LoggedEvent)
+        report = desk.until(Gone)
+    assert not report.requested
+    assert "signal 9" in report.sentence
+    assert "resume the session" in report.sentence
+    events = desk.of(LoggedEvent)
     before = Recording.open(folder)
-    assert list(before.events[: len(told)]) == told
+    assert list(before.events[: len(events)]) == events
     assert len(before.readings()) >= max(status.safe.readings for status in desk.of(Status))
     with Recorder.start(PACE) as second:
         desk = Desk(second)
@@ -289,10 +289,10 @@ def test_a_stop_breaks_off_a_connection_that_does_not_come_about():
         silent.settimeout(DEADLINE)
         caller, _ = silent.accept()  # it waits for an answer now
         recorder.send(Stop())
-        failed = desk.until(Failed)
+        failure = desk.until(Failed)
         caller.close()
-    assert failed.request == "Connect"
-    assert failed.sentence.endswith("stopped by the user")
+    assert failure.request == "Connect"
+    assert failure.sentence.endswith("stopped by the user")
     assert not desk.of(NoDevice)
 
 
@@ -303,13 +303,13 @@ def test_a_session_whose_folder_is_removed_stops_within_seconds_and_goes_on_in_t
         desk.begin(folder)
         desk.until(AskStroke)
         shutil.rmtree(folder)
-        ended = desk.until(SessionEnded)
-        rescued = Path(ended.folder)
-        assert rescued == tmp_path / "s-rescued"
-        assert (ended.end.cause, ended.resumable) == ("disk", True)
-        assert str(rescued) in ended.end.reason
-        assert desk.of(LoggedEvent) == list(Recording.open(rescued).events)
-        recorder.send(ResumeSession(str(rescued)))
+        report = desk.until(SessionEnded)
+        rescue_folder = Path(report.folder)
+        assert rescue_folder == tmp_path / "s-rescued"
+        assert (report.end.cause, report.resumable) == ("disk", True)
+        assert str(rescue_folder) in report.end.reason
+        assert desk.of(LoggedEvent) == list(Recording.open(rescue_folder).events)
+        recorder.send(ResumeSession(str(rescue_folder)))
         desk.until(Sealed)
-    assert {record.outcome for record in Recording.open(rescued).trials} == {"scored"}
+    assert {record.outcome for record in Recording.open(rescue_folder).trials} == {"scored"}
     assert not folder.exists()

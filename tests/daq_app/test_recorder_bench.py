@@ -21,20 +21,20 @@ class Seat:
         self.bench = Bench(RealClock(), self.display, self.reports.append)
         self.bench.connect("sim:?seed=7")
 
-    def until(self, wanted):
+    def until(self, kind):
         """Go on until a report of this kind comes, and return it; those before are forgotten."""
         self.reports.clear()
-        while not (found := [report for report in self.reports if isinstance(report, wanted)]):
+        while not (reports := [report for report in self.reports if isinstance(report, kind)]):
             self.bench.look()
             self.display.look(self.bench.health)
-        return found[0]
+        return reports[0]
 
 
 @pytest.fixture
 def seat():
-    made = Seat()
-    yield made
-    made.bench.disconnect()
+    new_seat = Seat()
+    yield new_seat
+    new_seat.bench.disconnect()
 
 
 def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(seat):
@@ -77,38 +77,38 @@ def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
     display = Display(reports.append, 1.0)
     display.device(INFO)
     display.set_zero((0.0, 0.0, -9e6, 0.0, 0.0, 0.0))  # a plate of 9 N
-    one = np.zeros(1, np.int64)
-    display.take(ReadingBlock(one, one, one, one / 1.0, one, np.array([[4.5e6, 0.0, -18e6, 0.0, 0.0, 0.0]])))
+    ones = np.zeros(1, np.int64)
+    display.take(ReadingBlock(ones, ones, ones, ones / 1.0, ones, np.array([[4.5e6, 0.0, -18e6, 0.0, 0.0, 0.0]])))
     display.look(Health())
-    [report] = (one for one in reports if isinstance(one, HealthReport))
+    [report] = (report for report in reports if isinstance(report, HealthReport))
     assert report.load[:3] == report.peak[:3] == pytest.approx((4.5 / 36, 0.0, 0.5))
 
 
 def test_the_time_since_the_newest_reading_is_told_and_where_none_need_come_it_is_nothing(monkeypatch):
     now, reports = [100.0], []
     monkeypatch.setattr("daq_app.recorder.display.time.monotonic", lambda: now[0])
-    display, one = Display(reports.append, 1.0), np.zeros(1, np.int64)
+    display, ones = Display(reports.append, 1.0), np.zeros(1, np.int64)
 
-    def told(at, **how):
+    def silence(at, **how):
         now[0] = at
         display.look(Health(), **how)
         return reports[-1].silence
 
-    assert told(130.0) == 0.0  # there is no transducer
+    assert silence(130.0) == 0.0  # there is no transducer
     display.device(INFO)
     display.stream_began()
-    assert told(131.5) == 1.5
-    display.take(ReadingBlock(one, one, one, one / 1.0, one, np.zeros((1, 6))))
-    assert told(131.7) == pytest.approx(0.2)
-    assert told(190.0, streaming=False) == 0.0
+    assert silence(131.5) == 1.5
+    display.take(ReadingBlock(ones, ones, ones, ones / 1.0, ones, np.zeros((1, 6))))
+    assert silence(131.7) == pytest.approx(0.2)
+    assert silence(190.0, streaming=False) == 0.0
 
 
 def test_zero_and_greatest_loads_stay_when_the_same_transducer_answers_again_and_go_with_another(seat):
     seat.bench.begin_tare(0.5)
-    tared, peak = seat.until(Tared), seat.until(HealthReport).peak
+    tare, peak = seat.until(Tared), seat.until(HealthReport).peak
     seat.bench.lose("the cable is out")
     assert seat.until(LinkBack).same
-    assert seat.until(Live).zero == tared.mean
+    assert seat.until(Live).zero == tare.mean
     assert np.all(np.array(seat.until(HealthReport).peak) >= peak)
     seat.bench.lose("the cable is out")
     seat.bench.uri = "sim:?seed=8"

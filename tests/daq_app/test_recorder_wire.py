@@ -37,14 +37,14 @@ from sessions.run.steps import AskScore, Scored, Zeroed
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, forces=True)
 SIX = (1.0, 2.0, 3.0, 4.0, 5.0, math.nan)
-ASKED = [
+REQUEST_EXAMPLES = [
     Connect("sim:?seed=7"),
     StartSession(PLAN, "recordings/P07", People("simulated hand", 7), (Setting("seed", 3, "", "set"),)),
     ResumeSession("recordings/Ä 日", None, None),
     Stop(),
     Scored(None, ((1.5, 20.0), (1.75, 30.25)), 1.5, 1, "left", "pen"),
 ]
-TOLD = [
+REPORT_EXAMPLES = [
     Device(INFO, Frame("-z", "set", 20.0, "set")),
     HealthReport(Health(received=7), 200.5, (*SIX, 2.0), (*SIX, 2.0), 0),
     Live(
@@ -67,7 +67,7 @@ def same(a, b):
     return a == b or (isinstance(a, float) and math.isnan(a) and math.isnan(b))
 
 
-@pytest.mark.parametrize(("types", "messages"), [(REQUESTS, ASKED), (REPORTS, TOLD)])
+@pytest.mark.parametrize(("types", "messages"), [(REQUESTS, REQUEST_EXAMPLES), (REPORTS, REPORT_EXAMPLES)])
 @given(data=st.data())
 def test_messages_come_out_as_they_went_in_but_for_one_that_is_cut_short(types, messages, data):
     codec = Codec(types)
@@ -97,7 +97,7 @@ def test_a_length_beyond_all_reason_is_refused_before_anything_is_gathered():
 
 
 def test_an_array_of_objects_is_refused():
-    body = Codec([Live]).encode(TOLD[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
+    body = Codec([Live]).encode(REPORT_EXAMPLES[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
     with pytest.raises(BrokenMessage):
         Codec([Live]).decode(body)
 

@@ -9,7 +9,7 @@ from daq_app.cli.main import run
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def session_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("replay") / "P07"
     words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P07", "--headless"]
     assert run([*words, "--simulate-subject", "7", "--pace", "50", "--seed", "3", "--out", str(folder), "--json"]) == 0
@@ -17,32 +17,32 @@ def recorded(tmp_path_factory):
     return folder
 
 
-def test_a_session_that_came_over_the_wire_replays_identical_with_exit_code_0(recorded, capsys):
-    assert run(["replay", str(recorded), "--fast", "--json"]) == 0
+def test_a_session_that_came_over_the_wire_replays_identical_with_exit_code_0(session_folder, capsys):
+    assert run(["replay", str(session_folder), "--fast", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["differences"] == []
     assert document["compared"] == ["readings", "events", "analysis.json"]
 
 
-def test_a_stored_number_that_comes_out_otherwise_is_named_with_exit_code_3(recorded, tmp_path, capsys):
-    session = shutil.copytree(recorded, tmp_path / "P07")
-    stored = json.loads((session / "analysis.json").read_text())
-    stored["strokes"][2]["mu_dynamic"] += 1e-9
-    (session / "analysis.json").write_text(json.dumps(stored))
+def test_a_stored_number_that_comes_out_otherwise_is_named_with_exit_code_3(session_folder, tmp_path, capsys):
+    session = shutil.copytree(session_folder, tmp_path / "P07")
+    analysis = json.loads((session / "analysis.json").read_text())
+    analysis["strokes"][2]["mu_dynamic"] += 1e-9
+    (session / "analysis.json").write_text(json.dumps(analysis))
     assert run(["replay", str(session), "--fast", "--json"]) == 3
     difference, why = json.loads(capsys.readouterr().out)["differences"]
     assert difference.startswith("analysis.json.strokes[2].mu_dynamic was stored as")
     assert why.startswith("analysis.json was made by the same versions as now")
 
 
-def test_a_replay_leaves_the_session_as_it_was(recorded):
-    before = {path.name: path.read_bytes() for path in recorded.iterdir()}
-    assert run(["replay", str(recorded), "--speed", "500", "--json"]) == 0
-    assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
+def test_a_replay_leaves_the_session_as_it_was(session_folder):
+    before = {path.name: path.read_bytes() for path in session_folder.iterdir()}
+    assert run(["replay", str(session_folder), "--speed", "500", "--json"]) == 0
+    assert {path.name: path.read_bytes() for path in session_folder.iterdir()} == before
 
 
-def test_a_recording_is_a_device_that_can_be_probed(recorded, capsys):
-    assert run(["devices", "probe", f"replay:{recorded}", "--json"]) == 0
+def test_a_recording_is_a_device_that_can_be_probed(session_folder, capsys):
+    assert run(["devices", "probe", f"replay:{session_folder}", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["simulated"] is True
     assert document["serial"] == "SIM00007"
@@ -52,8 +52,8 @@ def test_a_recording_is_a_device_that_can_be_probed(recorded, capsys):
 @pytest.mark.parametrize(
     ("words", "code"), [(["--speed", "0"], 2), (["--speed", "fast"], 2), (["--fast", "--speed", "2"], 2)]
 )
-def test_a_pace_that_cannot_be_is_exit_code_2(recorded, words, code, capsys):
-    assert run(["replay", str(recorded), *words]) == code
+def test_a_pace_that_cannot_be_is_exit_code_2(session_folder, words, code, capsys):
+    assert run(["replay", str(session_folder), *words]) == code
     assert capsys.readouterr().err
 
 

@@ -11,7 +11,7 @@ import pytest
 from daq_app.cli.main import run
 from sessions.recording import Recording, RecordingError
 
-PLANTED = {3: 0.15, 70: 0.6}  # friction of two surfaces on the simulated bench, by index
+FRICTION = {3: 0.15, 70: 0.6}  # friction of two surfaces on the simulated bench, by index
 OWN = f"""
 name = "own"
 title = "Cloths"
@@ -25,8 +25,8 @@ scale_ends = ["not at all", "very"]
 direction = "proximal to distal"
 indentation = 2.0
 instruction = "Stroke once, then score."
-indices = {list(PLANTED)}
-planted_friction = {list(PLANTED.values())}
+indices = {list(FRICTION)}
+planted_friction = {list(FRICTION.values())}
 repetitions = 4
 """
 
@@ -43,11 +43,11 @@ def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_en
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    kept = False
-    while not kept and process.poll() is None:
+    has_take = False
+    while not has_take and process.poll() is None:
         time.sleep(0.05)
         with suppress(RecordingError):  # not begun yet
-            kept = any(event.kind == "take_kept" for event in Recording.open(folder).events)
+            has_take = any(event.kind == "take_kept" for event in Recording.open(folder).events)
     process.send_signal(signal.SIGKILL)
     process.wait()
     while (before := Recording.open(folder)).end is None:  # the recorder waits for the lift
@@ -67,9 +67,9 @@ def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_en
     assert run(resume) == 1
     assert "is sealed" in capsys.readouterr().err
     assert run(["analyse", str(folder), "--json"]) in (0, 3)
-    analysed = json.loads(capsys.readouterr().out)
-    strokes = analysed["strokes"]
+    analysis = json.loads(capsys.readouterr().out)
+    strokes = analysis["strokes"]
     assert {stroke["trial"] for stroke in strokes if stroke["trial"]} == {trial.number for trial in after.plan.trials}
-    planted = {trial.number: PLANTED[trial.stimulus.index] for trial in after.plan.trials}
-    for row in analysed["friction"]:  # of the strokes before the end and after it
-        assert row["mu"] == pytest.approx(planted[row["trial"]], rel=0.1)
+    friction = {trial.number: FRICTION[trial.stimulus.index] for trial in after.plan.trials}
+    for row in analysis["friction"]:  # of the strokes before the end and after it
+        assert row["mu"] == pytest.approx(friction[row["trial"]], rel=0.1)

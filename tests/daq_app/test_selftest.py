@@ -2,7 +2,7 @@ import json
 from types import SimpleNamespace
 
 import pytest
-from recordings import ended
+from recordings import record_session
 
 from daq_app.cli.main import run
 from daq_app.cli.verbs import selftest
@@ -17,22 +17,22 @@ def test_the_selftest_kills_cuts_fills_stops_and_later_sessions_carry_its_certif
     for name, value in {"KILLS": 2, "STOPS": 1, "CUTS": 4, "RUNNING": (0.1, 0.4)}.items():
         monkeypatch.setattr(selftest, name, value)
     assert run(["selftest", "--out", str(tmp_path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["passed"]
-    assert "was killed 2 times, the end of its log was cut off 4 times" in told["sentence"]
-    assert told["quota"]["readings"] > 4 * 2**20 / 88 * 0.9  # as many as the room holds, by 88 bytes each
+    document = json.loads(capsys.readouterr().out)
+    assert document["passed"]
+    assert "was killed 2 times, the end of its log was cut off 4 times" in document["sentence"]
+    assert document["quota"]["readings"] > 4 * 2**20 / 88 * 0.9  # as many as the room holds, by 88 bytes each
     assert [path.name for path in tmp_path.iterdir()] == ["daq-app-selftest.json"]
     folder = tmp_path / "P08"
     words = ["run", "sensotact-friction", "--scores-only", "--subject", "P08", "--simulate-subject", "1"]
     assert run([*words, "--pace", "20", "--out", str(folder)]) == 0
-    carried = Recording.open(folder).provenance["selftest"]
-    assert carried["same_program"]
-    assert carried["sentence"] == told["sentence"]
+    certificate = Recording.open(folder).provenance["selftest"]
+    assert certificate["same_program"]
+    assert certificate["sentence"] == document["sentence"]
 
 
 def test_a_selftest_that_is_stopped_leaves_nothing_however_long_its_recorder_has_run(tmp_path, monkeypatch):
-    def press_ctrl_c(watched, _):
-        watched.until(Status)
+    def press_ctrl_c(observed, _):
+        observed.until(Status)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(selftest._WatchedRecorder, "hear", press_ctrl_c)
@@ -45,16 +45,16 @@ def test_a_selftest_that_is_stopped_leaves_nothing_however_long_its_recorder_has
 
 @pytest.mark.parametrize("what", ["readings", "event", "trial"])
 def test_the_selftest_fails_where_anything_acknowledged_is_missing(tmp_path, what):
-    recording = Recording.open(ended(tmp_path / "s"))
+    recording = Recording.open(record_session(tmp_path / "s"))
     events = list(recording.events)
-    watched = SimpleNamespace(events=events, safe=300)
-    selftest._check_recording(recording, watched, 1)
+    observed = SimpleNamespace(events=events, safe=300)
+    selftest._check_recording(recording, observed, 1)
     if what == "readings":
-        watched.safe = 301
+        observed.safe = 301
     if what == "event":
-        watched.events = [*events, LoggedEvent(len(events) + 1, 0, "scored", 1, 300, {"score": 1.0})]
+        observed.events = [*events, LoggedEvent(len(events) + 1, 0, "scored", 1, 300, {"score": 1.0})]
     with pytest.raises(selftest.SelfTestFailed):
-        selftest._check_recording(recording, watched, 2 if what == "trial" else 1)
+        selftest._check_recording(recording, observed, 2 if what == "trial" else 1)
 
 
 def test_a_certificate_of_other_versions_says_so_and_a_damaged_one_counts_for_nothing(tmp_path):

@@ -33,11 +33,11 @@ def test_of_a_sum_each_index_is_its_share_of_the_variance():
     indices, _ = sensitivity(
         SCENE, DESIGN, 1024, 0, quiet, lambda s: 3.0 * s.friction.mu + 2.0 * (s.loading.indentation or 0.0)
     )
-    found = {one.name: one for one in indices}
+    by_name = {index.name: index for index in indices}
     share = 9 * 0.16 / (9 * 0.16 + 4)
-    assert [one.name for one in indices] == ["loading.indentation", "friction.mu"]
-    assert found["friction.mu"].first == pytest.approx(share, abs=0.02)
-    assert found["friction.mu"].total == pytest.approx(share, abs=0.02)
+    assert [index.name for index in indices] == ["loading.indentation", "friction.mu"]
+    assert by_name["friction.mu"].first == pytest.approx(share, abs=0.02)
+    assert by_name["friction.mu"].total == pytest.approx(share, abs=0.02)
 
 
 @pytest.mark.parametrize("seed", [0, 3])
@@ -59,7 +59,7 @@ def test_of_a_product_about_zero_nothing_acts_alone():
         quiet,
         lambda s: (s.friction.mu - middle["friction.mu"]) * ((s.loading.indentation or 0.0) - 1.0),
     )
-    assert all(abs(one.first) < 0.05 and one.total == pytest.approx(1.0, abs=0.05) for one in indices)
+    assert all(abs(index.first) < 0.05 and index.total == pytest.approx(1.0, abs=0.05) for index in indices)
 
 
 def test_a_range_to_one_side_and_an_impossible_share_are_named_with_the_samples_that_would_do():
@@ -72,7 +72,7 @@ def test_a_range_to_one_side_and_an_impossible_share_are_named_with_the_samples_
     for wrong in (replace(sound, total=1.1), replace(sound, first=-0.1)):
         assert "a (" in doubts([wrong], 16)[0]
     indices, _ = sensitivity(SCENE, design, 64, 0, quiet, lambda s: s.friction.mu + (s.loading.indentation or 0.0))
-    assert {one.name for one in indices if one.one_sided} == {"friction.mu"}
+    assert {index.name for index in indices if index.one_sided} == {"friction.mu"}
     assert "friction.mu" in doubts(indices, 64)[0]
 
 
@@ -90,9 +90,9 @@ def test_what_a_design_leaves_as_it_is_is_named():
 
 
 def test_values_reach_their_places_and_no_others():
-    changed = with_values(SCENE, {"friction.mu": 0.3, "materials.fat.E": 0.05})
-    assert (changed.friction.mu, changed.friction.tau_max, changed.materials.fat.E) == (0.3, 0.02, 0.05)
-    assert changed.finger == SCENE.finger
+    other = with_values(SCENE, {"friction.mu": 0.3, "materials.fat.E": 0.05})
+    assert (other.friction.mu, other.friction.tau_max, other.materials.fat.E) == (0.3, 0.02, 0.05)
+    assert other.finger == SCENE.finger
 
 
 def test_a_scene_without_a_bound_varies_none():
@@ -123,9 +123,9 @@ def test_the_solver_is_more_moved_by_depth_than_by_a_little_friction(tmp_path, c
     scene.write_text("[friction]\nmu = 0.3\ntau_max = 0.02\n[loading]\nindentation = 1.0\nslide = '+x'\n")
     design.write_text("'friction.mu' = [0.29, 0.31]\n'loading.indentation' = [0.8, 1.2]\n")
     assert run(["sensitivity", str(scene), "--design", str(design), "--samples", "4", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["indices"][0]["name"] == "loading.indentation"
-    assert told["design_origin"] == "set"
+    document = json.loads(capsys.readouterr().out)
+    assert document["indices"][0]["name"] == "loading.indentation"
+    assert document["design_origin"] == "set"
     assert run(["sensitivity", str(scene), "--samples", "5"]) == 2
     for words in (["--samples", "0"], ["--keep", "answers"], ["--quantity", "pressure"], ["--workers", "1"]):
         assert run(["sensitivity", str(scene), *words]) == 2

@@ -18,25 +18,25 @@ def answer(sticky, slippery):
 
 
 def test_signs_are_kept_where_both_series_have_the_published_one_and_unknown_without_an_answer():
-    kept = sign_map.kept_signs(
+    signs = sign_map.kept_signs(
         [answer(0.1, -0.2), answer(0.1, 0.2), answer(None, -0.2), "no mesh fits"], answer(0.9, -0.9)
     )
-    assert kept[:2, 0].tolist() == [1.0, 0.0]
-    assert np.isnan(kept[2:]).all()
-    assert sign_map.share(kept[:, 0])[0] == 0.5
-    assert sign_map.share(kept[2:, 0]) is None
+    assert signs[:2, 0].tolist() == [1.0, 0.0]
+    assert np.isnan(signs[2:]).all()
+    assert sign_map.share(signs[:, 0])[0] == 0.5
+    assert sign_map.share(signs[2:, 0]) is None
 
 
 def test_the_slope_of_a_number_that_alone_moves_it_has_an_index_of_one():
     # The change is linear in the place of the receptor and in nothing else.
     points = saltelli_points(sign_map.DESIGN, 128, 0)
     column = list(sign_map.DESIGN).index("place of the receptor along the skin [mm]")
-    answers = [answer(float(one), 1.0) for one in points[:, column]]
+    answers = [answer(float(point), 1.0) for point in points[:, column]]
     indices, count = sign_map.slope_indices(answers, "stickiness", 0, 0)
     assert count == len(points)
     assert indices[0].name == "place of the receptor along the skin [mm]"
     assert indices[0].total == pytest.approx(1.0, abs=0.05)
-    assert all(abs(one.total) < 0.01 for one in indices[1:])
+    assert all(abs(index.total) < 0.01 for index in indices[1:])
 
 
 def test_a_block_with_a_finger_without_an_answer_is_left_out_whole():
@@ -85,14 +85,14 @@ def test_answers_that_cannot_be_kept_where_somebody_says_are_told_with_what_mend
 def test_the_verb_prints_signs_map_shares_and_indices(tmp_path, capsys):
     keep = str(tmp_path / "keep.jsonl")
     assert run(["sensitivity", "--samples", "2", "--workers", "1", "--keep", keep, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["fingers"] == 28
-    assert set(told["shares"]) == set(told["quantities"])
+    document = json.loads(capsys.readouterr().out)
+    assert document["fingers"] == 28
+    assert set(document["shares"]) == set(document["quantities"])
     assert run(["sensitivity", "--samples", "2", "--keep", keep, "--quantity", "shear_along_skin"]) == 0
-    said = capsys.readouterr().out
-    assert "receptor 0.25 mm distal" in said
-    assert "no slide" in said  # at finite strain
-    assert "+\N{MINUS SIGN}" in said
+    output = capsys.readouterr().out
+    assert "receptor 0.25 mm distal" in output
+    assert "no slide" in output  # at finite strain
+    assert "+\N{MINUS SIGN}" in output
 
 
 def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
@@ -109,8 +109,8 @@ def test_a_dask_cluster_answers_as_this_computer_does():
     trials = list(sign_map.single_changes("small").values())[:3]
     here = sign_map.answers_of(trials, lambda _: None, workers=1)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
-        there = sign_map.answers_of(trials, lambda _: None, scheduler=cluster.scheduler_address)
-    assert there == here
+        remote = sign_map.answers_of(trials, lambda _: None, scheduler=cluster.scheduler_address)
+    assert remote == here
 
 
 def test_an_address_without_a_scheduler_is_a_sentence(monkeypatch):

@@ -1,24 +1,20 @@
 """'daq-app solve' at the command line: what it prints, for scripts and for people, and how it is stopped."""
 
-import json
 from contextlib import contextmanager
 
 import pytest
 from examples import SCENE
+from json_answer import answer
 
 from daq_app.cli.main import run
 from solver.accuracy import adaptivity
-
-
-def printed(capsys):
-    return json.loads(capsys.readouterr().out)
 
 
 def test_solve_prints_what_the_contract_names(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE)
     assert run(["solve", str(scene), "--json"]) == 0
-    document = printed(capsys)
+    document = answer(capsys)
     names = "sed_ending sed_point normal_force tangential_force contact_width error_estimate dofs newton_iterations"
     assert {*names.split(), "wall_s", "setup_s", "row", "model", "audits"} <= set(document)
     assert document["tangential_force"] > 0
@@ -29,22 +25,22 @@ def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_pa
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE)
     assert run(["solve", str(scene)]) == 0
-    said = capsys.readouterr().out
-    for told in ("normal force", "tangential force", "SED at the ending"):
-        assert next(line for line in said.splitlines() if line.startswith(told)).endswith(" %")
-    assert {"bone compliance", "viscosity", "the third dimension"} <= {line[:19].strip() for line in said.splitlines()}
+    output = capsys.readouterr().out
+    for quantity in ("normal force", "tangential force", "SED at the ending"):
+        assert next(line for line in output.splitlines() if line.startswith(quantity)).endswith(" %")
+    assert {"bone compliance", "viscosity", "the third dimension"} <= {s[:19].strip() for s in output.splitlines()}
 
 
 def test_solve_tells_people_stresses_in_kilopascal_at_the_ending_along_the_row_and_over_the_course(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE + '[solve]\ncourse = "history"\n')
     assert run(["solve", str(scene), "--row", "1.9", "--json"]) == 0
-    document = printed(capsys)
+    document = answer(capsys)
     assert run(["solve", str(scene), "--row", "1.9"]) == 0
-    said = capsys.readouterr().out
-    assert "MPa" not in said
+    output = capsys.readouterr().out
+    assert "MPa" not in output
     expected = f"{1e3 * document['sed_ending']:.3f}"
-    lines = [line for line in said.splitlines() if line.startswith("SED ")]
+    lines = [line for line in output.splitlines() if line.startswith("SED ")]
     assert sum(f" {expected} ± " in line for line in lines) == 3  # at the ending, and twice over the course
 
 
@@ -55,7 +51,7 @@ def test_a_tolerance_that_no_mesh_meets_gives_the_best_answer_its_interval_a_war
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE + "[solve]\ntolerance = 0.0001\n")
     assert run(["solve", str(scene), "--json"]) == 3
-    document = printed(capsys)
+    document = answer(capsys)
     assert document["error_estimate"] > 1e-4
     assert document["sed_ending_corrected"] == pytest.approx(document["sed_ending"], rel=document["error_estimate"])
     assert len(document["row"]["error"]) == len(document["row"]["sed"])
@@ -70,16 +66,16 @@ def test_solve_stopped_by_the_user_gives_the_answer_that_was_there_already(tmp_p
     def impatient(*_):
         calls = iter(range(1))  # the solve itself; its evidence is not waited for
 
-        def told(_):
+        def interrupt(_):
             if next(calls, None) is None:
                 raise KeyboardInterrupt
             return True
 
-        yield told
+        yield interrupt
 
     monkeypatch.setattr("daq_app.console.Console.working", impatient)
     assert run(["solve", str(scene), "--json"]) == 130
-    document = printed(capsys)
+    document = answer(capsys)
     assert document["sed_ending"] > 0.0
     assert document["evidence_s"] is None
     assert any("Stopped" in warning for warning in document["warnings"])
@@ -89,7 +85,7 @@ def test_solve_with_a_history_prints_its_course(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE + '[solve]\ncourse = "history"\n')
     assert run(["solve", str(scene), "--json"]) == 0
-    document = printed(capsys)
+    document = answer(capsys)
     assert len(document["time"]) == len(document["bone_x"]) == len(document["bone_y"]) > 10
     assert document["bone_y"][-1] == pytest.approx(-1.5)
     assert document["bone_x"][-1] < 0

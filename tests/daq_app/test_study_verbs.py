@@ -26,12 +26,12 @@ def study(tmp_path_factory):
     for subject in ("P01", "P02"):
         alone = ["--subject", subject, "--scores-only", "--simulate-subject", "4"]
         assert run([*visit, *alone, "--out", str(folder / f"{subject}_scores")]) == 0
-    stroked = ["--subject", "P01", "--device", "sim:?seed=5", "--simulate-subject", "4", "--pace", "20"]
-    assert run([*visit, *stroked, "--out", str(folder / "P01_forces")]) in (0, 3)  # 3: a busy machine lost readings
+    with_forces = ["--subject", "P01", "--device", "sim:?seed=5", "--simulate-subject", "4", "--pace", "20"]
+    assert run([*visit, *with_forces, "--out", str(folder / "P01_forces")]) in (0, 3)  # 3: a busy machine lost readings
     return folder
 
 
-def said(capsys, *words):
+def run_json(capsys, *words):
     """Exit code and JSON document of a command line."""
     capsys.readouterr()
     code = run([*map(str, words), "--json"])
@@ -50,8 +50,8 @@ def test_a_session_that_cannot_be_read_is_named_and_the_rest_of_its_study_is_don
     assert run(["report", str(friction), "--subject", "P01", "-o", str(page)]) == 3
     assert str(torn) in capsys.readouterr().err
     assert str(torn) in page.read_text()
-    code, predicted = said(capsys, "predict", friction, "--subject", "P01", "--variants", "none")
-    assert (code, {row["stimulus"]["index"] for row in predicted["trials"]}) == (3, {0})
+    code, prediction = run_json(capsys, "predict", friction, "--subject", "P01", "--variants", "none")
+    assert (code, {row["stimulus"]["index"] for row in prediction["trials"]}) == (3, {0})
 
 
 def test_a_blinded_session_away_from_its_study_is_unblinded_with_the_study_that_is_named(study, tmp_path, capsys):
@@ -65,9 +65,9 @@ def test_a_blinded_session_away_from_its_study_is_unblinded_with_the_study_that_
 def test_a_session_that_cannot_be_written_stays_blinded_and_the_others_are_opened(study, tmp_path, capsys):
     friction = shutil.copytree(study, tmp_path / "friction")
     (friction / "P01_forces" / "unblinding.json").mkdir()
-    code, opened = said(capsys, "unblind", friction, "--by", "E02")
-    assert (code, opened["sessions"]) == (3, ["P01_scores", "P02_scores"])
-    assert "P01_forces" in "".join(opened["left_out"])
+    code, result = run_json(capsys, "unblind", friction, "--by", "E02")
+    assert (code, result["sessions"]) == (3, ["P01_scores", "P02_scores"])
+    assert "P01_forces" in "".join(result["left_out"])
 
 
 def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, tmp_path, capsys):
@@ -77,23 +77,23 @@ def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, tmp_path
     assert (plan.finger.tip_radius, plan.contact_angle, plan.blocks[0].indentation) == (5.5, 40.0, 1.8)
     assert plan.trials == Recording.open(study / "P01_scores").plan.trials
 
-    code, blind = said(capsys, "predict", study, "--subject", "P01", "--beside", "none")
+    code, blind = run_json(capsys, "predict", study, "--subject", "P01", "--beside", "none")
     assert code in (0, 3)
     assert {row["stimulus"]["index"] for row in blind["trials"]} == {None}
     assert blind["options"]["scene"]["finger"]["tip_radius"] == 5.5
     assert run(["report", str(study), "--subject", "P01"]) == 1
     assert "'daq-app unblind' opens the key" in capsys.readouterr().err
 
-    code, opened = said(capsys, "unblind", study, "--by", "E02")
+    code, result = run_json(capsys, "unblind", study, "--by", "E02")
     assert code == 0
-    assert sorted(opened["sessions"]) == ["P01_forces", "P01_scores", "P02_scores"]
-    told = json.loads((study / "P01_forces" / "unblinding.json").read_text())
-    assert (told["by"], told["unblinded_utc"]) == ("E02", opened["utc"])
-    assert {"analysis.json", "prediction.json"} <= set(told["made_before"])
-    assert said(capsys, "verify", study / "P01_forces")[0] in (0, 3)
-    assert said(capsys, "replay", study / "P01_scores", "--fast")[1]["differences"] == []
+    assert sorted(result["sessions"]) == ["P01_forces", "P01_scores", "P02_scores"]
+    document = json.loads((study / "P01_forces" / "unblinding.json").read_text())
+    assert (document["by"], document["unblinded_utc"]) == ("E02", result["utc"])
+    assert {"analysis.json", "prediction.json"} <= set(document["made_before"])
+    assert run_json(capsys, "verify", study / "P01_forces")[0] in (0, 3)
+    assert run_json(capsys, "replay", study / "P01_scores", "--fast")[1]["differences"] == []
 
-    code, clear = said(capsys, "predict", study, "--subject", "P01", "--beside", "none")
+    code, clear = run_json(capsys, "predict", study, "--subject", "P01", "--beside", "none")
     assert sorted(row["stimulus"]["index"] for row in clear["trials"]) == [0, 0]
     assert [row["sed"] for row in clear["trials"]] == [row["sed"] for row in blind["trials"]]
     assert run(["unblind", str(study), "--by", "E02"]) == 1
@@ -111,8 +111,8 @@ def test_labels_are_never_written_over_anything_but_older_labels(study, tmp_path
     assert "it is left alone: choose another file" in capsys.readouterr().err
     assert (friction / name).read_bytes() == before
     for _ in range(2):  # a list of labels is written over an older one
-        _, shown = said(capsys, "enrol", friction, "--labels", friction / "labels.txt")
-    assert [row["subject"] for row in shown["subjects"]] == ["P01", "P02"]
+        _, document = run_json(capsys, "enrol", friction, "--labels", friction / "labels.txt")
+    assert [row["subject"] for row in document["subjects"]] == ["P01", "P02"]
     assert (friction / "labels.txt").read_text().startswith("For whoever puts the labels on.")
 
 
@@ -121,8 +121,8 @@ def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
     assert run(["enrol", str(folder), "--protocol", "paired-comparison"]) == 0
     assert run(["enrol", str(folder), "--subject", "P01"]) == 0
     assert run(["enrol", str(folder), "--subject", "P01", "--withdraw", "moved away"]) == 0
-    _, shown = said(capsys, "enrol", folder, "--subject", "P02")
-    assert [(row["subject"], row["row"], row["withdrawn"]) for row in shown["subjects"]] == [
+    _, document = run_json(capsys, "enrol", folder, "--subject", "P02")
+    assert [(row["subject"], row["row"], row["withdrawn"]) for row in document["subjects"]] == [
         ("P01", 1, "moved away"),
         ("P02", 1, None),
     ]

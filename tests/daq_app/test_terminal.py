@@ -33,7 +33,7 @@ TRIAL = plan(protocol("sensotact-friction"), "S01", 3).trials[0]
 ENDS = ("not at all", "very")
 
 
-def meant(command, line, *, forces=True):
+def read_line(command, line, *, forces=True):
     """Return what a line means after a command, and what is said about it."""
     out = io.StringIO()
     terminal = Terminal(Console(as_json=False, err=out), forces=forces, lines=io.StringIO(f"{line}\n"))
@@ -56,27 +56,27 @@ def meant(command, line, *, forces=True):
     ],
 )
 def test_a_line_means_what_was_asked_for(command, line, event):
-    assert meant(command, line)[0] == (event,)
+    assert read_line(command, line)[0] == (event,)
 
 
 def test_a_number_that_may_be_a_thousand_is_asked_for_again():
-    events, said = meant(AskNumber(TRIAL, "How rough?"), "1,000")
+    events, output = read_line(AskNumber(TRIAL, "How rough?"), "1,000")
     assert events == ()
-    assert "'1,000' means nothing now" in said
+    assert "'1,000' means nothing now" in output
 
 
 def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():
-    assert meant(AskStroke(TRIAL), "", forces=False)[0] == (StrokeDone(),)
-    events, said = meant(AskStroke(TRIAL), "")
+    assert read_line(AskStroke(TRIAL), "", forces=False)[0] == (StrokeDone(),)
+    events, output = read_line(AskStroke(TRIAL), "")
     assert events == ()
-    assert "Nothing is waiting for Enter now" in said
+    assert "Nothing is waiting for Enter now" in output
 
 
 @pytest.mark.parametrize("line", ["", "good", "1 0"])
 def test_a_line_that_means_nothing_is_told_what_is_asked_for(line):
-    events, said = meant(AskScore(TRIAL, ENDS), line)
+    events, text = read_line(AskScore(TRIAL, ENDS), line)
     assert events == ()
-    assert said.count(f"Score from 0 ({ENDS[0]}) to 100 ({ENDS[1]}):") == 2  # as asked, and once more
+    assert text.count(f"Score from 0 ({ENDS[0]}) to 100 ({ENDS[1]}):") == 2  # as asked, and once more
 
 
 def test_a_pause_is_told_once_with_how_it_ends_and_enter_does_nothing_meanwhile():
@@ -93,9 +93,9 @@ def test_a_pause_is_told_once_with_how_it_ends_and_enter_does_nothing_meanwhile(
 
 
 def test_a_session_is_ended_for_good_only_with_a_reason():
-    events, said = meant(AskStroke(TRIAL), "abort ")
+    events, text = read_line(AskStroke(TRIAL), "abort ")
     assert events == ()
-    assert "say why: abort needs a reason" in said
+    assert "say why: abort needs a reason" in text
 
 
 def test_a_note_in_another_encoding_than_the_terminals_is_kept_with_escapes_and_the_next_line_is_heard():
@@ -120,13 +120,13 @@ def at_a_terminal(tmp_path):
         text=True,
         process_group=0,
     )
-    said = ""
-    for waited_for in ("Press Enter to begin.", "press Enter."):
-        while waited_for not in said:
+    output = ""
+    for prompt in ("Press Enter to begin.", "press Enter."):
+        while prompt not in output:
             letter = process.stderr.read(1)
-            assert letter, said
-            said += letter
-        process.stdin.write("\n" * waited_for.endswith("begin."))
+            assert letter, output
+            output += letter
+        process.stdin.write("\n" * prompt.endswith("begin."))
         process.stdin.flush()
     yield folder, process
     process.kill()
@@ -137,9 +137,9 @@ def at_a_terminal(tmp_path):
 def test_ctrl_c_at_the_terminal_ends_and_seals_the_session(at_a_terminal):
     folder, process = at_a_terminal
     os.killpg(process.pid, signal.SIGINT)
-    out, said = process.communicate()
+    out, output = process.communicate()
     assert process.returncode == 3
-    assert re.search(r"stopping\n(.*\n)*sealing", said)
+    assert re.search(r"stopping\n(.*\n)*sealing", output)
     assert "stopped by the user" in out
     assert (folder / "MANIFEST.json").exists()
     assert Recording.open(folder).end["cause"] == "stopped"
@@ -147,10 +147,10 @@ def test_ctrl_c_at_the_terminal_ends_and_seals_the_session(at_a_terminal):
 
 def test_a_terminal_that_closes_leaves_a_session_that_can_be_resumed(at_a_terminal):
     folder, process = at_a_terminal
-    out, said = process.communicate()  # closes its stdin
+    out, output = process.communicate()  # closes its stdin
     assert process.returncode == 3
     assert "is gone" in out
-    assert "daq-app resume" in said
+    assert "daq-app resume" in output
     assert Recording.open(folder).end["cause"] == "client"
 
 
@@ -160,9 +160,9 @@ def test_a_second_ctrl_c_leaves_a_recorder_that_does_not_answer_and_it_ends_the_
     recorder = int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
     os.kill(recorder, signal.SIGSTOP)
     os.killpg(process.pid, signal.SIGINT)
-    said = ""
-    while "stopping" not in said:
-        said += process.stderr.read(1)
+    output = ""
+    while "stopping" not in output:
+        output += process.stderr.read(1)
     os.killpg(process.pid, signal.SIGINT)
     process.communicate()
     assert process.returncode == 130

@@ -17,27 +17,27 @@ def test_tables_filled_in_at_the_end_of_a_protocol_are_its_new_language(tmp_path
     out, own = tmp_path / "nl.toml", tmp_path / "ours.toml"
     assert run(["translate", "sensotact-friction", "--language", "nl", "--out", str(out)]) == 0
     assert "texts yet to be translated: 3" in capsys.readouterr().err
-    filled = out.read_text().replace("Put your index finger", "Leg uw wijsvinger")
-    own.write_text((FOLDER / "sensotact-friction.toml").read_text() + filled)
-    made = plan(protocol(own), "S01", 1, setting=VisitSetting(language="nl"))
-    assert made.blocks[0].instruction.startswith("Leg uw wijsvinger")
+    translated_tables = out.read_text().replace("Put your index finger", "Leg uw wijsvinger")
+    own.write_text((FOLDER / "sensotact-friction.toml").read_text() + translated_tables)
+    session_plan = plan(protocol(own), "S01", 1, setting=VisitSetting(language="nl"))
+    assert session_plan.blocks[0].instruction.startswith("Leg uw wijsvinger")
 
 
 def test_what_is_translated_stays(capsys):
     assert run(["translate", "sensotact-friction", "--language", "de"]) == 0
-    told = capsys.readouterr()
-    assert "gar nicht klebrig" in told.out
-    assert "to be translated" not in told.out
-    assert "every text is translated" in told.err
+    output = capsys.readouterr()
+    assert "gar nicht klebrig" in output.out
+    assert "to be translated" not in output.out
+    assert "every text is translated" in output.err
 
 
-@pytest.mark.parametrize(("language", "left"), [("de", 0), ("nl", len(SubjectText))])
-def test_the_program_s_own_texts_come_as_xliff(tmp_path, language, left):
+@pytest.mark.parametrize(("language", "untranslated"), [("de", 0), ("nl", len(SubjectText))])
+def test_the_program_s_own_texts_come_as_xliff(tmp_path, language, untranslated):
     out = tmp_path / "texts.xlf"
     assert run(["translate", "--program", "--language", language, "--out", str(out)]) == 0
-    made = ElementTree.parse(out)
-    assert [unit.findtext("{*}source") for unit in made.iterfind(".//{*}trans-unit")] == list(SubjectText)
-    assert len([one for one in made.iterfind(".//{*}target") if one.get("state") == "needs-translation"]) == left
+    result = ElementTree.parse(out)
+    assert [unit.findtext("{*}source") for unit in result.iterfind(".//{*}trans-unit")] == list(SubjectText)
+    assert len([t for t in result.iterfind(".//{*}target") if t.get("state") == "needs-translation"]) == untranslated
 
 
 def test_the_windows_texts_come_as_a_file_that_keeps_what_was_translated(tmp_path, monkeypatch):
@@ -56,8 +56,8 @@ def test_the_windows_texts_come_as_a_file_that_keeps_what_was_translated(tmp_pat
 
 
 def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
-    there = tmp_path / "there.toml"
-    there.write_text("kept")
+    existing = tmp_path / "there.toml"
+    existing.write_text("kept")
     for wrong in (
         ["--language", "de"],
         ["sensotact-friction", "--program", "--language", "de"],
@@ -65,11 +65,11 @@ def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
         ["sensotact-friction", "--language", "Dutch"],
         ["sensotact-friction", "--language", "en"],
         ["nowhere", "--language", "de"],
-        ["sensotact-friction", "--language", "nl", "--out", str(there)],
+        ["sensotact-friction", "--language", "nl", "--out", str(existing)],
     ):
         assert run(["translate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("daq-app: ")
-    assert there.read_text() == "kept"
+    assert existing.read_text() == "kept"
     capsys.readouterr()
     assert run(["translate", "--program", "--language", "nl", "--out", str(tmp_path / "none" / "nl.xlf")]) == 1
     assert "check its name" in capsys.readouterr().err
@@ -77,6 +77,6 @@ def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
 
 def test_a_script_that_names_no_file_gets_the_text_in_the_document(capsys):
     assert run(["translate", "--program", "--language", "nl", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["out"] is None
-    assert len(list(ElementTree.fromstring(told["text"]).iterfind(".//{*}trans-unit"))) == len(SubjectText)
+    output = json.loads(capsys.readouterr().out)
+    assert output["out"] is None
+    assert len(list(ElementTree.fromstring(output["text"]).iterfind(".//{*}trans-unit"))) == len(SubjectText)

@@ -15,7 +15,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from examples import short_protocol
-from recordings import PLAN, TRIAL, begun, ended
+from json_answer import answer
+from recordings import PLAN, TRIAL, new_writer, record_session
 
 from daq_app.cli.main import run
 from daq_app.cli.verbs import demo
@@ -29,7 +30,7 @@ ROUGH = replace(TRIAL, stimulus=Stimulus("roughness", 20, "R1"))
 
 
 @pytest.fixture(scope="session")
-def recorded(tmp_path_factory):
+def session_folder(tmp_path_factory):
     """One simulated session of three trials; tests that change it take a copy."""
     folder = tmp_path_factory.mktemp("recorded") / "P07"
     protocol = folder.with_name("three.toml")
@@ -40,21 +41,17 @@ def recorded(tmp_path_factory):
 
 
 @pytest.fixture
-def session(recorded, tmp_path):
-    return shutil.copytree(recorded, tmp_path / "P07")
-
-
-def printed(capsys):
-    return json.loads(capsys.readouterr().out)
+def session(session_folder, tmp_path):
+    return shutil.copytree(session_folder, tmp_path / "P07")
 
 
 def test_a_simulated_session_analyses_without_a_flaw_and_says_simulated(session, capsys):
     assert run(["analyse", str(session), "--json"]) == 0
-    document = printed(capsys)
+    document = answer(capsys)
     assert {flaw["name"] for flaw in document["flaws"]} <= {"tilt_assumed"}
     assert [stroke["trial"] for stroke in document["strokes"]] == [1, 2, 3]
-    wanted = {"trial", "onset", "lift", "steady", "mu_static", "mu_dynamic", "tau_max", "speed", "direction", "flaws"}
-    assert all(wanted <= set(stroke) for stroke in document["strokes"])
+    required = {"trial", "onset", "lift", "steady", "mu_static", "mu_dynamic", "tau_max", "speed", "direction", "flaws"}
+    assert all(required <= set(stroke) for stroke in document["strokes"])
     assert "SIMULATED" in json.dumps(document)
 
 
@@ -72,17 +69,17 @@ def test_verify_names_a_changed_byte_of_the_recording_with_exit_code_3(session, 
     content[len(content) // 2] ^= 1
     live.write_bytes(content)
     assert run(["verify", str(session), "--json"]) == 3
-    assert any("session.sqlite" in problem for problem in printed(capsys)["problems"])
+    assert any("session.sqlite" in problem for problem in answer(capsys)["problems"])
 
 
 def test_verify_names_a_derived_number_that_comes_out_otherwise(session, capsys):
     run(["analyse", str(session)])
-    stored = json.loads((session / "analysis.json").read_text())
-    stored["strokes"][1]["mu_dynamic"] += 1e-9
-    (session / "analysis.json").write_text(json.dumps(stored))
+    document = json.loads((session / "analysis.json").read_text())
+    document["strokes"][1]["mu_dynamic"] += 1e-9
+    (session / "analysis.json").write_text(json.dumps(document))
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
-    assert any("strokes[1].mu_dynamic" in problem for problem in printed(capsys)["problems"])
+    assert any("strokes[1].mu_dynamic" in problem for problem in answer(capsys)["problems"])
 
 
 def test_verify_names_every_number_that_a_changed_constant_of_the_analysis_changes(session, capsys, monkeypatch):
@@ -95,7 +92,7 @@ def test_verify_names_every_number_that_a_changed_constant_of_the_analysis_chang
     monkeypatch.setattr(FilterSettings.__init__, "__defaults__", tuple(defaults))
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
-    problems = printed(capsys)["problems"]
+    problems = answer(capsys)["problems"]
     assert "analysis.json.settings.filter.smoothing was stored as 0.1 and comes out as 0.2 (+100 %)" in problems
     assert any("mu_max was stored as" in problem for problem in problems)
     assert any("analysis.json was made by the same versions as now" in problem for problem in problems)
@@ -106,7 +103,7 @@ def test_verify_names_what_a_changed_constant_inside_the_analysis_changes(sessio
     monkeypatch.setattr(forces, "_TWO_PASSES", 1.0)
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
-    assert any("friction[0].mu was stored as" in problem for problem in printed(capsys)["problems"])
+    assert any("friction[0].mu was stored as" in problem for problem in answer(capsys)["problems"])
 
 
 @pytest.mark.parametrize("name", ["MANIFEST.json", "analysis.json", "session.h5", "session.json", "session.sqlite"])
@@ -116,15 +113,15 @@ def test_verify_names_the_file_in_which_one_byte_is_changed(session, capsys, nam
     path = session / name
     content = path.read_bytes()
     for part in (0.0, 0.3, 0.83):
-        changed = bytearray(content)
-        changed[int(part * len(content))] ^= 4
+        changed_bytes = bytearray(content)
+        changed_bytes[int(part * len(content))] ^= 4
         path.chmod(stat.S_IRUSR | stat.S_IWUSR)
-        path.write_bytes(changed)
+        path.write_bytes(changed_bytes)
         capsys.readouterr()
         code = run(["verify", str(session), "--json"])
-        told = capsys.readouterr()
+        output = capsys.readouterr()
         assert code == 3 or (code == 1 and name == "session.sqlite")
-        assert name in (told.out if code == 3 else told.err)
+        assert name in (output.out if code == 3 else output.err)
 
 
 @pytest.mark.parametrize("column", ["raw", "time", "received_ns", "status"])
@@ -134,17 +131,17 @@ def test_verify_names_a_changed_reading_whose_check_sums_were_made_to_fit(sessio
     with closing(sqlite3.connect(live)) as file:
         names = list(COLUMNS)
         blobs = list(file.execute(f"SELECT {', '.join(names)} FROM blocks WHERE number = 3").fetchone())
-        changed = bytearray(blobs[names.index(column)])
-        changed[2] ^= 1
-        blobs[names.index(column)] = bytes(changed)
+        changed_bytes = bytearray(blobs[names.index(column)])
+        changed_bytes[2] ^= 1
+        blobs[names.index(column)] = bytes(changed_bytes)
         crc = zlib.crc32(b"".join(blobs))
-        file.execute(f"UPDATE blocks SET {column} = ?, crc32 = ? WHERE number = 3", (bytes(changed), crc))
+        file.execute(f"UPDATE blocks SET {column} = ?, crc32 = ? WHERE number = 3", (bytes(changed_bytes), crc))
         file.commit()
     manifest = json.loads((session / "MANIFEST.json").read_text())
     manifest["files"]["session.sqlite"]["sha256"] = hashlib.sha256(live.read_bytes()).hexdigest()
     (session / "MANIFEST.json").write_text(json.dumps(manifest))
     assert run(["verify", str(session), "--json"]) == 3
-    problems = printed(capsys)["problems"]
+    problems = answer(capsys)["problems"]
     assert any(problem.startswith(f"{column} of the readings") and "session.h5" in problem for problem in problems)
     assert f"sha256.columns.{column} of session.json differs from the live file" in problems
 
@@ -153,7 +150,7 @@ def test_verify_names_a_changed_reading_whose_check_sums_were_made_to_fit(sessio
 def test_verify_names_a_document_beside_the_recording_that_cannot_be_read(session, capsys, content):
     (session / "prediction.json").write_text(content)
     assert run(["verify", str(session), "--json"]) == 3
-    assert any("prediction.json" in problem for problem in printed(capsys)["problems"])
+    assert any("prediction.json" in problem for problem in answer(capsys)["problems"])
 
 
 def test_a_session_goes_out_and_comes_back_by_the_command_line(session, tmp_path, capsys):
@@ -161,9 +158,9 @@ def test_a_session_goes_out_and_comes_back_by_the_command_line(session, tmp_path
     capsys.readouterr()
     out = tmp_path / "out"
     assert run(["export", str(session), "--format", "csv", "--out", str(out), "--json"]) == 0
-    assert str(out / "predictions.csv") in printed(capsys)["files"]
+    assert str(out / "predictions.csv") in answer(capsys)["files"]
     assert run(["import", str(out), "--out", str(tmp_path / "again"), "--json"]) == 0
-    assert printed(capsys)["differences"] == []
+    assert answer(capsys)["differences"] == []
     assert run(["verify", str(tmp_path / "again")]) == 0
     assert run(["import", str(out), "--units", "N,Nmm", "--out", str(tmp_path / "third")]) == 2
     assert run(["export", str(session), "--format", "csv", "--out", str(out)]) == 1
@@ -176,16 +173,16 @@ def test_verify_of_what_is_no_recording_is_exit_code_1(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_a_session_is_never_written_over(recorded, capsys):
-    before = {path.name: path.read_bytes() for path in recorded.iterdir()}
+def test_a_session_is_never_written_over(session_folder, capsys):
+    before = {path.name: path.read_bytes() for path in session_folder.iterdir()}
     words = ["run", "sensotact-friction", "--scores-only", "--subject", "P08", "--simulate-subject", "1"]
-    assert run([*words, "--out", str(recorded)]) == 1
+    assert run([*words, "--out", str(session_folder)]) == 1
     assert "not empty" in capsys.readouterr().err
-    assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
+    assert {path.name: path.read_bytes() for path in session_folder.iterdir()} == before
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "named"),
+    ("arguments", "code", "sentence"),
     [
         (["--device", "sim:", "--subject", "Anna Schmidt"], 2, "Anna Schmidt"),
         (["--device", "sim:?speed=3", "--subject", "P1", "--simulate-subject", "1"], 2, "speed"),
@@ -198,16 +195,16 @@ def test_a_session_is_never_written_over(recorded, capsys):
         (["--device", "sim:", "--subject", "P1", "--simulate-subject", "-1"], 2, "--simulate-subject -1"),
     ],
 )
-def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, code, named, tmp_path, capsys):
+def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, code, sentence, tmp_path, capsys):
     folder = tmp_path / "none"
     assert run(["run", "sensotact-friction", *arguments, "--out", str(folder)]) == code
-    said = capsys.readouterr().err
-    assert named in said.splitlines()[-1]
+    output = capsys.readouterr().err
+    assert sentence in output.splitlines()[-1]
     assert not folder.exists()
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "named"),
+    ("text", "code", "sentence"),
     [
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2\n", 1, "line 3"),
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,nan,4,5,6\n", 1, "line 3"),
@@ -215,13 +212,13 @@ def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, co
         ("", 1, "empty"),
     ],
 )
-def test_a_csv_that_cannot_be_taken_is_one_sentence_and_leaves_no_folder(text, code, named, tmp_path, capsys):
+def test_a_csv_that_cannot_be_taken_is_one_sentence_and_leaves_no_folder(text, code, sentence, tmp_path, capsys):
     file = tmp_path / "a.csv"
     file.write_text(text)
     assert run(["import", str(file), "--out", str(tmp_path / "a")]) == code
-    said = capsys.readouterr().err
-    assert named in said
-    assert said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert sentence in output
+    assert output.count("\n") == 1
     assert not (tmp_path / "a").exists()
 
 
@@ -245,9 +242,9 @@ def test_a_file_whose_name_is_no_utf8_is_one_sentence_and_leaves_no_folder(tmp_p
     csv = tmp_path / os.fsdecode(b"m\xfcde.csv")
     csv.write_text("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,3,4,5,6\n")
     assert run(["import", str(csv), "--out", str(tmp_path / "a")]) == 1
-    said = capsys.readouterr().err
-    assert "a name is not UTF-8" in said
-    assert "rename the file or folder" in said
+    output = capsys.readouterr().err
+    assert "a name is not UTF-8" in output
+    assert "rename the file or folder" in output
     assert not (tmp_path / "a").exists()
 
 
@@ -306,7 +303,7 @@ def test_a_demonstration_that_is_stopped_after_it_recorded_says_where_that_is(tm
         raise KeyboardInterrupt
 
     def study(out, *_):
-        ended(out / "S01")
+        record_session(out / "S01")
         stop()
 
     monkeypatch.setattr(demo, "simulated_study", study)
@@ -324,11 +321,11 @@ def test_a_report_takes_no_scores_twice(session, tmp_path, capsys):
 
 def test_a_report_takes_no_visit_that_adds_no_score(session, tmp_path, capsys):
     skipped = tmp_path / "P08"
-    writer = begun(skipped)
+    writer = new_writer(skipped)
     writer.event("skip", 1)
     writer.event("ended", data={"reason": "done"})
     writer.close()
-    foreign = ended(tmp_path / "P09", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(ROUGH,)),)))
+    foreign = record_session(tmp_path / "P09", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(ROUGH,)),)))
     for visit, why in ((skipped, "no score of any stimulus"), (foreign, "no score of a stimulus of this session")):
         assert run(["report", str(session), "-o", str(tmp_path / "page.html"), "--scores", str(visit)]) == 2
         sentence = capsys.readouterr().err
@@ -361,12 +358,14 @@ def test_a_demonstration_is_written_over_nothing(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("verb", ["analyse", "predict", "report", "study"])
-def test_a_calibration_error_that_is_none_is_refused_with_exit_code_2(recorded, capsys, verb):
-    assert run([verb, str(recorded if verb != "study" else recorded.parent), "--calibration-error", "-1"]) == 2
+def test_a_calibration_error_that_is_none_is_refused_with_exit_code_2(session_folder, capsys, verb):
+    assert (
+        run([verb, str(session_folder if verb != "study" else session_folder.parent), "--calibration-error", "-1"]) == 2
+    )
     assert "--calibration-error" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [["--area", "round"], ["--area", "1.5"], ["--area-force", "2"]])
-def test_a_law_of_the_area_that_is_none_is_refused_with_exit_code_2(recorded, capsys, words):
-    assert run(["analyse", str(recorded), *words]) == 2
+def test_a_law_of_the_area_that_is_none_is_refused_with_exit_code_2(session_folder, capsys, words):
+    assert run(["analyse", str(session_folder), *words]) == 2
     assert "--area" in capsys.readouterr().err

@@ -66,8 +66,8 @@ def test_a_finger_without_triangles_has_no_field_anywhere():
 
 
 def test_a_strain_has_no_unit_and_a_negative_number_a_minus():
-    strained = frame(principal_strain_least=np.full(5, -0.125))
-    words = probe_words(strained, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
+    strained_frame = frame(principal_strain_least=np.full(5, -0.125))
+    words = probe_words(strained_frame, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
     assert words == "least principal strain −0.125 · x 2.000 mm, y 0.500 mm · epidermis"
 
 
@@ -78,8 +78,8 @@ def test_the_field_along_the_skin_is_that_of_the_skin_s_own_nodes():
 
 
 def test_colours_of_a_signed_field_have_nought_in_their_middle_and_others_begin_there():
-    shown = frame(pressure=np.array([-0.02, 0.0, 0.0, 0.0, 0.01]), von_mises=np.full(5, 0.009))
-    low, high = automatic_range(BY_NAME["pressure"], [shown])
+    field_frame = frame(pressure=np.array([-0.02, 0.0, 0.0, 0.0, 0.01]), von_mises=np.full(5, 0.009))
+    low, high = automatic_range(BY_NAME["pressure"], [field_frame])
     assert low == -high < 0.0
-    assert automatic_range(BY_NAME["von_mises"], [shown]) == (0.0, 10.0)
-    assert automatic_range(BY_NAME["displacement"], [shown]) == (0.0, 1.0)  # the frame has none
+    assert automatic_range(BY_NAME["von_mises"], [field_frame]) == (0.0, 10.0)
+    assert automatic_range(BY_NAME["displacement"], [field_frame]) == (0.0, 1.0)  # the frame has none

@@ -16,10 +16,10 @@ PATIENCE = 120.0  # far beyond what anything takes [s]
 
 def until(condition, what):
     end = time.monotonic() + PATIENCE
-    while not (found := condition()):
+    while not (result := condition()):
         assert time.monotonic() < end, f"{what} did not come"
         time.sleep(0.1)
-    return found
+    return result
 
 
 @contextmanager
@@ -30,8 +30,8 @@ def server(width, height):
     command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", screen, "-nolisten", "tcp", "-noreset"]
     process = subprocess.Popen(command, pass_fds=[writing], stderr=subprocess.DEVNULL)
     os.close(writing)
-    with os.fdopen(reading) as told:
-        number = told.readline().strip()
+    with os.fdopen(reading) as pipe:
+        number = pipe.readline().strip()
     try:
         yield f":{number}"
     finally:
@@ -47,12 +47,12 @@ class Desk:
         self.environment.pop("QT_QPA_PLATFORM", None)
 
     def do(self, *words):
-        done = subprocess.run(["xdotool", *map(str, words)], env=self.environment, capture_output=True, text=True)
-        return done.stdout.strip()
+        process = subprocess.run(["xdotool", *map(str, words)], env=self.environment, capture_output=True, text=True)
+        return process.stdout.strip()
 
     def window(self, name):
-        found = until(lambda: self.do("search", "--onlyvisible", "--name", name), name)
-        return found.splitlines()[0]
+        windows = until(lambda: self.do("search", "--onlyvisible", "--name", name), name)
+        return windows.splitlines()[0]
 
     def active(self):
         """Return the name of the window that the window manager gives the keyboard."""

@@ -49,8 +49,8 @@ def record(folder, in_second_stroke):
     transducer = Slider(clock, lost=(40, 41))
     transducer.height = short.frame.height
     machine = {"system": "Linux", "release": "", "processor": "x86_64", "cores": 2}
-    told = {**provenance(clock), "machine": machine}
-    writer = SessionWriter.create(folder, short, transducer.info, told, subject_simulated=True, clock=clock)
+    head = {**provenance(clock), "machine": machine}
+    writer = SessionWriter.create(folder, short, transducer.info, head, subject_simulated=True, clock=clock)
 
     def stroke(_):
         if transducer.touches:

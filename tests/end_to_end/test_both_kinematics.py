@@ -20,17 +20,17 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def session_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded") / "study"
     synthetic_study(folder, 1, Console(as_json=True), subjects=1)
     return folder / "S01"
 
 
 @pytest.fixture(scope="module", params=KINEMATICS)
-def predicted(request, recorded, tmp_path_factory):
+def prediction_folder(request, session_folder, tmp_path_factory):
     """Return a session's folder, with the prediction kept in it, and its document."""
     folder = tmp_path_factory.mktemp(request.param) / "S01"
-    shutil.copytree(recorded, folder)
+    shutil.copytree(session_folder, folder)
     code = run(["predict", str(folder), "--kinematics", request.param])
     document = json.loads((folder / "prediction.json").read_text())
     assert code == (3 if any(row["sed"] is None for row in document["trials"]) else 0)
@@ -44,50 +44,50 @@ def _answers_or_reasons(rows, count=10):
         assert (row["sed"] is None) == bool(row["reasons"].get("sed"))
 
 
-def test_every_surface_has_an_answer_or_its_reason(predicted):
-    _answers_or_reasons(predicted[1]["trials"])
+def test_every_surface_has_an_answer_or_its_reason(prediction_folder):
+    _answers_or_reasons(prediction_folder[1]["trials"])
 
 
-def test_the_report_shows_every_surface_of_the_kept_prediction(predicted):
-    folder, document = predicted
+def test_the_report_shows_every_surface_of_the_kept_prediction(prediction_folder):
+    folder, document = prediction_folder
     assert run(["report", str(folder)]) == 0
     page = (folder / "report.html").read_text()
     for row in document["trials"]:
-        shown = f"{1000.0 * row['sed']:.2f}" if row["sed"] is not None else row["reasons"]["sed"][:40]
-        assert shown in page
+        text = f"{1000.0 * row['sed']:.2f}" if row["sed"] is not None else row["reasons"]["sed"][:40]
+        assert text in page
 
 
 @pytest.mark.parametrize("format_", FORMATS)
-def test_every_export_carries_the_kept_prediction(predicted, format_, tmp_path):
-    folder, _ = predicted
+def test_every_export_carries_the_kept_prediction(prediction_folder, format_, tmp_path):
+    folder, _ = prediction_folder
     out = tmp_path / "out"
     assert run(["export", str(folder), "--format", format_, "--out", str(out)]) == 0
     assert any(out.rglob("*") if out.is_dir() else [out])
 
 
-def test_the_window_shows_the_kept_prediction_and_draws_every_surface(predicted):
-    folder, document = predicted
-    strain, said = document["options"]["kinematics"], []
-    work = Work(folder, said.append)
+def test_the_window_shows_the_kept_prediction_and_draws_every_surface(prediction_folder):
+    folder, document = prediction_folder
+    strain, messages = document["options"]["kinematics"], []
+    work = Work(folder, messages.append)
     work.go_on()
-    report = next(one.report for one in said if isinstance(one, m.ReportReady) and one.stage == "predicted")
-    answered = [one for one in said if isinstance(one, m.Answered)]
-    assert len(answered) == 10
+    report = next(r.report for r in messages if isinstance(r, m.ReportReady) and r.stage == "predicted")
+    answers = [message for message in messages if isinstance(message, m.Answered)]
+    assert len(answers) == 10
     assert report.model.startswith(f"{strain} strain")
-    assert [one.sed for one in report.predictions] == pytest.approx([row["sed"] for row in document["trials"]])
+    assert [p.sed for p in report.predictions] == pytest.approx([row["sed"] for row in document["trials"]])
     for name, _ in session_pictures(report):
         work.do(m.Draw(name))
-    for one in answered:
-        assert (one.finger is not None) == (one.finding.sed is not None)
-        work.do(m.Draw(f"finger {one.finding.stroke}"))
+    for message in answers:
+        assert (message.finger is not None) == (message.finding.sed is not None)
+        work.do(m.Draw(f"finger {message.finding.stroke}"))
         with contextlib.nullcontext() if strain == "small" else pytest.raises(NothingToShow):
-            work.do(m.ShowHistory((one.finding.trial, one.finding.stroke)))
-    assert not [one for one in said if isinstance(one, m.Problem)]
+            work.do(m.ShowHistory((message.finding.trial, message.finding.stroke)))
+    assert not [message for message in messages if isinstance(message, m.Problem)]
 
 
 @pytest.mark.parametrize("kinematics", KINEMATICS)
-def test_a_study_has_a_row_for_every_surface(recorded, kinematics, tmp_path):
-    shutil.copytree(recorded, tmp_path / "S01")
+def test_a_study_has_a_row_for_every_surface(session_folder, kinematics, tmp_path):
+    shutil.copytree(session_folder, tmp_path / "S01")
     run(["study", str(tmp_path), "--workers", "1", "--kinematics", kinematics, "--json"])
     (visit,) = json.loads((tmp_path / "pooled" / "study.json").read_bytes())["visits"]
     assert len(visit["rows"]) == 10

@@ -22,12 +22,12 @@ def test_ten_subjects_score_and_one_of_them_strokes(demo):
 
 def test_what_was_planted_is_found_and_the_papers_finding_comes_out(demo):
     rows = json.loads((demo / "S03-forces" / "prediction.json").read_text())["trials"]
-    planted = {"stickiness": {0: 0.28, 20: 0.44, 50: 0.48, 80: 0.64, 100: 0.67}}  # the paper's Tables 1 and 2
-    planted["slipperiness"] = {0: 0.62, 20: 0.55, 55: 0.44, 75: 0.52, 100: 0.24}
+    friction = {"stickiness": {0: 0.28, 20: 0.44, 50: 0.48, 80: 0.64, 100: 0.67}}  # the paper's Tables 1 and 2
+    friction["slipperiness"] = {0: 0.62, 20: 0.55, 55: 0.44, 75: 0.52, 100: 0.24}
     sed = {"stickiness": {}, "slipperiness": {}}
     for row in rows:
         descriptor, index = row["stimulus"]["descriptor"], row["stimulus"]["index"]
-        assert row["mu"] == pytest.approx(planted[descriptor][index], rel=0.02)
+        assert row["mu"] == pytest.approx(friction[descriptor][index], rel=0.02)
         sed[descriptor][index] = row["sed"]
     sticky, slippery = sed["stickiness"], sed["slipperiness"]
     assert sticky[0] < sticky[20] < sticky[50] < sticky[80] < sticky[100]

@@ -51,7 +51,7 @@ def near(path):
     return 1e3 * NEAR if loses else NEAR
 
 
-def others(cache):
+def kernels_to_try(cache):
     """Return the kernels to try, name and environment of each; loops for another processor are kept in `cache`."""
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
@@ -64,21 +64,21 @@ def others(cache):
     }
 
 
-def numbers(found, path=(), scale=None):
+def numbers(node, path=(), scale=None):
     """Yield where each number of a study stands, the number, and the size it counts against."""
-    if isinstance(found, dict):
-        kin = [abs(found[name]) for name in ONE_QUANTITY if isinstance(found.get(name), float)]
-        for name, value in found.items():
+    if isinstance(node, dict):
+        kin = [abs(node[name]) for name in ONE_QUANTITY if isinstance(node.get(name), float)]
+        for name, value in node.items():
             own = max(kin, default=None) if name in ONE_QUANTITY else 1.0 if name in AGAINST_ONE else None
-            if name in SPREAD_OF and "terms" in found:
-                term = found["terms"][SPREAD_OF[name]]
+            if name in SPREAD_OF and "terms" in node:
+                term = node["terms"][SPREAD_OF[name]]
                 own = max(abs(term[part]) for part in ("estimate", "low", "high"))
             yield from numbers(value, (*path, name), own)
-    elif isinstance(found, list):
-        for i, value in enumerate(found):
+    elif isinstance(node, list):
+        for i, value in enumerate(node):
             yield from numbers(value, (*path, i), scale)
-    elif isinstance(found, float):
-        yield path, found, abs(found) if scale is None else scale
+    elif isinstance(node, float):
+        yield path, node, abs(node) if scale is None else scale
 
 
 def study(folder, out, kernels):
@@ -86,8 +86,8 @@ def study(folder, out, kernels):
     command = [sys.executable, "-m", "daq_app", "study", str(folder), "--out", str(out), "--json"]
     clean = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
     environment = {**clean, "OPENBLAS_NUM_THREADS": "1", **kernels}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 3, done.stderr  # 3: one session was damaged on purpose
+    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert process.returncode == 3, process.stderr  # 3: one session was damaged on purpose
     return {path: (value, size) for path, value, size in numbers(json.loads((out / "study.json").read_bytes()))}
 
 
@@ -95,14 +95,14 @@ def study(folder, out, kernels):
 def test_kernels_of_other_processors_give_every_number_of_a_study_within_1e_12(tmp_path):
     folder = tmp_path / "study"
     synthetic_study(folder, 1, Console(as_json=True), subjects=4)
-    here = study(folder, tmp_path / "here", {})
-    assert study(folder, tmp_path / "again", {}) == here  # to the last bit
-    assert len(here) > 1000
-    for name, kernels in others(tmp_path / "loops").items():
-        there = study(folder, tmp_path / name, kernels)
-        assert there.keys() == here.keys()
+    base = study(folder, tmp_path / "here", {})
+    assert study(folder, tmp_path / "again", {}) == base  # to the last bit
+    assert len(base) > 1000
+    for name, kernels in kernels_to_try(tmp_path / "loops").items():
+        values = study(folder, tmp_path / name, kernels)
+        assert values.keys() == base.keys()
         off = {
-            path: abs(there[path][0] - value) / max(size, np.finfo(float).tiny) for path, (value, size) in here.items()
+            path: abs(values[path][0] - value) / max(size, np.finfo(float).tiny) for path, (value, size) in base.items()
         }
         worst = max(off, key=lambda path: off[path] / near(path))
-        assert off[worst] <= near(worst), (name, worst, here[worst], there[worst])
+        assert off[worst] <= near(worst), (name, worst, base[worst], values[worst])

@@ -29,21 +29,21 @@ WIPES = ["wipe_fender_a", "wipe_rim_a", "wipe_rim_b", "wipe_rim_c"]
 def session(tmp_path_factory):
     """Return a function that imports a file once and gives its recording and analysis."""
     folder = tmp_path_factory.mktemp("real")
-    made = {}
+    cache = {}
 
-    def of(name, **options):
+    def open_once(name, **options):
         key = (name, *options.items())
-        if key not in made:
-            target = folder / f"{len(made)}_{name}"
+        if key not in cache:
+            target = folder / f"{len(cache)}_{name}"
             import_csv(DATA / f"{name}.csv", target, ImportOptions(**options))
             recording = Recording.open(target)
-            made[key] = recording, analyse(recording)
-        return made[key]
+            cache[key] = recording, analyse(recording)
+        return cache[key]
 
-    return of
+    return open_once
 
 
-def refused(analysis):
+def refusals(analysis):
     return {str(flaw.name) for flaw in analysis.flaws if flaw.grade == "refused"}
 
 
@@ -54,7 +54,7 @@ def columns(name):
     return {heading: numbers[:, i] for i, heading in enumerate(head)}
 
 
-def tool_moved(name, begin, end):
+def tool_path(name, begin, end):
     """Return how far the measured position of the tool moved between two instants [m]."""
     table = columns(name)
     inside = (table["t_s"] >= begin) & (table["t_s"] <= end)
@@ -94,7 +94,7 @@ def test_a_rate_no_recording_holds_is_refused(tmp_path, path):
 
 def test_the_finger_has_no_zero_so_it_has_strokes_without_numbers(session):
     _, analysis = session("finger_strokes_bare_index")
-    assert "no_unloaded_stretch" in refused(analysis)
+    assert "no_unloaded_stretch" in refusals(analysis)
     first, last = analysis.strokes[0], analysis.strokes[-1]
     assert first.onset is None
     assert last.lift is None
@@ -144,20 +144,20 @@ def test_the_fender_is_wiped_four_times(session):
     _, analysis = session("wipe_fender_a")
     assert len(analysis.strokes) == 4
     for stroke in analysis.strokes:
-        assert tool_moved("wipe_fender_a", stroke.onset, stroke.lift or 25.0) > 0.3
+        assert tool_path("wipe_fender_a", stroke.onset, stroke.lift or 25.0) > 0.3
 
 
 @pytest.mark.parametrize("name", ["wipe_rim_a", "wipe_rim_b", "wipe_rim_c"])
 def test_the_rim_is_wiped_once(session, name):
     _, analysis = session(name)
     (stroke,) = analysis.strokes
-    assert tool_moved(name, stroke.onset, stroke.lift) > 1.0
+    assert tool_path(name, stroke.onset, stroke.lift) > 1.0
 
 
 @pytest.mark.parametrize("name", WIPES)
 def test_a_wipe_whose_zero_swings_with_the_arm_has_no_friction(session, name):
     _, analysis = session(name)
-    assert {"drift", "no_steady_sliding"} & refused(analysis)
+    assert {"drift", "no_steady_sliding"} & refusals(analysis)
 
 
 @pytest.mark.parametrize("name", WIPES)
@@ -187,7 +187,7 @@ def test_a_sensor_frozen_at_first_is_named_and_only_what_is_live_is_used(session
 def test_a_sensor_frozen_nearly_always_is_refused(session):
     _, analysis = session("fault_frozen_wipe_rim_late")
     assert analysis.strokes == ()
-    assert refused(analysis) == {"frozen_sensor"}
+    assert refusals(analysis) == {"frozen_sensor"}
 
 
 # The grip and the wheel
@@ -208,7 +208,7 @@ def test_the_giver_lets_go_twice_and_was_holding_when_the_recording_began(sessio
 def test_a_wheel_has_no_normal_axis_and_no_strokes(session, name):
     _, analysis = session(name)
     assert analysis.strokes == ()
-    assert refused(analysis) == {"normal_axis_implausible"}
+    assert refusals(analysis) == {"normal_axis_implausible"}
 
 
 def test_with_the_axis_of_its_pushes_stated_the_wheel_shows_each_push(session):
@@ -226,4 +226,4 @@ def test_a_wheel_without_a_hand_shows_no_friction_whatever_the_normal_is_said_to
     for stroke in analysis.strokes:
         assert all(getattr(stroke, number) is None for number in FRICTION)
         assert stroke.onset is stroke.lift is None or "no_unloaded_stretch" not in stroke.flaws
-    assert refused(analysis)
+    assert refusals(analysis)

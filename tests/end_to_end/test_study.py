@@ -82,15 +82,15 @@ def test_each_planted_flaw_stands_beside_whether_it_was_found(pool):
 
 
 def test_readings_lost_in_one_stroke_withhold_its_numbers_and_no_others(pool):
-    found = rows(pool, "S02")
-    assert found[3]["flaws"] == ["lost_readings"]
-    assert found[3]["sed"] is None
-    assert all(row["sed"] is not None for trial, row in found.items() if trial != 3)
+    trials = rows(pool, "S02")
+    assert trials[3]["flaws"] == ["lost_readings"]
+    assert trials[3]["sed"] is None
+    assert all(row["sed"] is not None for trial, row in trials.items() if trial != 3)
 
 
 def test_friction_comes_back_as_planted_but_for_the_calibration(pool, study):
-    planted = json.loads((study / "planted.json").read_bytes())["strokes"]
-    truth = {(stroke["subject"], stroke["trial"]): stroke["mu"] for stroke in planted}
+    strokes = json.loads((study / "planted.json").read_bytes())["strokes"]
+    truth = {(stroke["subject"], stroke["trial"]): stroke["mu"] for stroke in strokes}
     for visit in pool["visits"]:
         for row in visit["rows"]:
             if row["mu"] is not None:  # each axis' gain is planted with a standard deviation of 1 %
@@ -105,25 +105,25 @@ def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
         raise AssertionError("a session was computed again")
 
     monkeypatch.setattr(pooling, "_in_pool", never)
-    done, failed = visits(
+    pooled, failed = visits(
         [study / "S01", study / "S02"], STEADY, Shelf(study / "pooled" / "results", STEADY), Console(as_json=True)
     )
     assert not failed
-    assert {visit.session for visit in done} == {visit["session"] for visit in pool["visits"]}
+    assert {visit.session for visit in pooled} == {visit["session"] for visit in pool["visits"]}
 
 
-@pytest.mark.parametrize("spoilt", [b"", b"{", b"[]", b'{"a": 1}', "digit"])
-def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(pool, study, tmp_path, spoilt, capsys):
+@pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"a": 1}', "digit"])
+def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(pool, study, tmp_path, damage, capsys):
     visit = next(visit for visit in pool["visits"] if visit["session"] == "S01")
     shelf = Shelf(tmp_path, STEADY)
     key = shelf.key(study / "S01")
     shelf.keep(key, visit)
     whole = shelf.file(key).read_bytes()
-    shelf.file(key).write_bytes(whole.replace(b'"mu": 0.', b'"mu": 9.', 1) if spoilt == "digit" else spoilt)
+    shelf.file(key).write_bytes(whole.replace(b'"mu": 0.', b'"mu": 9.', 1) if damage == "digit" else damage)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pooling, "_in_pool", lambda *_: iter([("S01", visit)]))
-        done, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
-    assert done[0].rows[0].mu == visit["rows"][0]["mu"]
+        pooled, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
+    assert pooled[0].rows[0].mu == visit["rows"][0]["mu"]
     assert f"{key}.json is damaged; the session is computed anew" in capsys.readouterr().err
     assert shelf.file(key).read_bytes() == whole
 
@@ -150,9 +150,9 @@ def test_another_recording_or_other_options_are_another_key(study):
 
 
 def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):
-    sent = compute_sent_visit("S01", content_of(study / "S01"), STEADY)
-    stored = next(visit for visit in pool["visits"] if visit["session"] == "S01")  # from the disk, by another process
-    assert json.loads(json.dumps(sent)) == stored
+    remote = compute_sent_visit("S01", content_of(study / "S01"), STEADY)
+    local = next(visit for visit in pool["visits"] if visit["session"] == "S01")  # from the disk, by another process
+    assert json.loads(json.dumps(remote)) == local
 
 
 def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeypatch):
@@ -163,19 +163,19 @@ def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeyp
             yield name, compute_visit(*arguments)
 
     monkeypatch.setattr(pooling, "_in_pool", dying)
-    done, failed = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
-    assert [visit.session for visit in done] == ["S01"]
+    pooled, failed = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
+    assert [visit.session for visit in pooled] == ["S01"]
     assert [name for name, _ in failed] == ["S02"]
 
 
 def test_ctrl_c_keeps_what_is_done_and_says_so(pool, study, tmp_path, monkeypatch, capsys):
     row = next(visit for visit in pool["visits"] if visit["session"] == "S01")
 
-    def stopped(*_):
+    def stop(*_):
         yield "S01", row
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pooling, "_in_pool", stopped)
+    monkeypatch.setattr(pooling, "_in_pool", stop)
     assert run(["study", str(study), "--out", str(tmp_path)]) == 130
     assert "1 of 3 sessions are computed and kept" in capsys.readouterr().err
     assert len(list((tmp_path / "results").iterdir())) == 1
@@ -241,12 +241,12 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
     import distributed
 
     monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 0.5)
-    asked = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+    arguments = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None) as workers,
         pytest.raises(pooling.SchedulerError, match="no worker"),
     ):
-        visits(*asked, scheduler=workers.scheduler_address)
+        visits(*arguments, scheduler=workers.scheduler_address)
 
 
 @pytest.mark.slow
@@ -254,32 +254,32 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
 def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
     monkeypatch.setattr(pooling, "ANSWERS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
-        given = address.format(silent=silent.getsockname()[1])
-        assert run(["study", str(study), "--out", str(tmp_path), "--scheduler", given, "--json"]) == 1
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert given in said
-    assert "no Dask scheduler answers there" in said
+        uri = address.format(silent=silent.getsockname()[1])
+        assert run(["study", str(study), "--out", str(tmp_path), "--scheduler", uri, "--json"]) == 1
+    output = capsys.readouterr().err.splitlines()[-1]
+    assert uri in output
+    assert "no Dask scheduler answers there" in output
 
 
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, monkeypatch):
     monkeypatch.setattr(pooling, "ANSWERS", 5.0)
     monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 300.0)
-    whole = pooling._by_client
+    by_client = pooling._by_client
 
-    def killed(*words):
+    def kill_first(*words):
         scheduler.kill()
         scheduler.wait()
-        yield from whole(*words)
+        yield from by_client(*words)
 
-    told = tmp_path / "scheduler.json"
+    file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
-    command += ["--no-dashboard", "--scheduler-file", str(told)]
+    command += ["--no-dashboard", "--scheduler-file", str(file)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as scheduler:
         try:
-            _until(lambda: told.is_file() and told.read_text().endswith("}"))
-            address = json.loads(told.read_text())["address"]
-            monkeypatch.setattr(pooling, "_by_client", killed)
+            _until(lambda: file.is_file() and file.read_text().endswith("}"))
+            address = json.loads(file.read_text())["address"]
+            monkeypatch.setattr(pooling, "_by_client", kill_first)
             with pytest.raises(pooling.SchedulerError, match="the scheduler is gone"):
                 visits([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True), scheduler=address)
         finally:
@@ -289,12 +289,12 @@ def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, 
 class Workers:
     """A client of a cluster whose workers answer with these versions, or with the exception they raise."""
 
-    def __init__(self, **there):
-        self.there = there
+    def __init__(self, **answers):
+        self.answers = answers
 
     def run(self, _, workers, on_error):
         assert on_error == "return"
-        return {name: self.there[name] for name in workers}
+        return {name: self.answers[name] for name in workers}
 
 
 def test_every_worker_is_asked_for_its_versions_before_it_computes():
@@ -313,24 +313,24 @@ def test_every_worker_is_asked_for_its_versions_before_it_computes():
 def test_a_worker_of_another_version_that_joins_later_is_refused(study, tmp_path, monkeypatch):
     import distributed
 
-    asked = pooling.refuse_other_workers
-    seen = []
+    refuse = pooling.refuse_other_workers
+    names = []
 
-    def told(client, workers, address):
-        seen.extend(workers)
-        if len(seen) > 1:
-            asked(Workers(**{workers[-1]: {"numpy": "1.0"}}), workers[-1:], address)
-        asked(client, workers, address)
-        if len(seen) == 1:
+    def check_workers(client, workers, address):
+        names.extend(workers)
+        if len(names) > 1:
+            refuse(Workers(**{workers[-1]: {"numpy": "1.0"}}), workers[-1:], address)
+        refuse(client, workers, address)
+        if len(names) == 1:
             cluster_of.scale(2)
 
-    monkeypatch.setattr(pooling, "refuse_other_workers", told)
+    monkeypatch.setattr(pooling, "refuse_other_workers", check_workers)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster_of:
         folders = [study / "S01", study / "S02"]
         call = (folders, STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
         with pytest.raises(pooling.SchedulerError, match=r"computes with .*numpy 1\.0"):
             visits(*call, scheduler=cluster_of.scheduler_address)
-    assert len(seen) == 2
+    assert len(names) == 2
 
 
 def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in():
@@ -342,9 +342,9 @@ def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in
 
 @pytest.mark.usefixtures("pool")
 def test_a_cluster_is_not_asked_for_what_is_kept(study):
-    kept = Shelf(study / "pooled" / "results", STEADY)
-    done, failed = visits([study / "S01"], STEADY, kept, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
-    assert ([visit.session for visit in done], failed) == (["S01"], [])
+    shelf = Shelf(study / "pooled" / "results", STEADY)
+    pooled, failed = visits([study / "S01"], STEADY, shelf, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
+    assert ([visit.session for visit in pooled], failed) == (["S01"], [])
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ STATES = ("beginning", "idle", "mounting", "taring", "ready", "stroking", "scori
 VICTIMS = ("recorder", "client", "both")
 
 
-def told_of(message):
+def fields_of(message):
     """Return what the client tells of a report."""
     match message:
         case SessionBegun():
@@ -61,8 +61,8 @@ def told_of(message):
 def client(folder, pipe, *, pausing):
     """Be the client: begin or resume the session, answer a little later, and report down `pipe` all that is told."""
 
-    def report(**told):
-        os.write(pipe, (json.dumps(told) + "\n").encode())
+    def report(**fields):
+        os.write(pipe, (json.dumps(fields) + "\n").encode())
 
     chance = random.Random()
     recorder = Recorder.start(PACE)
@@ -75,11 +75,11 @@ def client(folder, pipe, *, pausing):
         desk.until(Device)
         recorder.send(StartSession(SHORT, str(folder), People("simulated hand", 7)))
     report(state="beginning")
-    told = {}
-    while told.get("state") != "done":
+    fields = {}
+    while fields.get("state") != "done":
         for message in recorder.poll(0.02):
-            told = told_of(message)
-            report(**told)
+            fields = fields_of(message)
+            report(**fields)
             if isinstance(message, AskBegin | AskMount | AskScore | AskFinish | AskStroke):
                 time.sleep(chance.uniform(0.0, 0.15))
                 if pausing and isinstance(message, AskStroke):
@@ -163,14 +163,14 @@ class Killing:
             self._note(json.loads(line))
         return True
 
-    def _note(self, told):
-        self.recorder = told.get("pid", self.recorder)
-        self.safe = max(self.safe, told.get("readings", 0))
-        self.states.add(told.get("state"))
-        if "event" in told:
-            self.events.append(tuple(told["event"]))
-        if "shown" in told:
-            self.shown[told["stream"]] = told["shown"]
+    def _note(self, fields):
+        self.recorder = fields.get("pid", self.recorder)
+        self.safe = max(self.safe, fields.get("readings", 0))
+        self.states.add(fields.get("state"))
+        if "event" in fields:
+            self.events.append(tuple(fields["event"]))
+        if "shown" in fields:
+            self.shown[fields["stream"]] = fields["shown"]
 
     def _count(self):
         try:
@@ -207,9 +207,9 @@ class Killing:
             shutil.rmtree(self.folder)  # the next kill begins a new session
             return
         check_resumable(recording)
-        kept = [event.trial for event in recording.events if event.kind == "take_kept"]
-        asked = [c.trial.number for c in resumption(recording.plan, recording.events).commands if hasattr(c, "trial")]
-        assert asked in ([len(set(kept)) + 1], [])
+        trials = [event.trial for event in recording.events if event.kind == "take_kept"]
+        numbers = [c.trial.number for c in resumption(recording.plan, recording.events).commands if hasattr(c, "trial")]
+        assert numbers in ([len(set(trials)) + 1], [])
 
     def _cut_tail(self):
         """Cut a copy's log short at random: a beginning of the session must be left."""
@@ -221,8 +221,8 @@ class Killing:
         content = log.read_bytes()
         (room / log.name).write_bytes(content[: max(len(content) - self._chance.randrange(1, 200_000), 0)])
         try:
-            left = Recording.open(room).readings().sequence
-            assert np.all(np.diff(left) == 1)
+            sequence = Recording.open(room).readings().sequence
+            assert np.all(np.diff(sequence) == 1)
         except RecordingError as error:
             assert "no such table" in str(error) or (room / "session.sqlite").stat().st_size < 8192  # noqa: PT017
         finally:

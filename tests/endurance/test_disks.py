@@ -20,7 +20,7 @@ from pathlib import Path
 sys.path[:0] = ["tests/sessions"]
 from failing_session import PLAN, RESERVE
 from stand_ins import INFO, Hands, StandIn, SimulatedClock
-from sessions.recording import SessionWriter, head
+from sessions.recording import SessionWriter, provenance
 from sessions.run.runner import run_session
 clock = SimulatedClock()
 folder = Path(sys.argv[1]) / "s"
@@ -38,9 +38,9 @@ def test_any_of_the_first_500_writes_may_fail_once_or_for_good_and_nothing_ackno
     for number in range(1, WRITES + 1):
         code = (IOERR_WRITE, IOERR_FSYNC)[number % 2]
         for name, fail in (("once", failing_once(number, code)), ("for good", failing_from(number))):
-            ran = OnADisk(tmp_path / f"{name} {number}", fail)
-            assert ran.calls >= number
-            recording = ran.check()
+            session = OnADisk(tmp_path / f"{name} {number}", fail)
+            assert session.calls >= number
+            recording = session.check()
             if recording is None or not recording.events:
                 ends["never begun"] += 1
             elif recording.end is None:
@@ -53,26 +53,26 @@ def test_any_of_the_first_500_writes_may_fail_once_or_for_good_and_nothing_ackno
 
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts a small disk of its own, in a name space of its own")
 def test_a_disk_that_is_really_full_ends_the_session_with_all_that_was_measured(tmp_path):
-    disk, kept = tmp_path / "disk", tmp_path / "kept"
+    disk, copy = tmp_path / "disk", tmp_path / "kept"
     disk.mkdir()
     size = RESERVE + 700_000
-    mounted = f'mount -t tmpfs -o size={size} tmpfs "$1" && exec "$0" -c "$3" "$1" "$2"'
-    words = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mounted]
-    ran = subprocess.run(
-        [*words, sys.executable, str(disk), str(kept), FULL],
+    mount = f'mount -t tmpfs -o size={size} tmpfs "$1" && exec "$0" -c "$3" "$1" "$2"'
+    words = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount]
+    process = subprocess.run(
+        [*words, sys.executable, str(disk), str(copy), FULL],
         capture_output=True,
         text=True,
         cwd=Path(__file__).parents[2],
     )
-    if "unshare" in ran.stderr or "mount:" in ran.stderr:
-        pytest.skip(f"this computer lets nobody mount a disk of their own ({ran.stderr.strip()})")
-    assert ran.returncode == 0, ran.stderr
-    cause, readings, reason = ran.stdout.split(maxsplit=2)
+    if "unshare" in process.stderr or "mount:" in process.stderr:
+        pytest.skip(f"this computer lets nobody mount a disk of their own ({process.stderr.strip()})")
+    assert process.returncode == 0, process.stderr
+    cause, readings, reason = process.stdout.split(maxsplit=2)
     assert cause == "disk"
     assert "database or disk is full" in reason
-    recording = Recording.open(kept)
+    recording = Recording.open(copy)
     assert recording.readings().sequence.tolist() == list(range(int(readings)))
     assert recording.end["reason"] == reason.strip()
-    seal(kept)
-    assert problems(kept) == ()
+    seal(copy)
+    assert problems(copy) == ()
     print(f"\na disk of {size / 1e6:.1f} MB was full after {readings} readings: all of them kept, the end written")

@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="n
 
 CYCLES = 500
 AWAY, CYCLE = (1.2, 1.6), 2.0  # the plug is out between these, in each cycle [s]
-TOLD = 600.0  # of random faults [s]
+SIMULATED = 600.0  # of random faults [s]
 
 
 @dataclass
@@ -41,10 +41,10 @@ class Run:
 
 def boxes(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path) -> dict[str, RunningSimulator]:
     """Return every simulated device in the list, started."""
-    return {name: one.start(Bench(3), clock, faults(one), folder) for name, one in SIMULATORS.items()}
+    return {name: simulator.start(Bench(3), clock, faults(simulator), folder) for name, simulator in SIMULATORS.items()}
 
 
-def started(transducer: Transducer) -> None:
+def start(transducer: Transducer) -> None:
     """Start it as soon as its plug is in for long enough."""
     for _ in range(600):
         with contextlib.suppress(LinkLost, SetupError):
@@ -54,38 +54,38 @@ def started(transducer: Transducer) -> None:
     raise AssertionError("it never came back")
 
 
-def followed(transducer: Transducer, clock: Clock, until: float, begun_ns: int) -> Run:
+def follow_readings(transducer: Transducer, clock: Clock, until: float, begun_ns: int) -> Run:
     """Read until so many told seconds have passed; every number is received or lost, times never run back."""
     run, last, time_ = Run(), 0, 0.0
-    started(transducer)
-    counted = 0
+    start(transducer)
+    count = 0
     while (clock.now_ns() - begun_ns) * 1e-9 < until:
         try:
             block = transducer.read(0.1)
         except LinkLost:
             run.lost += transducer.health.lost
             run.reopened += 1
-            counted, last, time_ = 0, 0, 0.0
+            count, last, time_ = 0, 0, 0.0
             transducer.stop()
-            started(transducer)
+            start(transducer)
             continue
         if len(block):
             assert block.sequence[0] > last
             assert np.all(np.diff(block.sequence) > 0)
             assert block.time[0] >= time_
             last, time_ = int(block.sequence[-1]), float(block.time[-1])
-            counted += len(block)
+            count += len(block)
             run.readings += len(block)
     transducer.stop()
-    counted += len(transducer.read(0.0))
+    count += len(transducer.read(0.0))
     health = transducer.health
-    assert health.received == counted
+    assert health.received == count
     run.lost += health.lost
     run.restarted = health.restarted
     return run
 
 
-def together(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path, until: float) -> dict[str, Run]:
+def follow_all(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path, until: float) -> dict[str, Run]:
     """Follow all drivers at once, each in a thread of its own."""
     devices = boxes(clock, faults, folder)
     runs = {name: Run(error="never ended") for name in devices}
@@ -100,7 +100,7 @@ def together(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path, 
                 except Exception as error:  # the plug may be out just now
                     if (clock.now_ns() - begun_ns) * 1e-9 > until:
                         raise error
-            runs[name] = followed(transducer, clock, until, begun_ns)
+            runs[name] = follow_readings(transducer, clock, until, begun_ns)
             transducer.close()
         except BaseException as error:  # noqa: BLE001 - told by the test
             runs[name] = Run(error=f"{type(error).__name__}: {error}")
@@ -116,7 +116,7 @@ def together(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path, 
     return runs
 
 
-def held() -> tuple[int, int, float]:
+def resources() -> tuple[int, int, float]:
     """Return threads, open files and resident memory [MB] of this process."""
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -126,11 +126,11 @@ def held() -> tuple[int, int, float]:
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is read from Linux's /proc")
 def test_hundreds_of_pulled_plugs_leave_nothing_behind_and_every_reading_counted(tmp_path):
     faults = lambda _: Faults([Fault("unplug", *AWAY)], seed=1, repeat=CYCLE)  # noqa: E731
-    together(RealClock(), faults, tmp_path, 3 * CYCLE)
-    threads, files, memory = held()
+    follow_all(RealClock(), faults, tmp_path, 3 * CYCLE)
+    threads, files, memory = resources()
     start = time.monotonic()
-    runs = together(RealClock(), faults, tmp_path, CYCLES * CYCLE)
-    after = held()
+    runs = follow_all(RealClock(), faults, tmp_path, CYCLES * CYCLE)
+    after = resources()
     for name, run in runs.items():
         assert not run.error, f"{name}: {run.error}"
         assert run.readings > 0
@@ -146,7 +146,7 @@ def test_ten_told_minutes_of_random_faults_leave_every_reading_received_or_lost(
 
     def faults(device: Simulator) -> Faults:
         kinds = [kind for kind in (*device.tells, *device.hides) if kind not in ("reboot", "unplug")]
-        begins = np.arange(2.0, TOLD - 10.0, 6.0)
+        begins = np.arange(2.0, SIMULATED - 10.0, 6.0)
         return Faults(
             [
                 Fault(chance.choice(kinds), at, at + chance.uniform(0.2, 3.0), chance.uniform(0.05, 0.6))
@@ -155,7 +155,7 @@ def test_ten_told_minutes_of_random_faults_leave_every_reading_received_or_lost(
             seed=chance.randrange(1000),
         )
 
-    runs = together(PacedClock(4.0), faults, tmp_path, TOLD)
+    runs = follow_all(PacedClock(4.0), faults, tmp_path, SIMULATED)
     for name, run in runs.items():
         assert not run.error, f"{name}: {run.error}"
         assert run.readings > 0

@@ -55,9 +55,9 @@ def reach(desk, state):
         pass
 
 
-def broken_off(recorder, desk, chance):
+def stop_times(recorder, desk, chance):
     """Return how long it took to stop connections to a box that accepts calls and says nothing [s]."""
-    found = []
+    times = []
     with socket.create_server(("127.0.0.1", 0)) as silent:
         for _ in range(ROUNDS):
             recorder.send(Connect(f"net-ft://127.0.0.1?http={silent.getsockname()[1]}"))
@@ -66,14 +66,14 @@ def broken_off(recorder, desk, chance):
             began = time.monotonic()
             recorder.send(Stop())
             desk.until(Failed)
-            found.append(time.monotonic() - began)
+            times.append(time.monotonic() - began)
             caller.close()
-    return found
+    return times
 
 
 def test_a_stop_is_answered_within_a_fifth_of_a_second_in_every_state(tmp_path):
     chance = random.Random(3)
-    took = defaultdict(list)
+    times_of = defaultdict(list)
     with Recorder.start() as recorder:
         desk = Desk(recorder)
         recorder.send(Connect("sim:?seed=7"))
@@ -82,22 +82,22 @@ def test_a_stop_is_answered_within_a_fifth_of_a_second_in_every_state(tmp_path):
             state = STATES[number % len(STATES)]
             folder = tmp_path / str(number)
             # Nobody answers in a state that is left by an answer.
-            asked = {"idle": AskBegin, "mounting": AskMount, "scoring": AskScore}.get(state)
-            desk.instead = {} if asked is None else {asked: lambda _: None}
+            command = {"idle": AskBegin, "mounting": AskMount, "scoring": AskScore}.get(state)
+            desk.instead = {} if command is None else {command: lambda _: None}
             recorder.send(StartSession(PLAN, str(folder), People("simulated hand", 7)))
             reach(desk, state)
             time.sleep(chance.uniform(0.0, 0.1))
             began = time.monotonic()
             recorder.send(Stop())
             end = desk.until(SessionEnded).end
-            took[state].append(time.monotonic() - began)
+            times_of[state].append(time.monotonic() - began)
             assert end.cause == "stopped"
             assert Recording.open(folder).end["cause"] == "stopped"
-        took["connecting"] = broken_off(recorder, desk, chance)
-    for state, times in took.items():
+        times_of["connecting"] = stop_times(recorder, desk, chance)
+    for state, times in times_of.items():
         print(f"\nstop while {state}: median {np.median(times) * 1e3:.0f} ms, most {max(times) * 1e3:.0f} ms", end="")
     print(f"\nload of this computer: {os.getloadavg()[0]:.1f}")
-    assert all(np.median(times) < LIMIT for times in took.values())
+    assert all(np.median(times) < LIMIT for times in times_of.values())
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="puts a process to sleep, which needs POSIX")
@@ -106,10 +106,10 @@ def test_a_recorder_that_slept_loses_no_reading_that_the_system_kept_for_it(tmp_
         [sys.executable, "-m", "daq_app", "simulate", "net-ft", "--json"], stdout=subprocess.PIPE, text=True
     )
     try:
-        said = ""
-        while "net-ft://" not in said:
-            said += box.stdout.readline()
-        uri = next(word for word in said.replace('"', " ").split() if word.startswith("net-ft://"))
+        output = ""
+        while "net-ft://" not in output:
+            output += box.stdout.readline()
+        uri = next(word for word in output.replace('"', " ").split() if word.startswith("net-ft://"))
         with Recorder.start() as recorder:
             desk = Desk(recorder, {AskMount: lambda _: None})
             recorder.send(Connect(uri))
@@ -129,8 +129,8 @@ def test_a_recorder_that_slept_loses_no_reading_that_the_system_kept_for_it(tmp_
         assert end.health.received == len(block) == end.readings
         missing = int(block.sequence[-1]) + 1 - int(block.sequence[0]) - len(block)
         assert missing == end.health.lost
-        counted = sum(event.data.get("lost", 0) for event in recording.events if event.kind == "losses")
-        assert counted == missing
+        losses = sum(event.data.get("lost", 0) for event in recording.events if event.kind == "losses")
+        assert losses == missing
         print(f"\nasleep for {ASLEEP:g} s: {len(block)} readings, {missing} lost, and as many counted")
     finally:
         box.terminate()
@@ -160,8 +160,8 @@ def test_a_cable_pulled_again_and_again_costs_a_trial_each_time_and_the_session_
         for _ in range(PULLS):
             desk.until(AskStroke)
             box.close()
-            ended = desk.until(SessionEnded)
-            assert (ended.end.cause, ended.resumable) == ("device", True)
+            report = desk.until(SessionEnded)
+            assert (report.end.cause, report.resumable) == ("device", True)
             box = NetFtBox(Bench(7), clock, **ports)
             box.start()
             assert desk.until(LinkBack).same

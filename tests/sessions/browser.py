@@ -27,18 +27,18 @@ PAPER_HEIGHT = 1001  # likewise [CSS px]
 MEASURE = Path(__file__).with_name("page_measure.js").read_text(encoding="utf-8")
 
 
-def opened(room, text):
+def open_page(room, text):
     """Open a page three times, 360 and 1920 px wide and as on paper.
 
     Return what is seen of each, what the console says, and every address the page asks for.
     """
-    printed = text.replace("@media print", "@media all")
+    paper_text = text.replace("@media print", "@media all")
     frames = "".join(
-        f'<iframe id="{name}" style="width: {width}px; height: 900px; border: 0" srcdoc="{escape(shown)}"></iframe>'
-        for name, width, shown in (("narrow", 360, text), ("wide", 1920, text), ("paper", PAPER, printed))
+        f'<iframe id="{name}" style="width: {width}px; height: 900px; border: 0" srcdoc="{escape(page_text)}"></iframe>'
+        for name, width, page_text in (("narrow", 360, text), ("wide", 1920, text), ("paper", PAPER, paper_text))
     )
     (room / "page.html").write_text(f"<pre></pre>{frames}<script>{MEASURE}</script>", encoding="utf-8")
-    done = subprocess.run(
+    process = subprocess.run(
         [
             CHROMIUM,
             *FLAGS,
@@ -55,7 +55,7 @@ def opened(room, text):
         timeout=200,
         check=True,
     )
-    seen = json.loads(re.search(r"<pre>(\{.*?\})</pre>", done.stdout, re.DOTALL)[1].replace("&amp;", "&"))
-    asked = set(OF_THE_PAGE.findall((room / "net.json").read_text(errors="replace")))
-    foreign = {address for address in asked if not address.startswith("file:")}
-    return seen, [line for line in done.stderr.splitlines() if "CONSOLE" in line], foreign
+    document = json.loads(re.search(r"<pre>(\{.*?\})</pre>", process.stdout, re.DOTALL)[1].replace("&amp;", "&"))
+    addresses = set(OF_THE_PAGE.findall((room / "net.json").read_text(errors="replace")))
+    foreign = {address for address in addresses if not address.startswith("file:")}
+    return document, [line for line in process.stderr.splitlines() if "CONSOLE" in line], foreign

@@ -4,9 +4,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from recordings import begun, change, readings
+from recordings import change, new_writer, readings
+from simulated_session import Session
 from stand_ins import INFO, SimulatedClock
-from told_session import Session
 
 from sessions.exchange import ExportSource, export
 from sessions.exchange.import_csv import import_csv
@@ -27,7 +27,7 @@ def whole(folder):
 def torn(folder):
     """Nothing simulated, texts beyond ASCII, lost readings, a silence, odd numbers, a damaged block, and no end."""
     clock = SimulatedClock()
-    writer = begun(folder, info=replace(INFO, simulated=False), clock=clock)
+    writer = new_writer(folder, info=replace(INFO, simulated=False), clock=clock)
     writer.event("take_started", 1, {"take": 1}, time_ns=50)
     for first, later, received in ((0, 0.0, 100), (110, 0.0, 200), (210, 30.0, 300), (310, 30.0, 400)):
         block = readings(first, 100, received_ns=received)
@@ -56,12 +56,12 @@ def foreign(folder):
     import_csv(path, folder)
 
 
-MADE = {make.__name__: make for make in (whole, torn, scores_only, foreign)}
+MAKERS = {make.__name__: make for make in (whole, torn, scores_only, foreign)}
 
 
 def source_of(name, folder):
     """Make one of these sessions in `folder` and return it as exports are given it; the whole one with a prediction."""
-    MADE[name](folder)
+    MAKERS[name](folder)
     recording = Recording.open(folder)
     if name == "whole":
         append(recording, Decision("E02", "seen", "kept", 1, 1, None, new=True))

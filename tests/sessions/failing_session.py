@@ -28,13 +28,13 @@ class OnADisk:
                 writer.safe = self.safe_events.extend
                 device = StandIn(clock)
                 self.end = run_session(
-                    PLAN, writer, Hands(clock, device), device, progress=lambda status: self.told(status)
+                    PLAN, writer, Hands(clock, device), device, progress=lambda status: self.acknowledge(status)
                 )
             except RecordingError as error:
                 self.error = str(error)
             self.calls = disk.calls
 
-    def told(self, status):
+    def acknowledge(self, status):
         self.acknowledged = status.safe.readings
 
     def check(self):
@@ -51,10 +51,10 @@ class OnADisk:
         assert len(sequence) >= self.acknowledged
         if recording.end is None or not recording.end["complete"]:
             check_resumable(recording)
-            kept = {event.trial for event in recording.events if event.kind == "take_kept"}
+            kept_trials = {event.trial for event in recording.events if event.kind == "take_kept"}
             commands = resumption(recording.plan, recording.events).commands
-            asked = [command.trial.number for command in commands if hasattr(command, "trial")]
-            assert asked in ([len(kept) + 1], [])
+            trial_numbers = [command.trial.number for command in commands if hasattr(command, "trial")]
+            assert trial_numbers in ([len(kept_trials) + 1], [])
         return recording
 
 
@@ -76,9 +76,9 @@ class Quota:
         if what != "write":
             return OK
         file, _, length, offset = arguments
-        grown = {**self.ends, file: max(self.ends.get(file, 0), offset + length)}
+        file_ends = {**self.ends, file: max(self.ends.get(file, 0), offset + length)}
         reserve = self.folder / "session.reserve"
-        if sum(grown.values()) > self.size + RESERVE - (reserve.stat().st_size if reserve.exists() else 0):
+        if sum(file_ends.values()) > self.size + RESERVE - (reserve.stat().st_size if reserve.exists() else 0):
             return FULL
-        self.ends = grown
+        self.ends = file_ends
         return OK

@@ -61,19 +61,19 @@ class FaultyDisk:
     def __init__(self, fail):
         self.fail = fail
         self.calls = 0
-        self._made = {}  # methods by the address of the original ones; kept alive
+        self._methods = {}  # methods by the address of the original ones; kept alive
 
     def wrap(self, file):
         """Put our methods into an opened file."""
         original = file.contents.methods
         address = ctypes.addressof(original.contents)
-        if address not in self._made:
+        if address not in self._methods:
             mine = Methods()
             ctypes.memmove(ctypes.byref(mine), original, ctypes.sizeof(Methods))
             mine.write = WRITE(self._failing("write", original.contents.write))
             mine.sync = SYNC(self._failing("sync", original.contents.sync))
-            self._made[address] = mine
-        file.contents.methods = ctypes.pointer(self._made[address])
+            self._methods[address] = mine
+        file.contents.methods = ctypes.pointer(self._methods[address])
 
     def _failing(self, what, original):
         def call(*arguments):
@@ -89,56 +89,56 @@ def library():
     name = ctypes.util.find_library("sqlite3")
     if name is None:
         return None
-    found = ctypes.CDLL(name)
-    found.sqlite3_libversion.restype = ctypes.c_char_p
-    found.sqlite3_vfs_find.restype = ctypes.POINTER(Layer)
-    found.sqlite3_vfs_find.argtypes = (ctypes.c_char_p,)
-    found.sqlite3_vfs_register.argtypes = (ctypes.POINTER(Layer), ctypes.c_int)
-    found.sqlite3_vfs_unregister.argtypes = (ctypes.POINTER(Layer),)
+    sqlite = ctypes.CDLL(name)
+    sqlite.sqlite3_libversion.restype = ctypes.c_char_p
+    sqlite.sqlite3_vfs_find.restype = ctypes.POINTER(Layer)
+    sqlite.sqlite3_vfs_find.argtypes = (ctypes.c_char_p,)
+    sqlite.sqlite3_vfs_register.argtypes = (ctypes.POINTER(Layer), ctypes.c_int)
+    sqlite.sqlite3_vfs_unregister.argtypes = (ctypes.POINTER(Layer),)
     # Ours only when Python's own connections see what is registered with it.
-    return found if found.sqlite3_libversion().decode() == sqlite3.sqlite_version and _shared(found) else None
+    return sqlite if sqlite.sqlite3_libversion().decode() == sqlite3.sqlite_version and _is_shared(sqlite) else None
 
 
-def _shared(found):
-    probe = _copy(found)
+def _is_shared(sqlite):
+    probe = _copy(sqlite)
     probe.name = b"daq-app probe"
-    found.sqlite3_vfs_register(ctypes.byref(probe), 0)
+    sqlite.sqlite3_vfs_register(ctypes.byref(probe), 0)
     try:
         sqlite3.connect("file::memory:?vfs=daq-app%20probe", uri=True).close()
     except sqlite3.OperationalError:
         return False
     finally:
-        found.sqlite3_vfs_unregister(ctypes.byref(probe))
+        sqlite.sqlite3_vfs_unregister(ctypes.byref(probe))
     return True
 
 
-def _copy(found):
+def _copy(sqlite):
     layer = Layer()
-    ctypes.memmove(ctypes.byref(layer), found.sqlite3_vfs_find(None), ctypes.sizeof(Layer))
+    ctypes.memmove(ctypes.byref(layer), sqlite.sqlite3_vfs_find(None), ctypes.sizeof(Layer))
     return layer
 
 
 @contextmanager
 def faulty_disk(fail):
     """Let every SQLite file opened inside go through a disk that fails as `fail` says."""
-    found = library()
+    sqlite = library()
     disk = FaultyDisk(fail)
-    usual = found.sqlite3_vfs_find(None)
-    layer = _copy(found)
+    usual_layer = sqlite.sqlite3_vfs_find(None)
+    layer = _copy(sqlite)
     layer.name = b"faulty"
-    usual_open = usual.contents.open
+    usual_open = usual_layer.contents.open
 
-    def opened(_this, name, file, flags, out_flags):
-        code = usual_open(ctypes.addressof(usual.contents), name, file, flags, out_flags)
+    def open_file(_this, name, file, flags, out_flags):
+        code = usual_open(ctypes.addressof(usual_layer.contents), name, file, flags, out_flags)
         handle = ctypes.cast(file, ctypes.POINTER(File))
         if code == OK and handle.contents.methods:
             disk.wrap(handle)
         return code
 
-    layer.open = OPEN(opened)
-    found.sqlite3_vfs_register(ctypes.byref(layer), 1)
+    layer.open = OPEN(open_file)
+    sqlite.sqlite3_vfs_register(ctypes.byref(layer), 1)
     try:
         yield disk
     finally:
-        found.sqlite3_vfs_unregister(ctypes.byref(layer))
-        found.sqlite3_vfs_register(usual, 1)
+        sqlite.sqlite3_vfs_unregister(ctypes.byref(layer))
+        sqlite.sqlite3_vfs_register(usual_layer, 1)

@@ -5,7 +5,7 @@ import os
 import signal
 import time
 
-from told_session import Session
+from simulated_session import Session
 
 
 def whole_session(folder, report):
@@ -15,7 +15,7 @@ def whole_session(folder, report):
     session.run(progress=lambda status: report(status.safe.readings, status.safe.events))
 
 
-def forked(work):
+def fork(work):
     """Start `work(report)` in a process of its own; what it reports comes down the pipe that is returned."""
     reading, writing = os.pipe()
     process = os.fork()
@@ -29,15 +29,15 @@ def forked(work):
     return process, reading
 
 
-def killed(process, reading, events, later):
+def kill_later(process, reading, events, later):
     """Kill a process `later` seconds after it said that so many events are safe, or ended; return all it reported."""
-    said = b""
-    while (more := os.read(reading, 65536)) and _safe_events(said := said + more) < events:
+    report = b""
+    while (part := os.read(reading, 65536)) and _safe_events(report := report + part) < events:
         pass
     time.sleep(later)
     kill(process)
     with os.fdopen(reading, "rb") as pipe:
-        return _lines(said + pipe.read())
+        return _lines(report + pipe.read())
 
 
 def kill(process):
@@ -45,23 +45,23 @@ def kill(process):
     os.waitpid(process, 0)
 
 
-def reported(reading):
+def read_reports(reading):
     """Return everything reported in whole lines."""
     with os.fdopen(reading, "rb") as pipe:
         return _lines(pipe.read())
 
 
-def _lines(said):
-    return [json.loads(line) for line in said.split(b"\n")[:-1]]
+def _lines(report):
+    return [json.loads(line) for line in report.split(b"\n")[:-1]]
 
 
-def _safe_events(said):
-    return max((line[1] for line in _lines(said) if len(line) == 2), default=-1)
+def _safe_events(report):
+    return max((line[1] for line in _lines(report) if len(line) == 2), default=-1)
 
 
 def lines_of(reading, count):
     """Return so many lines of what is reported, or as many as there are."""
-    told = b""
-    while told.count(b"\n") < count and (part := os.read(reading, 1)):
-        told += part
-    return [json.loads(line) for line in told.splitlines()]
+    report = b""
+    while report.count(b"\n") < count and (part := os.read(reading, 1)):
+        report += part
+    return [json.loads(line) for line in report.splitlines()]

@@ -26,19 +26,19 @@ const boxes_of = (page) => {
       if (box.width > 0 && box.height > 0) boxes.push([letters, node.data.trim().slice(0, 30)]);
     }
   }
-  return boxes.sort((one, other) => one[0].top - other[0].top);
+  return boxes.sort((upper, lower) => upper[0].top - lower[0].top);
 };
 const overlaps = (page) => {
   const boxes = boxes_of(page);
-  const found = [];
+  const pairs = [];
   boxes.forEach(([upper, text], i) => {
     for (let j = i + 1; j < boxes.length && boxes[j][0].top < upper.bottom - 2; j++) {
       const lower = boxes[j][0];
       const across = Math.min(upper.right, lower.right) - Math.max(upper.left, lower.left);
-      if (across > 2 && Math.min(upper.bottom, lower.bottom) - lower.top > 2) found.push(`${text} | ${boxes[j][1]}`);
+      if (across > 2 && Math.min(upper.bottom, lower.bottom) - lower.top > 2) pairs.push(`${text} | ${boxes[j][1]}`);
     }
   });
-  return found;
+  return pairs;
 };
 const cut = (page) =>
   [...page.querySelectorAll(".scroll, table, figure, pre, p")]
@@ -47,16 +47,16 @@ const cut = (page) =>
 const beyond = (page) =>
   [...page.querySelectorAll("svg text")]
     .filter((element) => {
-      const [text, picture] = [element, element.closest("svg")].map((one) => one.getBoundingClientRect());
+      const [text, picture] = [element, element.closest("svg")].map((part) => part.getBoundingClientRect());
       return text.left < picture.left - 1 || text.right > picture.right + 1;
     })
     .map((element) => element.textContent);
 onload = () => {
-  const seen = {};
+  const frames = {};
   for (const frame of document.querySelectorAll("iframe")) {
     const page = frame.contentDocument;
     const whole = [...page.querySelectorAll("figure, tr, pre")].map((element) => element.getBoundingClientRect().height);
-    seen[frame.id] = {
+    frames[frame.id] = {
       window: page.documentElement.clientWidth,
       needed: page.documentElement.scrollWidth,
       texts: boxes_of(page).length,
@@ -67,5 +67,5 @@ onload = () => {
       fetched: frame.contentWindow.performance.getEntriesByType("resource").map((entry) => entry.name),
     };
   }
-  document.querySelector("pre").textContent = JSON.stringify(seen);
+  document.querySelector("pre").textContent = JSON.stringify(frames);
 };

@@ -44,13 +44,13 @@ class Tables(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
+        attributes = dict(attrs)
         if tag == "table":
             self._row = None
-            if given["class"] == "data":
-                self.tables.append({"name": given["id"], "heads": [], "rows": [], "notes": {}})
+            if attributes["class"] == "data":
+                self.tables.append({"name": attributes["id"], "heads": [], "rows": [], "notes": {}})
         if tag in ("table", "th", "td", "small", "sup", "span", "caption", "li", "ul"):
-            self._in.append((tag, given.get("class", "")))
+            self._in.append((tag, attributes.get("class", "")))
         if tag == "tr":
             self._row = []
         if tag in ("th", "td", "li"):
@@ -87,13 +87,13 @@ def estimates(text):
                 plain = name in PLAIN or _is_interval(name) or re.match(r"index \d", name)
                 if plain or not re.search(r"\d", cell["words"]):
                     continue
-                beside = row[at + 1] if at + 1 < len(row) and _is_interval(heads[at + 1][0]) else None
-                told_beside = beside is not None and " to " in beside["words"]
-                interval = cell["interval"] or (beside["words"] if told_beside else "")
-                marks = [*cell["mark"].split(","), *([] if beside is None else beside["mark"].split(","))]
-                told = [table["notes"].get(mark, "") for mark in marks]
-                why = next((note for note in told if "no interval" in note), "")
-                place = f"{table['name']}, {name}, {' '.join(other['words'] for other in row[:3])}: {cell['words']}"
+                neighbour = row[at + 1] if at + 1 < len(row) and _is_interval(heads[at + 1][0]) else None
+                interval_beside = neighbour is not None and " to " in neighbour["words"]
+                interval = cell["interval"] or (neighbour["words"] if interval_beside else "")
+                marks = [*cell["mark"].split(","), *([] if neighbour is None else neighbour["mark"].split(","))]
+                notes = [table["notes"].get(mark, "") for mark in marks]
+                why = next((note for note in notes if "no interval" in note), "")
+                place = f"{table['name']}, {name}, {' '.join(head['words'] for head in row[:3])}: {cell['words']}"
                 yield place, unit or (name if name in BARE else ""), interval, why
 
 

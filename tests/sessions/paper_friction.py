@@ -29,11 +29,11 @@ PLAN = SessionPlan(
 MEASURED = 2.5  # N
 
 
-def stroke(trial, **known):
+def stroke(trial, **fields):
     empty = dict.fromkeys(Stroke.__dataclass_fields__)
-    told = {"trial": trial, "readings": 100, "zero": "before contact", "flaws": (), "reasons": {}, "number": 1}
-    told |= {"kept": True, "decided": {}}
-    return Stroke(**(empty | told | {"normal_force": MEASURED, "tangential_force": 1.2} | known))
+    basics = {"trial": trial, "readings": 100, "zero": "before contact", "flaws": (), "reasons": {}, "number": 1}
+    basics |= {"kept": True, "decided": {}}
+    return Stroke(**(empty | basics | {"normal_force": MEASURED, "tangential_force": 1.2} | fields))
 
 
 def parameters(trial, mu, tau_max, direction, speed=20.0, flaws=()):

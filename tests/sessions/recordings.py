@@ -24,7 +24,7 @@ PLAN = SessionPlan(
 )
 
 
-def begun(folder, *, info=INFO, plan=PLAN, clock=None, subject_simulated=False):
+def new_writer(folder, *, info=INFO, plan=PLAN, clock=None, subject_simulated=False):
     clock = clock or SimulatedClock()
     return SessionWriter.create(folder, plan, info, provenance(clock), subject_simulated=subject_simulated, clock=clock)
 
@@ -36,10 +36,10 @@ def readings(first, count, received_ns=0):
     return ReadingBlock(i, i * 35 + 2**33, i % 3, i / 200.0, np.full(count, received_ns, np.int64), raw)
 
 
-def crashed(folder, commits):
+def record_crash(folder, commits):
     """The files of a recording whose writer never closed: commits of 100 readings each, in the log alone."""
     live = folder.with_name("live")
-    writer = begun(live)
+    writer = new_writer(live)
     for i in range(commits):
         writer.readings(readings(100 * i, 100, received_ns=i))
         writer.commit()
@@ -50,9 +50,9 @@ def crashed(folder, commits):
     return folder
 
 
-def ended(folder, *, blocks=3, **options):
+def record_session(folder, *, blocks=3, **options):
     """A recording of 100 readings a block, with one scored trial, ended as it should."""
-    writer = begun(folder, **options)
+    writer = new_writer(folder, **options)
     writer.event("started")
     writer.event("take_started", 1, {"take": 1}, time_ns=50)
     for i in range(blocks):
@@ -67,7 +67,7 @@ def ended(folder, *, blocks=3, **options):
 
 def with_a_long_answer(folder, positions, count=0):
     """A recording of `count` readings whose one answer has so many positions, followed by 118 notes."""
-    writer = begun(folder)
+    writer = new_writer(folder)
     if count:
         writer.readings(readings(0, count))
     answer = {"score": 42.5, "positions": [[1000.0 + i / 60, i % 101 * 0.99] for i in range(positions)]}
@@ -91,14 +91,14 @@ def change(folder, query, values=()):
         connection.commit()
 
 
-def plainly_read(folder):
+def read_plainly(folder):
     """Every (sequence, counter, status, time, received_ns, raw 1..6), read with nothing of ours."""
-    found = []
+    readings_list = []
     for n, *columns in rows(
         folder, "SELECT readings, sequence, counter, status, time, received_ns, raw FROM blocks ORDER BY number"
     ):
         kinds = ("q", "q", "q", "d", "q")
         plain = [struct.unpack(f"<{n}{kind}", column) for kind, column in zip(kinds, columns, strict=False)]
         raw = list(struct.iter_unpack("<6d", columns[5]))
-        found += [(*(column[i] for column in plain), *raw[i]) for i in range(n)]
-    return found
+        readings_list += [(*(column[i] for column in plain), *raw[i]) for i in range(n)]
+    return readings_list

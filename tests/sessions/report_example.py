@@ -75,8 +75,8 @@ def experiment(descriptor, score_tables):
         indices=tuple(rows),
         scores=means,
         answers={
-            subject: tuple(given.get(i) for i in rows)
-            for subject, given in score_matrix(score_tables, descriptor).items()
+            subject: tuple(scores.get(i) for i in rows)
+            for subject, scores in score_matrix(score_tables, descriptor).items()
         },
         score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
         index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
@@ -113,15 +113,15 @@ def trace(mu, speed, onset):
     t = np.arange(0, 2.4, 0.005)
     normal = 3.0 * np.clip(t / 0.15, 0, 1) * (1 + 0.15 * np.sin(2.2 * t)) * np.clip((2.4 - t) / 0.2, 0, 1)
     ratio = mu * np.clip(t / 0.5, 0, 1) * (1 + 0.02 * np.sin(17 * t + 9 * mu))
-    felt = normal > 0.3
+    touching = normal > 0.3
     v = speed * np.clip((t - 0.4) / 0.2, 0, 1) * (1 + 0.06 * np.sin(11 * t))
     return Trace(
         origin=onset,
         time=t,
         normal=normal,
         tangential=ratio * normal,
-        mu=np.where(felt, ratio, np.nan),
-        speed=np.where(felt, v, np.nan),
+        mu=np.where(touching, ratio, np.nan),
+        speed=np.where(touching, v, np.nan),
     )
 
 
@@ -230,13 +230,13 @@ def prediction(number, descriptor, index):
         matching_depth_interval=(1.88, 1.97),
         alternatives=tuple(
             Alternative(
-                variant, tau, DEPTH[descriptor], *((sed, 0.001) if small else (None, None)), 3.0, 2.0, why, 0.01, held
+                variant, tau, DEPTH[descriptor], *((sed, 0.001) if small else (None, None)), 3.0, 2.0, why, 0.01, band
             )
             for variant in variants("both")
             for small in [variant.kinematics == "small"]
             for why in ["" if small else "there is no settled sliding"]
             for ends in [((2.9, 3.1), (1.9, 2.1), (1.9, 2.1))]  # of N, T and depth
-            for held in [SedInterval(0.99 * sed, 1.01 * sed, "derivatives", 0.1, 0.1, None, "", *ends)]
+            for band in [SedInterval(0.99 * sed, 1.01 * sed, "derivatives", 0.1, 0.1, None, "", *ends)]
         ),
     )
 
@@ -281,15 +281,15 @@ def _placed(local):
 
 
 def example(**changes):
-    return Report(**{**_made(), **changes})
+    return Report(**{**_contents(), **changes})
 
 
 @functools.cache
-def _made():
+def _contents():
     """What is in it: made once, for correlations of every subject take a second."""
     score_tables = tables()
     numbered = [(d, i) for d, rows in TABLES.items() for i in rows]
-    strokes = tuple(stroke(k, *which) for k, which in enumerate(numbered, 1))
+    strokes = tuple(stroke(k, *surface) for k, surface in enumerate(numbered, 1))
     t = np.arange(0, 110, 0.05)
     force = sum(np.where((t > 10 * k) & (t < 10 * k + 2.4), 3.0, 0.0) for k in range(1, 11))
     return {
@@ -307,7 +307,7 @@ def _made():
         "experiments": tuple(experiment(d, score_tables) for d in TABLES),
         "course": Course(t, force, 0.5 * force),
         "strokes": strokes,
-        "predictions": tuple(prediction(k, *which) for k, which in enumerate(numbered, 1)),
+        "predictions": tuple(prediction(k, *surface) for k, surface in enumerate(numbered, 1)),
         "fields": (finger_field("stickiness", 100), finger_field("slipperiness", 100)),
         "planted": tuple(
             GroundTruth(k, TABLES[d][i][0], TABLES[d][i][1], TABLES[d][i][2], DIRECTION[d])

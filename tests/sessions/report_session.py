@@ -78,13 +78,13 @@ def plan(subject="P01", *, forces=True, per_block=5):
 def record(folder, *, seed=1, subject="P01", forces=True, per_block=5, discard=None):
     """Write a session; return the folder and what was planted, a list of (trial, PlantedStroke)."""
     clock = SimulatedClock()
-    made = plan(subject, forces=forces, per_block=per_block)
+    session_plan = plan(subject, forces=forces, per_block=per_block)
     writer = SessionWriter.create(
-        folder, made, INFO if forces else None, PROVENANCE, subject_simulated=True, clock=clock
+        folder, session_plan, INFO if forces else None, PROVENANCE, subject_simulated=True, clock=clock
     )
     bench, hand, surfaces = Bench(seed), SimulatedSubject(seed), paper_surfaces()
-    planted = []
-    for trial in made.trials:
+    truth = []
+    for trial in session_plan.trials:
         surface = surfaces[trial.stimulus.descriptor, trial.stimulus.index]
         for take in (1, 2) if trial.number == discard else (1,):
             begin = clock.ns
@@ -99,12 +99,12 @@ def record(folder, *, seed=1, subject="P01", forces=True, per_block=5, discard=N
                 writer.event("take_discarded", trial=trial.number, data={"take": take, "reason": "slipped off"})
                 continue
             if forces:
-                planted.append((trial.number, stroke))
+                truth.append((trial.number, stroke))
             writer.event("scored", trial=trial.number, data={"score": hand.score(surface)})
             writer.event("take_kept", trial=trial.number, data={"take": take})
     writer.event("ended", data={})
     writer.close()
-    return folder, planted
+    return folder, truth
 
 
 def _block(bench, times):

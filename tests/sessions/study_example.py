@@ -44,12 +44,12 @@ def study():
     simulated = "SIMULATED: made up"
     visits = [_full(visit(number, simulated=simulated)) for number in range(1, 11)]
     visits[8] = replace(visits[8], session="S09_" + "as_long_as_a_folder_may_be_called_" * 7)
-    planted = {
+    truth = {
         "score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0},
         "strokes": [{"subject": v.subject, "trial": row.trial, "mu": row.mu} for v in visits for row in v.rows],
     }
     out = (Exclusion("S03", "used the scale backwards, and said so afterwards", "E02"),)
-    return pool_visits(visits, [("S11", "session.sqlite is damaged")], out, planted, VisitOptions(paths="small"))
+    return pool_visits(visits, [("S11", "session.sqlite is damaged")], out, truth, VisitOptions(paths="small"))
 
 
 def _with_ends(**ends):
@@ -57,8 +57,8 @@ def _with_ends(**ends):
     return lows | {f"{name}_high": high for name, (_, high) in ends.items()}
 
 
-def _full(made):
-    number = int(made.subject[1:])
+def _full(bare_visit):
+    number = int(bare_visit.subject[1:])
     small = [path for path in PATHS if path.kinematics == "small"]
     rows = [
         replace(
@@ -73,14 +73,16 @@ def _full(made):
             flaws=("too_little_force",) if row.trial == 3 else (),
             paths=tuple(row.sed * (1.0 if path.receptor == "ending" else 1.0 - 0.002 * row.index) for path in small),
         )
-        for row in made.rows
+        for row in bare_visit.rows
     ]
     return replace(
-        made,
+        bare_visit,
         rows=tuple(rows),
-        sha256=hashlib.sha256(made.session.encode()).hexdigest(),
+        sha256=hashlib.sha256(bare_visit.session.encode()).hexdigest(),
         sealed="The predictions were made after the scores had been given, and had not been sealed before.",
-        decisions=("decision 1 by E02: stroke 1 of trial 2 is kept: it was good",) if made.session == "S04" else (),
+        decisions=("decision 1 by E02: stroke 1 of trial 2 is kept: it was good",)
+        if bare_visit.session == "S04"
+        else (),
         model=(("kinematics", "small strain, plane strain", ""),),
         made_by={"daq-app": "0.1.0"},
     )

@@ -64,7 +64,7 @@ def rows(seds, interval=None):
             sed=value[0],
             history=SimpleNamespace(time=time, responses=ramp * value),
             interval=interval,
-            responses={name: (one, 0.0) for name, one in zip(NAMES, value.tolist(), strict=True)},
+            responses={name: (response, 0.0) for name, response in zip(NAMES, value.tolist(), strict=True)},
         )
         for i, value in enumerate(values, 1)
     )
@@ -72,20 +72,20 @@ def rows(seds, interval=None):
 
 def test_the_interval_of_an_sed_goes_through_to_the_rates():
     interval = SimpleNamespace(low=0.008, high=0.012)
-    _, (alone,) = session_firing(SimpleNamespace(trials=rows([0.01])))
-    _, (found,) = session_firing(SimpleNamespace(trials=rows([0.01], interval)))
-    assert (alone.settled_interval, alone.peak_interval) == (None, None)
+    _, (bare_firing,) = session_firing(SimpleNamespace(trials=rows([0.01])))
+    _, (firing,) = session_firing(SimpleNamespace(trials=rows([0.01], interval)))
+    assert (bare_firing.settled_interval, bare_firing.peak_interval) == (None, None)
     # Drive 1 at the reference of 10 kPa, straight in the SED beyond a threshold of 4 Pa: 14 imp/s for it.
-    assert found.settled_interval == pytest.approx((19.0 - 14.0 * 0.2, 19.0 + 14.0 * 0.2), abs=2e-2)
-    assert found.peak_interval[0] < found.rate.max() < found.peak_interval[1]
+    assert firing.settled_interval == pytest.approx((19.0 - 14.0 * 0.2, 19.0 + 14.0 * 0.2), abs=2e-2)
+    assert firing.peak_interval[0] < firing.rate.max() < firing.peak_interval[1]
 
 
 def test_the_order_of_surfaces_is_that_of_the_sed_whatever_the_exponent():
     seds = [0.0086, 0.0094, 0.0052, 0.0087, 0.0053]
     for exponent in (0.5, 1.0):
-        reference, found = session_firing(SimpleNamespace(trials=rows(seds)), replace(USUAL, exponent=exponent))
+        reference, firings = session_firing(SimpleNamespace(trials=rows(seds)), replace(USUAL, exponent=exponent))
         assert reference == 0.0086
-        assert stats.spearmanr(seds, [one.settled_rate for one in found]).statistic == pytest.approx(1.0)
+        assert stats.spearmanr(seds, [firing.settled_rate for firing in firings]).statistic == pytest.approx(1.0)
 
 
 def test_an_afferent_answers_to_the_size_of_any_quantity_by_the_threshold_of_one_per_cent_strain():
@@ -94,17 +94,19 @@ def test_an_afferent_answers_to_the_size_of_any_quantity_by_the_threshold_of_one
         usual = usual_settings(name)
         assert usual.threshold == pytest.approx(threshold)
         trials = rows([0.004, 0.01, 0.02], interval)
-        reference, found = session_firing(SimpleNamespace(trials=trials), usual)
+        reference, firings = session_firing(SimpleNamespace(trials=trials), usual)
         assert reference == pytest.approx(1.0)
         # A line from the rate at rest at the threshold to 14 imp/s more at the reference.
         expected = [5.0 + 14.0 * (size - threshold) / (1.0 - threshold) for size in (0.4, 1.0, 2.0)]
-        assert [one.settled_rate for one in found] == pytest.approx(expected)
-        assert {one.settled_interval for one in found} == {None}
-        told = {one["name"]: one for one in parameters(usual, reference)}
+        assert [firing.settled_rate for firing in firings] == pytest.approx(expected)
+        assert {firing.settled_interval for firing in firings} == {None}
+        by_name = {parameter["name"]: parameter for parameter in parameters(usual, reference)}
         assert (
-            told["threshold"]["unit"] == told["reference"]["unit"] == ("-" if name == "stretch_along_skin" else "MPa")
+            by_name["threshold"]["unit"]
+            == by_name["reference"]["unit"]
+            == ("-" if name == "stretch_along_skin" else "MPa")
         )
-        assert told["threshold"]["standing"] == "assumed"
+        assert by_name["threshold"]["standing"] == "assumed"
 
 
 def test_a_course_that_is_known_of_the_sed_alone_makes_no_firing_of_another_quantity():
@@ -122,7 +124,7 @@ def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
 
 def test_every_parameter_is_told_with_its_standing():
     assert {*PARAMETERS, "quantity"} == {field.name for field in fields(AfferentSettings)}
-    assert {one["standing"] for one in parameters(USUAL) if one["name"] != "seed"} == {"assumed"}
+    assert {parameter["standing"] for parameter in parameters(USUAL) if parameter["name"] != "seed"} == {"assumed"}
 
 
 def test_up_to_its_threshold_the_unit_only_fires_at_rest_and_at_the_reference_the_drive_is_one():
@@ -136,10 +138,10 @@ def test_the_usual_threshold_is_the_sed_of_one_per_cent_strain_in_the_dermis():
 
 
 def test_a_parameter_that_somebody_set_is_told_as_set_and_the_reference_as_assumed():
-    told = {one["name"]: one for one in parameters(settings_with({"static_gain": 30.0}), 0.0086)}
-    assert (told["static_gain"]["value"], told["static_gain"]["standing"]) == (30.0, "set")
-    assert (told["reference"]["value"], told["reference"]["standing"]) == (0.0086, "assumed")
-    assert {one["standing"] for name, one in told.items() if name not in ("static_gain", "seed")} == {"assumed"}
+    by_name = {parameter["name"]: parameter for parameter in parameters(settings_with({"static_gain": 30.0}), 0.0086)}
+    assert (by_name["static_gain"]["value"], by_name["static_gain"]["standing"]) == (30.0, "set")
+    assert (by_name["reference"]["value"], by_name["reference"]["standing"]) == (0.0086, "assumed")
+    assert {one["standing"] for name, one in by_name.items() if name not in ("static_gain", "seed")} == {"assumed"}
 
 
 def test_a_page_tells_every_parameter_with_its_unit_and_whether_it_is_assumed_or_set():

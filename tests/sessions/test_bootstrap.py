@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import test_planted_truth as planted_truth
-from made_strokes import PLAIN, T, analysed, block, felt
+from closed_form import GAINS_ALONE, PLAIN, T, analyse, block, noisy
 
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
 from sessions.strokes.event_uncertainty import onset_draws
@@ -17,12 +17,11 @@ from simulators.subject import SimulatedSubject
 
 NUMBERS = ("mu_dynamic", "mu_max", "tau_max", "speed")
 FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
-GAINS_ALONE = BootstrapSettings(repeats=20000, gain_error=0.02, cross_talk=0.0, tilt_error=(0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
 def strokes():
-    return planted_truth.visit(1).analysed().strokes
+    return planted_truth.visit(1).analyse().strokes
 
 
 def width(interval):
@@ -38,26 +37,26 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others(strokes):
 
 def test_every_number_lies_in_its_interval(strokes):
     for number, stroke in enumerate(strokes):
-        found = stroke_intervals(stroke, number)
+        intervals = stroke_intervals(stroke, number)
         for name in (*NUMBERS, *FORCES, "heading"):
-            low, high = getattr(found, name)
+            low, high = getattr(intervals, name)
             assert low < getattr(stroke, name) < high
-        assert found.onset[0] < stroke.onset <= found.onset[1]
+        assert intervals.onset[0] < stroke.onset <= intervals.onset[1]
 
 
 def test_losses_that_leave_the_zero_no_filtered_reading_leave_the_intervals():
-    kept = np.flatnonzero(((T > 1.0) & (T < 3.0)) | (np.arange(len(T)) % 8 > 0))  # elsewhere seven at a time
-    stroke = analysed(block(T[kept], felt(PLAIN)[kept], sequence=kept)).strokes[0]
-    found = stroke_intervals(stroke, 0)
+    arrived = np.flatnonzero(((T > 1.0) & (T < 3.0)) | (np.arange(len(T)) % 8 > 0))  # elsewhere seven at a time
+    stroke = analyse(block(T[arrived], noisy(PLAIN)[arrived], sequence=arrived)).strokes[0]
+    intervals = stroke_intervals(stroke, 0)
     for name in (*NUMBERS, *FORCES):
-        low, high = getattr(found, name)
+        low, high = getattr(intervals, name)
         assert low < getattr(stroke, name) < high
 
 
 def test_of_a_calibration_alone_tau_max_has_the_closed_form(strokes):
     # The gain of a long-known force, normal with 2 %: 1.96 * 2 % to both sides, noise of 4 mN being far below.
-    found = stroke_intervals(strokes[4], 4, GAINS_ALONE)
-    assert width(found.tau_max) / strokes[4].tau_max == pytest.approx(2 * 1.95996 * 0.02, rel=0.03)
+    intervals = stroke_intervals(strokes[4], 4, GAINS_ALONE)
+    assert width(intervals.tau_max) / strokes[4].tau_max == pytest.approx(2 * 1.95996 * 0.02, rel=0.03)
 
 
 def test_without_an_error_of_calibration_intervals_are_narrower(strokes):
@@ -68,22 +67,22 @@ def test_without_an_error_of_calibration_intervals_are_narrower(strokes):
 
 
 def test_a_number_that_was_withheld_has_no_interval(strokes):
-    found = stroke_intervals(replace(strokes[0], mu_dynamic=None, speed=None, mu_static=None), 0)
-    assert (found.mu_dynamic, found.speed, found.mu_static) == (None, None, None)
-    assert found.tau_max is not None
+    intervals = stroke_intervals(replace(strokes[0], mu_dynamic=None, speed=None, mu_static=None), 0)
+    assert (intervals.mu_dynamic, intervals.speed, intervals.mu_static) == (None, None, None)
+    assert intervals.tau_max is not None
     assert stroke_intervals(replace(strokes[0], curve=None), 0).tau_max is None
 
 
 def test_the_instants_of_a_held_finger_have_intervals_and_the_direction_is_sure(strokes):
     for number, stroke in enumerate(strokes):
-        found = stroke_intervals(stroke, number)
-        assert (found.break_away is None) == (stroke.break_away is None)
-        assert found.direction_agrees == 1.0
-        if found.break_away is not None:
-            assert found.break_away[0] < stroke.break_away < found.break_away[1]
-            assert width(found.break_away) < 0.01
-            assert found.slide_onset[0] <= stroke.slide_onset <= found.slide_onset[1]
-            assert stroke.break_away < found.slide_onset[1]
+        intervals = stroke_intervals(stroke, number)
+        assert (intervals.break_away is None) == (stroke.break_away is None)
+        assert intervals.direction_agrees == 1.0
+        if intervals.break_away is not None:
+            assert intervals.break_away[0] < stroke.break_away < intervals.break_away[1]
+            assert width(intervals.break_away) < 0.01
+            assert intervals.slide_onset[0] <= stroke.slide_onset <= intervals.slide_onset[1]
+            assert stroke.break_away < intervals.slide_onset[1]
 
 
 def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
@@ -94,7 +93,7 @@ def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
     columns = (t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
     curve = StrokeCurve(*columns, noise=(0.0, 0.0), quiet=0.0)
     crossing = replace(
-        planted_truth.visit(1).analysed().strokes[0],
+        planted_truth.visit(1).analyse().strokes[0],
         curve=curve,
         onset=None,
         steady=(0.0, 1.99),
@@ -103,16 +102,16 @@ def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
         break_away=None,
         slide_onset=None,
     )
-    found = stroke_intervals(crossing, 0)
-    assert found.heading[0] < 60.0 < found.heading[1]
-    assert 0.2 < found.direction_agrees < 0.8
+    intervals = stroke_intervals(crossing, 0)
+    assert intervals.heading[0] < 60.0 < intervals.heading[1]
+    assert 0.2 < intervals.direction_agrees < 0.8
 
 
 def test_an_instant_that_a_person_decided_has_no_interval(strokes):
-    held = next(stroke for stroke in strokes if stroke.break_away is not None)
-    by = dict.fromkeys(("onset", "stick", "slide_onset"), "by E02")
-    found = stroke_intervals(replace(held, decided=by), 0)
-    assert (found.onset, found.break_away, found.slide_onset) == (None, None, None)
+    sticking = next(stroke for stroke in strokes if stroke.break_away is not None)
+    deciders = dict.fromkeys(("onset", "stick", "slide_onset"), "by E02")
+    intervals = stroke_intervals(replace(sticking, decided=deciders), 0)
+    assert (intervals.onset, intervals.break_away, intervals.slide_onset) == (None, None, None)
 
 
 def test_of_a_force_without_noise_the_onset_lies_anywhere_between_two_readings():
@@ -136,7 +135,7 @@ def test_an_onset_that_no_force_climbed_to_has_no_interval():
 
 
 def test_a_finger_that_slid_when_its_speed_was_first_known_began_at_any_instant_since_the_contact(strokes):
-    stroke = next(one for one in strokes if one.break_away is None)
+    stroke = next(stroke for stroke in strokes if stroke.break_away is None)
     low, high = stroke_intervals(stroke, strokes.index(stroke)).slide_onset
     assert stroke.onset <= low < stroke.onset + 0.01
     assert low < stroke.slide_onset <= high
@@ -155,31 +154,31 @@ def truths(seed, truth):
         yield "break_away", truth.slip
 
 
-def covered(seeds, noise):
+def coverage_of(seeds, noise):
     """Return the share of strokes whose intervals hold the truth; each bench's gains are drawn with 1 %.
 
     `noise` is how many times the usual one. In one stroke of a hundred a number may be withheld.
     """
-    held = defaultdict(list)
+    coverage = defaultdict(list)
     for seed in seeds:
         a, b, c, d, e, f = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         bench = BenchSettings(gains=(a, b, c, d, e, f), noise_force=0.004 * noise, noise_torque=0.05 * noise)
         visit = planted_truth.visit(seed, bench)
-        for number, (stroke, truth) in enumerate(zip(visit.analysed().strokes, visit.planted, strict=True)):
-            found = stroke_intervals(stroke, number, BootstrapSettings(cross_talk=0.0, tilt_error=(0.0, 0.0)))
-            for name, planted in truths(seed, truth):
-                low, high = getattr(found, name) or (None, None)
+        for number, (stroke, truth) in enumerate(zip(visit.analyse().strokes, visit.strokes, strict=True)):
+            intervals = stroke_intervals(stroke, number, BootstrapSettings(cross_talk=0.0, tilt_error=(0.0, 0.0)))
+            for name, true_value in truths(seed, truth):
+                low, high = getattr(intervals, name) or (None, None)
                 if low is None:
-                    held[name].append(None)
+                    coverage[name].append(None)
                     continue
-                planted += 360.0 * round((low - planted) / 360.0) if name == "heading" else 0.0
-                held[name].append(low <= planted <= high)
-    assert all(hits.count(None) <= 0.01 * len(hits) for hits in held.values())
-    return {name: float(np.mean([hit for hit in hits if hit is not None])) for name, hits in held.items()}
+                true_value += 360.0 * round((low - true_value) / 360.0) if name == "heading" else 0.0
+                coverage[name].append(low <= true_value <= high)
+    assert all(hits.count(None) <= 0.01 * len(hits) for hits in coverage.values())
+    return {name: float(np.mean([hit for hit in hits if hit is not None])) for name, hits in coverage.items()}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seeds", "noise"), [(range(1000, 1300), 1.0), (range(1300, 1500), 10.0)])
 def test_intervals_of_hundreds_of_visits_hold_the_truth_90_to_98_times_in_a_hundred(seeds, noise):
-    for name, share in covered(seeds, noise).items():
+    for name, share in coverage_of(seeds, noise).items():
         assert 0.90 <= share <= 0.98, (name, share)

@@ -32,11 +32,11 @@ def planned(seed, subject):
     return plan(protocol(PROTOCOL), subject, seed)
 
 
-def row(trial, block, place, score, **told):
+def row(trial, block, place, score, **numbers):
     before = block.trials[place - 1].stimulus.known_index if place else None
     stimulus = trial.stimulus
-    named = (trial.number, block.name, stimulus.descriptor, stimulus.known_index, stimulus.code, trial.direction)
-    return TrialRow(*named, trial.repetition, place, before, "scored", score, **told)
+    head = (trial.number, block.name, stimulus.descriptor, stimulus.known_index, stimulus.code, trial.direction)
+    return TrialRow(*head, trial.repetition, place, before, "scored", score, **numbers)
 
 
 def visit(subject, rows):
@@ -52,40 +52,40 @@ def seds(loads):
     return [stand_in(mu) for mu, *_ in loads]
 
 
-def judged(seed, subject):
+def judged_visit(seed, subject):
     """Return the visit of one of the synthetic study's people, and what was planted in it."""
-    carries, does_not = (SimulatedSubject(seed, one) for one in (PEOPLE, replace(PEOPLE, carry_over=0.0)))
+    carries, does_not = (SimulatedSubject(seed, settings) for settings in (PEOPLE, replace(PEOPLE, carry_over=0.0)))
     drag, press = np.random.default_rng([seed, 7]).normal(1.0, CALIBRATION, 2)
-    rows, planted = [], []
+    rows, true_strokes = [], []
     for block in planned(seed, subject).blocks:
         for place, trial in enumerate(block.trials):
             person = carries if block.name == "stickiness" else does_not
             surface = planted_surface(trial)
             before = block.trials[place - 1].stimulus.known_index if place else None
-            felt = person.perceived_surface(surface)
-            mu = felt.mu * drag / press
-            score = person.score(felt, 1, place, before)
+            surface_felt = person.perceived_surface(surface)
+            mu = surface_felt.mu * drag / press
+            score = person.score(surface_felt, 1, place, before)
             rows.append(row(trial, block, place, score, mu=mu, sed=stand_in(mu)))
-            named = {"subject": subject, "trial": trial.number, "descriptor": block.name, "index": surface.index}
-            truth = {"mu": felt.mu}
-            planted.append({**named, **truth})
-    return visit(subject, rows), planted
+            head = {"subject": subject, "trial": trial.number, "descriptor": block.name, "index": surface.index}
+            truth = {"mu": surface_felt.mu}
+            true_strokes.append({**head, **truth})
+    return visit(subject, rows), true_strokes
 
 
-def judged_on_average(surface, carry_over):
+def mean_score(surface, carry_over):
     """Return the mean score of a surface over subjects and orders.
 
     A surface never follows itself: what carries over to it lies a fifth of its own distance below the middle.
     """
     mu = surface.mu * math.exp(PEOPLE.moisture**2 / 2)
-    felt = 100.0 * (mu - 0.24) / 0.43
-    felt = felt if surface.descriptor == "stickiness" else 100.0 - felt
+    sticky = 100.0 * (mu - 0.24) / 0.43
+    sticky = sticky if surface.descriptor == "stickiness" else 100.0 - sticky
     weight, away = PEOPLE.friction_weight, surface.index - 50
-    followed = PEOPLE.gain * ((1.0 - weight) * away + weight * (felt - 50.0))
-    return 50.0 + followed - carry_over * away / 5 + 2 * PEOPLE.drift
+    scaled = PEOPLE.gain * ((1.0 - weight) * away + weight * (sticky - 50.0))
+    return 50.0 + scaled - carry_over * away / 5 + 2 * PEOPLE.drift
 
 
-def followed(seed, subject):
+def sed_visit(seed, subject):
     """Return a visit whose scores follow the SED of each trial, and nothing of the index."""
     draw = np.random.default_rng([seed, 8])
     level, middle = draw.normal(50.0, LEVEL), draw.normal(8.0, 1.0)
@@ -98,7 +98,7 @@ def followed(seed, subject):
     return visit(subject, rows)
 
 
-def met_by_chance(seed, subject):
+def chance_visit(seed, subject):
     """Return the visit of one of the synthetic study's people to surfaces that nobody meets again."""
     person, draw = SimulatedSubject(seed, PEOPLE), np.random.default_rng([seed, 9])
     rows, before = [], None
@@ -106,10 +106,10 @@ def met_by_chance(seed, subject):
     for place, trial in enumerate(block.trials):
         near, own = draw.normal(size=2).tolist()
         index = round(50 + 15 * near)
-        felt = person.perceived_surface(Surface(mu=0.45 + 0.06 * (0.8 * near + 0.6 * own), index=index))
-        score = person.meant(felt, place, before) + PEOPLE.judgement_noise * draw.normal()
-        made = row(trial, block, place, score, mu=felt.mu, sed=stand_in(felt.mu))
-        rows.append(replace(made, index=index, before=before))
+        surface_felt = person.perceived_surface(Surface(mu=0.45 + 0.06 * (0.8 * near + 0.6 * own), index=index))
+        score = person.meant(surface_felt, place, before) + PEOPLE.judgement_noise * draw.normal()
+        trial_row = row(trial, block, place, score, mu=surface_felt.mu, sed=stand_in(surface_felt.mu))
+        rows.append(replace(trial_row, index=index, before=before))
         before = index
     return visit(subject, rows)
 
@@ -121,78 +121,82 @@ def people(make, number):
 def at_large():
     """Return how score and SED go together among very many people, by descriptor."""
     # Without carry-over in judgements of slipperiness.
-    found = relations(PEOPLE, seds)["stickiness"], relations(replace(PEOPLE, carry_over=0.0), seds)["slipperiness"]
-    return {name: asdict(one) for name, one in zip(("stickiness", "slipperiness"), found, strict=True)}
+    people = {"stickiness": PEOPLE, "slipperiness": replace(PEOPLE, carry_over=0.0)}
+    return {name: asdict(relations(settings, seds)[name]) for name, settings in people.items()}
 
 
-def people_held():
-    held = defaultdict(list)
+def people_hits():
+    hits = defaultdict(list)
     habits = {name: getattr(PEOPLE, name) for name in PEOPLE.__dataclass_fields__}
     truth = {"score": planted_slopes(PEOPLE), "people": habits, "calibration_sd": CALIBRATION}
     truth["relation"] = at_large()
     for number in range(REPEATS):
-        made = people(judged, number)
-        strokes = [stroke for _, planted in made for stroke in planted]
-        found = pool_visits([one for one, _ in made], planted={**truth, "strokes": strokes})
-        for one in found.effects:
-            none = one.descriptor == "slipperiness" and one.effect == CARRY_OVER
-            held[one.effect, "none" if none else "planted"].append(one.low <= 0.0 <= one.high if none else one.covered)
-        for one, carry in zip(found.descriptors, (PEOPLE.carry_over, 0.0), strict=True):
+        visits = people(judged_visit, number)
+        strokes = [stroke for _, true_strokes in visits for stroke in true_strokes]
+        findings = pool_visits([person for person, _ in visits], planted={**truth, "strokes": strokes})
+        for effect in findings.effects:
+            if effect.descriptor == "slipperiness" and effect.effect == CARRY_OVER:
+                hits[effect.effect, "none"].append(effect.low <= 0.0 <= effect.high)
+            else:
+                hits[effect.effect, "planted"].append(effect.covered)
+        for finding, carry in zip(findings.descriptors, (PEOPLE.carry_over, 0.0), strict=True):
             surfaces = paper_surfaces()
-            expect = {index: judged_on_average(surfaces[one.descriptor, index], carry) for index in one.indices}
-            for mean in one.scores:
-                held["mean of a surface", "planted"].append(mean.low <= expect[mean.index] <= mean.high)
-            for pair in one.differences:
+            expect = {index: mean_score(surfaces[finding.descriptor, index], carry) for index in finding.indices}
+            for mean in finding.scores:
+                hits["mean of a surface", "planted"].append(mean.low <= expect[mean.index] <= mean.high)
+            for pair in finding.differences:
                 expected = expect[pair.high_index] - expect[pair.low_index]
-                held["difference of two surfaces", "planted"].append(pair.low <= expected <= pair.high)
-            for a in one.within:
-                for b in one.within:
+                hits["difference of two surfaces", "planted"].append(pair.low <= expected <= pair.high)
+            for a in finding.within:
+                for b in finding.within:
                     if a.index < b.index:
                         half = math.hypot(a.high - a.mean, b.high - b.mean)
                         expected = expect[b.index] - expect[a.index]
-                        held["intervals within subjects, two surfaces", "planted"].append(
+                        hits["intervals within subjects, two surfaces", "planted"].append(
                             abs(b.mean - a.mean - expected) <= half
                         )
-    return held
+    return hits
 
 
-def followed_held():
+def sed_hits():
     # Of numbers that scatter like this about each subject's own means the correlation is
     rho = SLOPE * SCATTER / math.hypot(SLOPE * SCATTER, math.hypot(NOISE, DRIFTING * math.sqrt(2.5)))
-    held = defaultdict(list)
+    hits = defaultdict(list)
     for number in range(REPEATS):
-        (found,) = pool_visits(people(followed, 1000 + number)).descriptors
-        low, high = found.repeated.people
-        held["correlation within subjects", "planted"].append(low <= rho <= high)
-        for name, planted in ((SED_TERM, SLOPE), (DRIFT, DRIFTING), (CARRY_OVER, 0.0)):
-            term = found.on_response.term(name)
-            held[f"mixed model on SED: {name}", "planted"].append(term.low <= planted <= term.high)
-        differ = found.on_response.spreads
-        held["mixed model on SED: spread of levels", "planted"].append(differ.level.low <= LEVEL <= differ.level.high)
-        held["mixed model on SED: noise", "planted"].append(differ.left.low <= NOISE <= differ.left.high)
-    return held
+        (finding,) = pool_visits(people(sed_visit, 1000 + number)).descriptors
+        low, high = finding.repeated.people
+        hits["correlation within subjects", "planted"].append(low <= rho <= high)
+        for name, true_value in ((SED_TERM, SLOPE), (DRIFT, DRIFTING), (CARRY_OVER, 0.0)):
+            term = finding.on_response.term(name)
+            hits[f"mixed model on SED: {name}", "planted"].append(term.low <= true_value <= term.high)
+        spreads = finding.on_response.spreads
+        hits["mixed model on SED: spread of levels", "planted"].append(spreads.level.low <= LEVEL <= spreads.level.high)
+        hits["mixed model on SED: noise", "planted"].append(spreads.left.low <= NOISE <= spreads.left.high)
+    return hits
 
 
-def by_chance_held():
+def chance_hits():
     # Of very many people, none of whom is in the studies: what goes with what within each.
     x, y = [], []
     for seed in range(10**6, 10**6 + 4_000):
-        told = met_by_chance(seed, "S00").rows
+        rows = chance_visit(seed, "S00").rows
         for values, name in ((x, "sed"), (y, "score")):
-            own = np.array([getattr(one, name) for one in told])
+            own = np.array([getattr(row, name) for row in rows])
             values.extend(own - own.mean())
     rho = float(np.corrcoef(x, y)[0, 1])
-    held = defaultdict(list)
+    hits = defaultdict(list)
     for number in range(REPEATS):
-        (found,) = pool_visits(people(met_by_chance, 2000 + number)).descriptors
-        of = found.repeated
-        held["correlation within subjects of friction's own SED", "planted"].append(of.people[0] <= rho <= of.people[1])
-        held["the same by Fisher's z", "planted"].append(of.low <= rho <= of.high)
-    return held
+        (finding,) = pool_visits(people(chance_visit, 2000 + number)).descriptors
+        repeated = finding.repeated
+        hits["correlation within subjects of friction's own SED", "planted"].append(
+            repeated.people[0] <= rho <= repeated.people[1]
+        )
+        hits["the same by Fisher's z", "planted"].append(repeated.low <= rho <= repeated.high)
+    return hits
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("held_in", [people_held, followed_held, by_chance_held])
-def test_intervals_of_everything_planted_hold_it_90_to_98_times_in_a_hundred(held_in):
-    shares = {" ".join(what): float(np.mean(hits)) for what, hits in held_in().items()}
+@pytest.mark.parametrize("hits_of", [people_hits, sed_hits, chance_hits])
+def test_intervals_of_everything_planted_hold_it_90_to_98_times_in_a_hundred(hits_of):
+    shares = {" ".join(what): float(np.mean(hits)) for what, hits in hits_of().items()}
     assert all(0.90 <= share <= 0.98 for share in shares.values()), shares

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from closed_form import INFO, SETTINGS, T, block, noisy, plan, slide, times, trapezium, trial, wrench
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_strokes import INFO, SETTINGS, T, block, felt, plan, stroke, times, trapezium, trial, wrench
-from recordings import ended
+from recordings import record_session
 
 from sessions.plan.plan import Frame
 from sessions.recording import Recording
@@ -23,17 +23,17 @@ WINDOW = Decision("E02", "the ramp was in it", "steady", 1, 1, (1.1, 2.9), (1.5,
 
 
 @pytest.fixture(scope="module")
-def sealed(tmp_path_factory):
+def sealed_recording(tmp_path_factory):
     """A sealed recording, for tests that write to its decisions alone."""
-    folder = ended(tmp_path_factory.mktemp("decided") / "S01")
+    folder = record_session(tmp_path_factory.mktemp("decided") / "S01")
     seal(folder)
     return Recording.open(folder)
 
 
 @pytest.fixture
-def recording(sealed):
-    (sealed.folder / DECISIONS).unlink(missing_ok=True)
-    return sealed
+def recording(sealed_recording):
+    (sealed_recording.folder / DECISIONS).unlink(missing_ok=True)
+    return sealed_recording
 
 
 def lines(recording):
@@ -41,13 +41,13 @@ def lines(recording):
 
 
 def test_a_decision_is_a_line_with_who_when_why_and_what_stood_before(recording):
-    made = append(recording, WINDOW)
+    decision = append(recording, WINDOW)
     document = json.loads(lines(recording))
-    told = {"by": "E02", "why": "the ramp was in it", "what": "steady", "trial": 1, "stroke": 1}
-    assert told.items() <= document.items()
+    expected = {"by": "E02", "why": "the ramp was in it", "what": "steady", "trial": 1, "stroke": 1}
+    assert expected.items() <= document.items()
     assert (document["old"], document["new"], document["number"]) == ([1.1, 2.9], [1.5, 2.5], 1)
-    assert document["made_utc"] == made.made_utc > "2026"
-    assert read(recording.folder).in_force == (made,)
+    assert document["made_utc"] == decision.made_utc > "2026"
+    assert read(recording.folder).in_force == (decision,)
 
 
 def test_the_check_sum_is_that_of_the_text_before_it(recording):
@@ -98,9 +98,9 @@ def test_a_torn_last_line_is_named_and_what_came_before_holds(recording):
     append(recording, replace(WINDOW, new=(1.6, 2.6)))
     whole = lines(recording)
     (recording.folder / DECISIONS).write_bytes(whole[:-9])
-    found = read(recording.folder)
-    assert found.in_force == (first,)
-    assert "torn" in found.problems[0]
+    decisions = read(recording.folder)
+    assert decisions.in_force == (first,)
+    assert "torn" in decisions.problems[0]
     third = append(recording, replace(WINDOW, new=(1.7, 2.7)))
     assert third.number == 3  # the torn line keeps its place
     assert read(recording.folder).in_force == (third,)
@@ -111,9 +111,9 @@ def test_a_line_that_was_changed_or_taken_away_is_named(recording):
     for end in (2.5, 2.6, 2.7):
         append(recording, replace(WINDOW, new=(1.5, end)))
     whole = lines(recording)
-    changed = parse(whole.replace(b"2.6]", b"2.4]"))
-    assert "CRC-32" in changed.problems[0]
-    assert [line.number for line in changed.lines] == [1, 3]
+    decisions = parse(whole.replace(b"2.6]", b"2.4]"))
+    assert "CRC-32" in decisions.problems[0]
+    assert [line.number for line in decisions.lines] == [1, 3]
     first, _, third = whole.splitlines(keepends=True)
     assert "lacks decision 2" in parse(first + third).problems[0]
     assert "comes before" in parse(third + first).problems[0]
@@ -129,7 +129,7 @@ STEPS = st.lists(
 )
 
 
-def worked_out(steps):
+def in_force(steps):
     """What is in force of each stroke, by asking of each line anew: who undoes it, and who undoes that?"""
 
     def alive(number):
@@ -145,11 +145,13 @@ def worked_out(steps):
 
 @settings(max_examples=30, deadline=None)
 @given(steps=STEPS, cut=st.integers(0, 10_000))
-def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_undoing_and_a_crash(sealed, steps, cut):
+def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_undoing_and_a_crash(
+    sealed_recording, steps, cut
+):
     with tempfile.TemporaryDirectory() as room:
-        recording = replace(sealed, folder=Path(room))
+        recording = replace(sealed_recording, folder=Path(room))
         path = Path(room) / DECISIONS
-        done, content = [], b""
+        history, content = [], b""
         for kind, target, value in steps:
             undo = Decision("E02", "w", undoes=target)
             decision = undo if kind == "undo" else Decision("E02", "w", "onset", 1, target, None, float(value))
@@ -158,67 +160,70 @@ def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_
             except DecisionError:
                 assert path.is_file() == bool(content)
                 continue  # what is not in force cannot be undone
-            done.append((kind, target, value))
-            grown = path.read_bytes()
-            assert grown.startswith(content)  # nothing that was written is altered
-            content = grown
-            assert {one.stroke: one.new for one in read(Path(room)).in_force} == worked_out(done)
+            history.append((kind, target, value))
+            longer = path.read_bytes()
+            assert longer.startswith(content)  # nothing that was written is altered
+            content = longer
+            assert {line.stroke: line.new for line in read(Path(room)).in_force} == in_force(history)
         torn = content[: cut % (len(content) + 1)]
-        found = parse(torn)
-        assert {one.stroke: one.new for one in found.in_force} == worked_out(done[: torn.count(b"\n")])
-        assert bool(found.problems) == (torn != b"" and not torn.endswith(b"\n"))
+        decisions = parse(torn)
+        assert {line.stroke: line.new for line in decisions.in_force} == in_force(history[: torn.count(b"\n")])
+        assert bool(decisions.problems) == (torn != b"" and not torn.endswith(b"\n"))
 
 
 # What decisions do
 
 
-SLOW = stroke(T, mu=0.5)  # touches at 1 s, lifts at 3 s, 25 mm/s, 2 N
+SLOW = slide(T, mu=0.5)  # touches at 1 s, lifts at 3 s, 25 mm/s, 2 N
 
 
-def decided(*decisions, raw=None, t=T, of=True):
-    lines = tuple(replace(one, number=at) for at, one in enumerate(decisions, 1))
-    one = trial() if of else None
+def analyse_with(*decisions, raw=None, t=T, of=True):
+    lines = tuple(replace(decision, number=at) for at, decision in enumerate(decisions, 1))
+    of_trial = trial() if of else None
     frame = Frame("-z", "set", 12.0, "set")
-    readings = block(t, felt(SLOW) if raw is None else raw)
-    parts = [(one, readings)]
-    return analyse_blocks(parts, plan([one] if one else [], frame), INFO, SETTINGS, (), Decisions(lines))
+    readings = block(t, noisy(SLOW) if raw is None else raw)
+    parts = [(of_trial, readings)]
+    return analyse_blocks(parts, plan([of_trial] if of_trial else [], frame), INFO, SETTINGS, (), Decisions(lines))
 
 
 def rising():
     """A stroke whose T/N is 0.4 until 2 s and 0.5 after it."""
     n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
-    return felt(wrench(T, n, 0.4 + 0.1 * (T > 2.0), 25.0 * (T - 2.0)))
+    return noisy(wrench(T, n, 0.4 + 0.1 * (T > 2.0), 25.0 * (T - 2.0)))
 
 
 @pytest.mark.parametrize(("window", "mu"), [((1.3, 1.9), 0.4), ((2.1, 2.8), 0.5)])
 def test_mu_and_speed_are_those_of_the_window_decided(window, mu):
-    found = decided(replace(WINDOW, new=window), raw=rising())
-    (one,) = found.strokes
-    assert one.mu_dynamic == pytest.approx(mu, rel=0.005)
-    assert one.speed == pytest.approx(25.0, rel=0.03)
-    assert one.steady == pytest.approx(window, abs=0.006)
-    assert found.friction[0].mu == one.mu_dynamic
-    assert "the ramp was in it" in one.decided["steady"]
+    analysis = analyse_with(replace(WINDOW, new=window), raw=rising())
+    (stroke,) = analysis.strokes
+    assert stroke.mu_dynamic == pytest.approx(mu, rel=0.005)
+    assert stroke.speed == pytest.approx(25.0, rel=0.03)
+    assert stroke.steady == pytest.approx(window, abs=0.006)
+    assert analysis.friction[0].mu == stroke.mu_dynamic
+    assert "the ramp was in it" in stroke.decided["steady"]
 
 
 def test_a_window_decided_where_nothing_slides_gives_its_numbers_with_the_flaw():
-    held = felt(wrench(T, trapezium(T, 1.0, 3.0, 0.1, 2.0), 0.3 + 0.0 * T, 0.0 * T))
-    assert decided(raw=held).strokes[0].mu_dynamic is None
-    found = decided(WINDOW, raw=held)
-    assert found.strokes[0].mu_dynamic == pytest.approx(0.3, rel=0.01)
-    doubted = [flaw for flaw in found.flaws if flaw.name == "no_steady_sliding"]
-    assert [flaw.grade for flaw in doubted] == ["doubtful"]
+    sticking = noisy(wrench(T, trapezium(T, 1.0, 3.0, 0.1, 2.0), 0.3 + 0.0 * T, 0.0 * T))
+    assert analyse_with(raw=sticking).strokes[0].mu_dynamic is None
+    analysis = analyse_with(WINDOW, raw=sticking)
+    assert analysis.strokes[0].mu_dynamic == pytest.approx(0.3, rel=0.01)
+    doubts = [flaw for flaw in analysis.flaws if flaw.name == "no_steady_sliding"]
+    assert [flaw.grade for flaw in doubts] == ["doubtful"]
 
 
 def test_a_window_decided_where_nothing_touches_gives_no_number_and_says_so():
-    found = decided(replace(WINDOW, new=(3.2, 3.6)))
-    assert found.strokes[0].mu_dynamic is None
-    assert found.strokes[0].reasons["mu_dynamic"] == "decision"
+    analysis = analyse_with(replace(WINDOW, new=(3.2, 3.6)))
+    assert analysis.strokes[0].mu_dynamic is None
+    assert analysis.strokes[0].reasons["mu_dynamic"] == "decision"
 
 
 def test_an_onset_decided_later_leaves_the_intervals_what_they_are():
-    found, cut = (one.strokes[0] for one in (decided(), decided(Decision("E02", "seen", "onset", 1, 1, None, 1.3))))
-    plain, late = stroke_intervals(found, 0).mu_dynamic, stroke_intervals(cut, 0).mu_dynamic
+    usual, cut = (
+        analysis.strokes[0]
+        for analysis in (analyse_with(), analyse_with(Decision("E02", "seen", "onset", 1, 1, None, 1.3)))
+    )
+    plain, late = stroke_intervals(usual, 0).mu_dynamic, stroke_intervals(cut, 0).mu_dynamic
     assert cut.onset == 1.3
     assert late[1] - late[0] == pytest.approx(plain[1] - plain[0], rel=0.2)
 
@@ -226,77 +231,77 @@ def test_an_onset_decided_later_leaves_the_intervals_what_they_are():
 def test_the_stick_phase_decided_gives_static_friction_and_break_away():
     n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
     bump = 0.5 + 0.03 * (abs(T - 1.4) < 0.1)  # too low to stand out by itself
-    raw = felt(wrench(T, n, bump, 25.0 * (T - 2.0)))
-    found = decided(Decision("E02", "seen", "stick", 1, 1, None, (1.1, 1.6)), raw=raw)
-    (one,) = found.strokes
-    assert one.mu_static == pytest.approx(0.53, rel=0.01)
-    assert one.break_away == 1.6
-    assert "mu_static" not in one.reasons
+    raw = noisy(wrench(T, n, bump, 25.0 * (T - 2.0)))
+    analysis = analyse_with(Decision("E02", "seen", "stick", 1, 1, None, (1.1, 1.6)), raw=raw)
+    (stroke,) = analysis.strokes
+    assert stroke.mu_static == pytest.approx(0.53, rel=0.01)
+    assert stroke.break_away == 1.6
+    assert "mu_static" not in stroke.reasons
 
 
 def test_a_slide_onset_decided_is_that_of_the_stroke_and_ends_the_search_for_a_static_peak():
     n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
     late = 0.5 + 0.2 * (abs(T - 2.0) < 0.05)  # a bump in the slide, no static peak
-    raw = felt(wrench(T, n, late, 25.0 * (T - 2.0)))
-    early, seen = (Decision("E02", "seen", "slide_onset", 1, 1, None, at) for at in (1.3, 2.0))
-    assert decided(early, raw=raw).strokes[0].mu_static is None
-    (one,) = decided(seen, raw=raw).strokes
-    assert one.slide_onset == 2.0
-    assert one.mu_static == pytest.approx(0.7, rel=0.05)
+    raw = noisy(wrench(T, n, late, 25.0 * (T - 2.0)))
+    early, at_bump = (Decision("E02", "seen", "slide_onset", 1, 1, None, at) for at in (1.3, 2.0))
+    assert analyse_with(early, raw=raw).strokes[0].mu_static is None
+    (stroke,) = analyse_with(at_bump, raw=raw).strokes
+    assert stroke.slide_onset == 2.0
+    assert stroke.mu_static == pytest.approx(0.7, rel=0.05)
 
 
 @pytest.mark.parametrize("outside", [0.5, 3.5, -5.0, 1000.0])
 def test_a_slide_onset_decided_outside_of_the_contact_is_named_and_changes_nothing(outside):
-    found = decided(Decision("E02", "seen", "slide_onset", 1, 1, None, outside))
-    assert found.strokes[0].slide_onset == decided().strokes[0].slide_onset
-    assert [flaw.sentence for flaw in found.flaws if flaw.name == "decision"] == [
+    analysis = analyse_with(Decision("E02", "seen", "slide_onset", 1, 1, None, outside))
+    assert analysis.strokes[0].slide_onset == analyse_with().strokes[0].slide_onset
+    assert [flaw.sentence for flaw in analysis.flaws if flaw.name == "decision"] == [
         "The slide onset that was decided lies outside of the contact: it stays as it was found."
     ]
 
 
 def test_onset_lift_and_direction_are_those_decided():
     ends = [Decision("E02", "w", "onset", 1, 1, None, 0.9), Decision("E02", "w", "lift", 1, 1, None, 2.7)]
-    (one,) = decided(*ends, Decision("E02", "w", "direction", 1, 1, 1, -1)).strokes
-    assert (one.onset, one.lift, one.direction, one.direction_from) == (0.9, 2.7, -1, "decision")
-    assert one.mu_dynamic == pytest.approx(0.5, rel=0.005)
-    assert one.steady[1] < 2.7
+    (stroke,) = analyse_with(*ends, Decision("E02", "w", "direction", 1, 1, 1, -1)).strokes
+    assert (stroke.onset, stroke.lift, stroke.direction, stroke.direction_from) == (0.9, 2.7, -1, "decision")
+    assert stroke.mu_dynamic == pytest.approx(0.5, rel=0.005)
+    assert stroke.steady[1] < 2.7
 
 
 def test_a_stroke_left_out_is_shown_with_its_numbers_and_the_model_gets_none():
-    found = decided(Decision("E02", "talked", "kept", 1, 1, True, new=False))
-    (one,) = found.strokes
-    assert one.mu_dynamic == pytest.approx(0.5, rel=0.005)
-    assert not one.kept
-    assert found.friction == ()
-    again = decided(Decision("E02", "talked", "kept", 1, 1, True, new=False), Decision("E03", "fine", undoes=1))
+    analysis = analyse_with(Decision("E02", "talked", "kept", 1, 1, True, new=False))
+    (stroke,) = analysis.strokes
+    assert stroke.mu_dynamic == pytest.approx(0.5, rel=0.005)
+    assert not stroke.kept
+    assert analysis.friction == ()
+    again = analyse_with(Decision("E02", "talked", "kept", 1, 1, True, new=False), Decision("E03", "fine", undoes=1))
     assert len(again.friction) == 1
 
 
 def test_the_model_gets_the_stroke_decided_and_never_one_that_was_left_out():
     t = times(8.0)
-    both = felt(stroke(t, mu=0.4, begin=1.0, end=3.0) + stroke(t, mu=0.6, begin=5.0, end=7.0))
+    two_strokes = noisy(slide(t, mu=0.4, begin=1.0, end=3.0) + slide(t, mu=0.6, begin=5.0, end=7.0))
     choose = Decision("E02", "w", "choice", 1, None, 1, 2)
     drop = Decision("E02", "w", "kept", 1, 2, True, new=False)
-    assert decided(raw=both, t=t).friction[0].mu == pytest.approx(0.4, rel=0.01)
-    chosen = decided(choose, raw=both, t=t)
-    assert chosen.friction[0].mu == pytest.approx(0.6, rel=0.01)
-    assert chosen.friction[0].stroke == 1
-    assert any("uses the one numbered 2" in flaw.sentence for flaw in chosen.flaws)
-    left = decided(choose, drop, raw=both, t=t)
-    assert left.friction[0].mu == pytest.approx(0.4, rel=0.01)
-    assert any(flaw.name == "decision" and "left out" in flaw.sentence for flaw in left.flaws)
+    assert analyse_with(raw=two_strokes, t=t).friction[0].mu == pytest.approx(0.4, rel=0.01)
+    second = analyse_with(choose, raw=two_strokes, t=t)
+    assert second.friction[0].mu == pytest.approx(0.6, rel=0.01)
+    assert second.friction[0].stroke == 1
+    assert any("uses the one numbered 2" in flaw.sentence for flaw in second.flaws)
+    without_second = analyse_with(choose, drop, raw=two_strokes, t=t)
+    assert without_second.friction[0].mu == pytest.approx(0.4, rel=0.01)
+    assert any(flaw.name == "decision" and "left out" in flaw.sentence for flaw in without_second.flaws)
 
 
 def test_a_decision_about_no_stroke_that_is_there_is_named():
-    found = decided(replace(WINDOW, stroke=4), Decision("E02", "w", "lift", 9, 1, None, 2.0))
-    assert [flaw.name for flaw in found.flaws] == ["decision", "decision"]
+    analysis = analyse_with(replace(WINDOW, stroke=4), Decision("E02", "w", "lift", 9, 1, None, 2.0))
+    assert [flaw.name for flaw in analysis.flaws] == ["decision", "decision"]
     with pytest.raises(DecisionError, match="there is no stroke 4 of trial 1: it has 1"):
-        with_present(found, replace(WINDOW, stroke=4))
+        with_present(analysis, replace(WINDOW, stroke=4))
 
 
 def test_a_decision_is_told_what_stands_before_it():
-    found = decided()
-    (one,) = found.strokes
-    assert with_present(found, replace(WINDOW, old=None)).old == one.steady
-    assert with_present(found, Decision("E02", "w", "choice", 1, None, None, 1)).old == 1
-    assert with_present(found, Decision("E02", "w", "kept", 1, 1, None, new=False)).old is True
+    analysis = analyse_with()
+    (stroke,) = analysis.strokes
+    assert with_present(analysis, replace(WINDOW, old=None)).old == stroke.steady
+    assert with_present(analysis, Decision("E02", "w", "choice", 1, None, None, 1)).old == 1
+    assert with_present(analysis, Decision("E02", "w", "kept", 1, 1, None, new=False)).old is True

@@ -16,8 +16,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from exported_sessions import MADE, Exports, source_of
-from recordings import PLAN, plainly_read, with_a_long_answer
+from exported_sessions import MAKERS, Exports, source_of
+from recordings import read_plainly, with_a_long_answer
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS, ExportError, ExportSource, export
@@ -29,13 +29,13 @@ from sessions.recording.archive import problems, seal
 from sessions.recording.derived import gain_error_set
 from sessions.strokes import analyse
 
-AGAIN = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]
+READABLE = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]
 
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory):
     room = tmp_path_factory.mktemp("sessions")
-    return {name: source_of(name, room / name) for name in MADE}
+    return {name: source_of(name, room / name) for name in MAKERS}
 
 
 @pytest.fixture(scope="module")
@@ -70,61 +70,61 @@ def test_no_file_of_a_real_session_says_that_it_was_simulated(exports, form):
         assert b"simulated\t" not in content
 
 
-@pytest.mark.parametrize("form", AGAIN)
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("form", READABLE)
+@pytest.mark.parametrize("name", MAKERS)
 def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, name):
-    recorded = sources[name].recording
-    made = import_session(read_export(exports[form, name]), tmp_path / "s")
-    again = Recording.open(tmp_path / "s")
+    original = sources[name].recording
+    result = import_session(read_export(exports[form, name]), tmp_path / "s")
+    restored = Recording.open(tmp_path / "s")
     for column in ("sequence", "counter", "status", "time", "received_ns", "raw"):
-        assert getattr(again.readings(), column).tobytes() == getattr(recorded.readings(), column).tobytes()
-    kept = [event for event in again.events if event.kind != "not_restored"]
-    assert [(e.time_ns, e.kind, e.trial, e.data) for e in kept] == [
-        (e.time_ns, e.kind, e.trial, e.data) for e in recorded.events
+        assert getattr(restored.readings(), column).tobytes() == getattr(original.readings(), column).tobytes()
+    events = [event for event in restored.events if event.kind != "not_restored"]
+    assert [(e.time_ns, e.kind, e.trial, e.data) for e in events] == [
+        (e.time_ns, e.kind, e.trial, e.data) for e in original.events
     ]
-    assert again.plan == recorded.plan
-    assert again.trials == recorded.trials
-    assert again.simulated_sentence == recorded.simulated_sentence
-    assert again.flaws == recorded.flaws
-    assert {k: v for k, v in again.provenance.items() if k != "restored_from"} == recorded.provenance
-    if recorded.info is not None:
-        np.testing.assert_equal(asdict(again.info), asdict(recorded.info))  # an unknown number is nan in both
-    assert set(recorded.losses) <= set(again.losses)
-    assert made.readings == len(recorded.readings())
-    assert side_files(again.folder) == side_files(recorded.folder)
-    assert gain_error_set(again.folder) == gain_error_set(recorded.folder)
-    assert [analyse(again).to_dict()[part] for part in ("strokes", "friction")] == [
-        analyse(recorded).to_dict()[part] for part in ("strokes", "friction")
+    assert restored.plan == original.plan
+    assert restored.trials == original.trials
+    assert restored.simulated_sentence == original.simulated_sentence
+    assert restored.flaws == original.flaws
+    assert {k: v for k, v in restored.provenance.items() if k != "restored_from"} == original.provenance
+    if original.info is not None:
+        np.testing.assert_equal(asdict(restored.info), asdict(original.info))  # an unknown number is nan in both
+    assert set(original.losses) <= set(restored.losses)
+    assert result.readings == len(original.readings())
+    assert side_files(restored.folder) == side_files(original.folder)
+    assert gain_error_set(restored.folder) == gain_error_set(original.folder)
+    assert [analyse(restored).to_dict()[part] for part in ("strokes", "friction")] == [
+        analyse(original).to_dict()[part] for part in ("strokes", "friction")
     ]
 
 
-@pytest.mark.parametrize("form", AGAIN)
+@pytest.mark.parametrize("form", READABLE)
 def test_what_was_lost_before_an_export_is_named_after_it_comes_back(exports, tmp_path, form):
-    made = import_session(read_export(exports[form, "torn"]), tmp_path / "s")
-    assert made.differences == (
+    result = import_session(read_export(exports[form, "torn"]), tmp_path / "s")
+    assert result.differences == (
         "block 4 of the readings is damaged and left out (its bytes do not give the CRC-32 stored with them)",
     )
-    assert made.differences[0] in Recording.open(tmp_path / "s").losses
+    assert result.differences[0] in Recording.open(tmp_path / "s").losses
     seal(tmp_path / "s")
-    assert made.differences[0] in problems(tmp_path / "s")
+    assert result.differences[0] in problems(tmp_path / "s")
 
 
 @pytest.mark.parametrize("name", ["whole", "torn"])
 def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, exports, name):
-    recorded = plainly_read(sources[name].recording.folder)
+    readings = read_plainly(sources[name].recording.folder)
     lines = (exports["csv", name] / "readings.csv").read_text().splitlines()
     first = 1 if name == "whole" else 0  # after the column that says SIMULATED
     rows = [line.split(",")[first:] for line in lines]
     assert rows[0][:6] == ["sequence", "counter", "status", "time_s", "received_ns", "raw_1_counts"]
     assert rows[0][11:] == ["Fx_N", "Fy_N", "Fz_N", "Tx_Nmm", "Ty_Nmm", "Tz_Nmm"]
-    kept = recorded if name == "whole" else recorded[:300]  # the damaged block is left out
-    assert len(rows) - 1 == len(kept)
-    for row, reading in zip(rows[1:], kept, strict=True):
-        found = (*map(int, row[:3]), float(row[3]), int(row[4]), *map(float, row[5:11]))
-        assert repr(found) == repr(reading)  # as text NaN is equal to itself
+    intact = readings if name == "whole" else readings[:300]  # the damaged block is left out
+    assert len(rows) - 1 == len(intact)
+    for row, reading in zip(rows[1:], intact, strict=True):
+        cells = (*map(int, row[:3]), float(row[3]), int(row[4]), *map(float, row[5:11]))
+        assert repr(cells) == repr(reading)  # as text NaN is equal to itself
     # 1e-6 N and 1e-3 N mm a count: the calibration of the stand-in.
     wrench = [float(number) for number in rows[1][11:]]
-    assert wrench == pytest.approx([r * s for r, s in zip(kept[0][5:], [1e-6] * 3 + [1e-3] * 3, strict=True)])
+    assert wrench == pytest.approx([r * s for r, s in zip(intact[0][5:], [1e-6] * 3 + [1e-3] * 3, strict=True)])
 
 
 @pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form == "nwb")) for form in FORMATS])
@@ -136,12 +136,12 @@ def test_one_long_answer_takes_room_and_memory_once_in_every_export(exports, tmp
     folder = export(source, form, tmp_path / "out")
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    recorded = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
-    assert sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) < 6 * recorded
-    assert peak < 60 * recorded  # as Python holds it, more than once; padding takes it 120 times or more
+    file_size = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
+    assert sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) < 6 * file_size
+    assert peak < 60 * file_size  # as Python holds it, more than once; padding takes it 120 times or more
 
 
-@pytest.mark.parametrize("form", AGAIN)
+@pytest.mark.parametrize("form", READABLE)
 def test_a_number_changed_after_the_export_is_named_when_it_is_imported(exports, tmp_path, form):
     folder = shutil.copytree(exports[form, "whole"], tmp_path / "export")
     if form == "csv":
@@ -150,11 +150,11 @@ def test_a_number_changed_after_the_export_is_named_when_it_is_imported(exports,
         cells = lines[500].split(",")
         lines[500] = ",".join([*cells[:7], repr(float(cells[7]) + 1.0), *cells[8:]])
         path.write_text("".join(lines))
-        named = "since it was exported: raw of the readings is not what it was"
+        difference = "since it was exported: raw of the readings is not what it was"
     elif form == "bids":
         (path,) = folder.glob("sub-*/beh/*_events.tsv")
         path.write_text(path.read_text().replace('"score":', '"score":1', 1))
-        named = "since it was exported: the event log is not what it was"
+        difference = "since it was exported: the event log is not what it was"
     else:
         with h5py.File(folder / "session.h5", "r") as file:
             chunk = file["readings/raw"].id.get_chunk_info(0)
@@ -165,9 +165,9 @@ def test_a_number_changed_after_the_export_is_named_when_it_is_imported(exports,
             import_session(read_export(folder), tmp_path / "s")
         assert not (tmp_path / "s").exists()
         return
-    made = import_session(read_export(folder), tmp_path / "s")
-    assert made.differences == (named,)
-    assert named in Recording.open(tmp_path / "s").losses
+    result = import_session(read_export(folder), tmp_path / "s")
+    assert result.differences == (difference,)
+    assert difference in Recording.open(tmp_path / "s").losses
 
 
 @pytest.mark.parametrize("form", ["csv", "bids"])
@@ -178,11 +178,11 @@ def test_a_row_taken_out_of_an_export_is_named(exports, tmp_path, form):
     lines = text.splitlines(keepends=True)
     text = "".join(lines[:200] + lines[201:])
     path.write_bytes(text.encode() if form == "csv" else gzip.compress(text.encode()))
-    made = import_session(read_export(folder), tmp_path / "s")
-    assert made.differences[0] == "since it was exported: there were 400 readings and there are 399"
+    result = import_session(read_export(folder), tmp_path / "s")
+    assert result.differences[0] == "since it was exported: there were 400 readings and there are 399"
 
 
-@pytest.mark.parametrize("form", AGAIN)
+@pytest.mark.parametrize("form", READABLE)
 def test_an_export_that_is_no_longer_whole_is_refused_and_leaves_nothing(exports, tmp_path, form):
     folder = shutil.copytree(exports[form, "whole"], tmp_path / "export")
     victims = [path for path in files(folder) if path.name.endswith(("readings.csv", "physio.tsv.gz", "session.h5"))]
@@ -248,27 +248,27 @@ def test_the_readme_tells_every_column_of_every_csv(exports):
 # ---- BIDS
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", MAKERS)
 def test_the_official_validator_finds_no_error_in_a_bids_export(exports, name):
     validator = Path(sys.executable).with_name("bids-validator-deno")
     if not validator.exists():
         pytest.skip("bids-validator-deno is not installed")
-    run = subprocess.run(
+    process = subprocess.run(
         [validator, "-r", "--format", "json", "--max-rows", "-1", exports["bids", name]],
         capture_output=True,
         text=True,
         check=False,
         encoding="utf-8",
     )
-    told = json.loads(run.stdout)
-    every = [
-        *told["issues"]["issues"],
-        *(i for d in told.get("derivativesSummary", {}).values() for i in d["issues"]["issues"]),
+    document = json.loads(process.stdout)
+    issues = [
+        *document["issues"]["issues"],
+        *(i for d in document.get("derivativesSummary", {}).values() for i in d["issues"]["issues"]),
     ]
-    assert [issue for issue in every if issue["severity"] == "error"] == []
-    assert told["summary"]["totalFiles"] > 0
-    assert any("daq-app" in name for name in told["derivativesSummary"])
-    assert run.returncode == 0
+    assert [issue for issue in issues if issue["severity"] == "error"] == []
+    assert document["summary"]["totalFiles"] > 0
+    assert any("daq-app" in name for name in document["derivativesSummary"])
+    assert process.returncode == 0
 
 
 def test_a_reading_that_never_arrived_is_a_row_of_its_own_and_a_silence_begins_a_new_file(exports):
@@ -292,13 +292,13 @@ def test_a_reading_that_never_arrived_is_a_row_of_its_own_and_a_silence_begins_a
 
 
 def test_the_derivatives_tell_what_made_them(exports):
-    told = json.loads((exports["bids", "whole"] / "derivatives/daq-app/dataset_description.json").read_text())
-    assert told["DatasetType"] == "derivative"
-    assert told["GeneratedBy"][0]["Name"] == "daq-app"
-    assert f"numpy {np.__version__}" in told["GeneratedBy"][0]["Description"]
-    made = exports["bids", "whole"] / "derivatives/daq-app/sub-S01/beh"
-    assert (made / "sub-S01_task-sensotactfriction_desc-friction_beh.tsv").is_file()
-    assert (made / "sub-S01_task-sensotactfriction_desc-predictions_beh.tsv").is_file()
+    document = json.loads((exports["bids", "whole"] / "derivatives/daq-app/dataset_description.json").read_text())
+    assert document["DatasetType"] == "derivative"
+    assert document["GeneratedBy"][0]["Name"] == "daq-app"
+    assert f"numpy {np.__version__}" in document["GeneratedBy"][0]["Description"]
+    folder = exports["bids", "whole"] / "derivatives/daq-app/sub-S01/beh"
+    assert (folder / "sub-S01_task-sensotactfriction_desc-friction_beh.tsv").is_file()
+    assert (folder / "sub-S01_task-sensotactfriction_desc-predictions_beh.tsv").is_file()
 
 
 # ---- HDF5
@@ -320,48 +320,48 @@ def test_the_hdf5_export_opens_in_hdf5_1_8_and_holds_the_strokes_with_units(sour
 def test_nwb_holds_what_was_recorded(sources, exports):
     pynwb = pytest.importorskip("pynwb")
     for name in ("whole", "torn"):
-        recorded = sources[name].recording
-        block: ReadingBlock = recorded.readings()
+        recording = sources[name].recording
+        block: ReadingBlock = recording.readings()
         with pynwb.NWBHDF5IO(exports["nwb", name] / "session.nwb", "r") as io:
             file = io.read()
             assert file.acquisition["raw"].data[...].tobytes() == block.raw.tobytes()
             assert file.acquisition["received_ns"].data[...].tolist() == block.received_ns.tolist()
             assert file.acquisition["raw"].timestamps is not None  # readings are missing in both: there is no one rate
             assert file.acquisition["forces"].data[5, 0] == pytest.approx(block.raw[5, 0] * 1e-6)
-            assert file.acquisition["events"]["kind"][...].tolist() == [event.kind for event in recorded.events]
+            assert file.acquisition["events"]["kind"][...].tolist() == [event.kind for event in recording.events]
             if name == "whole":
-                assert file.trials["score"][...].tolist() == [trial.score for trial in recorded.trials]
+                assert file.trials["score"][...].tolist() == [trial.score for trial in recording.trials]
             assert json.loads(file.notes)["plan"]["subject"] == "S01"
 
 
 def test_nwb_tells_the_error_of_calibration_that_the_intervals_hold(sources, tmp_path):
     pynwb = pytest.importorskip("pynwb")
-    drawn = {"gain_error": 0.003, "gain_error_origin": "set"}
-    whole = sources["whole"]
-    analysis = {**whole.analysis, "bootstrap": {"settings": drawn, "strokes": []}}
-    export(replace(whole, analysis=analysis), "nwb", tmp_path / "out")
+    bootstrap_settings = {"gain_error": 0.003, "gain_error_origin": "set"}
+    source = sources["whole"]
+    analysis = {**source.analysis, "bootstrap": {"settings": bootstrap_settings, "strokes": []}}
+    export(replace(source, analysis=analysis), "nwb", tmp_path / "out")
     with pynwb.NWBHDF5IO(tmp_path / "out" / "session.nwb", "r") as io:
-        assert json.loads(io.read().notes)["calibration_error"] == drawn
+        assert json.loads(io.read().notes)["calibration_error"] == bootstrap_settings
 
 
 def test_a_session_in_told_time_that_moves_when_waited_on_opens_as_nwb(sources, tmp_path):
     pynwb = pytest.importorskip("pynwb")
     recording = sources["whole"].recording
-    known = {**recording.provenance, "clock": {**recording.provenance["clock"], "factor": 0.0}}
-    waited = replace(sources["whole"], recording=replace(recording, provenance=known))
-    export(waited, "nwb", tmp_path / "out")
+    provenance = {**recording.provenance, "clock": {**recording.provenance["clock"], "factor": 0.0}}
+    source = replace(sources["whole"], recording=replace(recording, provenance=provenance))
+    export(source, "nwb", tmp_path / "out")
     with pynwb.NWBHDF5IO(tmp_path / "out" / "session.nwb", "r") as io:
-        begun_s = (recording.events[0].time_ns - known["clock"]["now_ns"]) * 1e-9
-        told = io.read().session_start_time - datetime.fromisoformat(known["created_utc"])
-        assert told.total_seconds() == pytest.approx(begun_s, abs=1e-5)
+        begun_s = (recording.events[0].time_ns - provenance["clock"]["now_ns"]) * 1e-9
+        elapsed = io.read().session_start_time - datetime.fromisoformat(provenance["created_utc"])
+        assert elapsed.total_seconds() == pytest.approx(begun_s, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", ["whole", "scores_only"])
 def test_the_nwb_inspector_finds_no_violation(exports, name):
     inspector = pytest.importorskip("nwbinspector")
-    found = list(inspector.inspect_nwbfile(nwbfile_path=exports["nwb", name] / "session.nwb"))
-    grave = [message for message in found if message.importance.name != "BEST_PRACTICE_SUGGESTION"]
-    assert grave == []
+    messages = list(inspector.inspect_nwbfile(nwbfile_path=exports["nwb", name] / "session.nwb"))
+    violations = [message for message in messages if message.importance.name != "BEST_PRACTICE_SUGGESTION"]
+    assert violations == []
 
 
 def test_without_pynwb_one_sentence_says_what_to_install(sources, tmp_path, monkeypatch):
@@ -382,7 +382,3 @@ def test_a_full_folder_for_an_import_is_refused(exports, tmp_path):
     (tmp_path / "mine").write_text("")
     with pytest.raises(RecordingError, match="not empty"):
         import_session(read_export(exports["csv", "whole"]), tmp_path)
-
-
-def test_the_plan_of_these_tests_has_texts_beyond_ascii():
-    assert not json.dumps(PLAN.blocks[0].scale_ends, ensure_ascii=False).isascii()

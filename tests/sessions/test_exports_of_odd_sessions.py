@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from recordings import PLAN, TRIAL, begun, ended, readings
+from recordings import PLAN, TRIAL, new_writer, readings, record_session
 from stand_ins import INFO
 
 from sessions.exchange import FORMATS, ExportSource, export
@@ -19,7 +19,7 @@ BARE = {"made_by": {}, "strokes": [], "friction": [], "flaws": []}  # an analysi
 
 
 def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     block = readings(0, 20)
     raw = block.raw.copy()
     raw[7, 2] = math.inf
@@ -27,17 +27,17 @@ def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back
     writer.event("ended", data={"reason": "done"})
     writer.close()
     source = ExportSource(Recording.open(tmp_path / "s"), BARE, None)
-    for form, named in (
+    for form, differences in (
         ("csv", ()),
         ("hdf5", ()),
         ("bids", ("since it was exported: raw of the readings is not what it was",)),
     ):
-        made = import_session(read_export(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
-        assert made.differences == named
+        result = import_session(read_export(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
+        assert result.differences == differences
 
 
 def test_a_rate_that_the_device_does_not_state_is_that_of_the_readings_in_bids_and_nwb(tmp_path):
-    writer = begun(tmp_path / "s", info=replace(INFO, rate=math.nan))
+    writer = new_writer(tmp_path / "s", info=replace(INFO, rate=math.nan))
     writer.readings(readings(0, 200))
     writer.event("ended", data={"reason": "done"})
     writer.close()
@@ -52,22 +52,22 @@ def test_a_rate_that_the_device_does_not_state_is_that_of_the_readings_in_bids_a
 
 @pytest.mark.parametrize("form", ["csv", "bids", "hdf5"])
 def test_a_remark_with_a_line_separator_in_it_comes_back_as_it_was_typed(tmp_path, form):
-    typed = "one\u2028two\x85three\u2029four"  # each ends a line for Python's splitlines, and none ends one in a file
-    writer = begun(tmp_path / "s")
-    writer.event("told", data={"sentence": typed})
+    remark = "one\u2028two\x85three\u2029four"  # each ends a line for Python's splitlines, and none ends one in a file
+    writer = new_writer(tmp_path / "s")
+    writer.event("told", data={"sentence": remark})
     writer.event("ended", data={"reason": "done"})
     writer.close()
     out = export(ExportSource(Recording.open(tmp_path / "s"), BARE, None), form, tmp_path / "out")
     assert import_session(read_export(out), tmp_path / "again").differences == ()
-    (event,) = [one for one in Recording.open(tmp_path / "again").events if one.kind == "told"]
-    assert event.data == {"sentence": typed}
+    (event,) = [event for event in Recording.open(tmp_path / "again").events if event.kind == "told"]
+    assert event.data == {"sentence": remark}
 
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinded(tmp_path, form):
     hidden = replace(TRIAL, stimulus=replace(TRIAL.stimulus, index=None))
     plan = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(hidden,)),), key_sha256="0" * 64)
-    ended(tmp_path / "s", plan=plan)
+    record_session(tmp_path / "s", plan=plan)
     recording = Recording.open(tmp_path / "s")
     source = ExportSource(recording, BARE, None)
     out = export(source, form, tmp_path / "out")

@@ -6,7 +6,7 @@ import sqlite3
 from pathlib import Path
 
 import pytest
-from recordings import ended
+from recordings import record_session
 
 from daq_app.cli.main import run
 from sessions.file_access import read_within_limit, remedy, write_whole
@@ -29,11 +29,11 @@ def test_a_failing_disk_a_denied_permission_and_a_full_disk_have_each_their_own_
 
 
 def test_a_new_file_in_a_folder_that_is_not_there_is_named_as_it_was_asked_for_and_nothing_is_to_be_restored(tmp_path):
-    with pytest.raises(FileNotFoundError) as failed:
+    with pytest.raises(FileNotFoundError) as caught_error:
         write_whole(tmp_path / "none" / "labels.txt", b"K1")
-    assert failed.value.filename == str(tmp_path / "none" / "labels.txt")
-    assert remedy(failed.value, new=True) == "check its name"
-    assert "copy" in remedy(failed.value)
+    assert caught_error.value.filename == str(tmp_path / "none" / "labels.txt")
+    assert remedy(caught_error.value, new=True) == "check its name"
+    assert "copy" in remedy(caught_error.value)
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_a_failure_of_the_database_is_advised_by_its_code(code, advice):
 
 
 def test_a_link_at_the_place_of_the_unfinished_file_is_not_followed(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     mine = tmp_path / "thesis.tex"
     mine.write_text("years of work")
     own = os.getpid()
@@ -67,15 +67,15 @@ def test_a_link_at_the_place_of_the_unfinished_file_is_not_followed(tmp_path):
 
 
 def test_a_sealing_that_failed_names_the_verb_that_seals_again(tmp_path, monkeypatch):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
 
     def failing(*_):
         raise OSError(errno.EIO, "Input/output error")
 
     monkeypatch.setattr(archive, "write_copy", failing)
-    with pytest.raises(RecordingError, match=r"check the disk and its cable.*'daq-app resume --end'") as failed:
+    with pytest.raises(RecordingError, match=r"check the disk and its cable.*'daq-app resume --end'") as caught_error:
         seal(folder)
-    assert "free space" not in str(failed.value)
+    assert "free space" not in str(caught_error.value)
 
 
 def test_a_file_of_twenty_gigabytes_is_refused_in_one_sentence_before_it_is_read(tmp_path):
@@ -98,9 +98,9 @@ def test_a_latin_1_protocol_is_named_when_a_study_is_made_of_it(tmp_path, capsys
     path = tmp_path / "p.toml"
     path.write_bytes('name = "Stärke"'.encode("latin-1"))
     assert run(["enrol", str(tmp_path / "study"), "--protocol", str(path)]) == 2
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1
-    assert "byte 10 is no UTF-8 text; save the file as UTF-8" in said[0]
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert "byte 10 is no UTF-8 text; save the file as UTF-8" in lines[0]
     assert not (tmp_path / "study").exists()
 
 

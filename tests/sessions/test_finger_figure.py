@@ -18,8 +18,8 @@ def with_sed(values):
 
 
 def test_a_node_without_an_sed_moves_no_border_of_the_colours():
-    more = with_sed(np.append(SED, np.nan))
-    assert common_levels((more,)) == common_levels((FIELD,))
+    longer_field = with_sed(np.append(SED, np.nan))
+    assert common_levels((longer_field,)) == common_levels((FIELD,))
 
 
 @pytest.mark.parametrize("sed", [0.0, float("nan")])
@@ -30,16 +30,16 @@ def test_fields_without_any_sed_have_colours_up_to_a_kilopascal(sed):
 
 
 def test_a_finger_with_a_node_without_an_sed_is_drawn():
-    gone = with_sed(np.append(np.nan, SED[1:]))
+    incomplete_field = with_sed(np.append(np.nan, SED[1:]))
     with look():
-        panels = finger_panels(gone, common_levels((gone,)))
+        panels = finger_panels(incomplete_field, common_levels((incomplete_field,)))
     assert all(panel.svg for panel in panels)
 
 
 def test_a_finger_without_any_sed_is_drawn_without_colours_and_says_so_in_one_sentence():
-    gone = with_sed(np.full_like(SED, np.nan))
+    incomplete_field = with_sed(np.full_like(SED, np.nan))
     with look():
-        panels = finger_panels(gone, common_levels((gone,)))
+        panels = finger_panels(incomplete_field, common_levels((incomplete_field,)))
         usual = finger_panels(FIELD, common_levels((FIELD,)))
     assert all(NO_SED in panel.svg and "SED [kPa]" not in panel.svg for panel in panels)
     assert not any(NO_SED in panel.svg for panel in usual)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from made_strokes import (
+from closed_form import (
     CALIBRATION,
     HEIGHT,
     INFO,
@@ -13,15 +13,15 @@ from made_strokes import (
     N,
     T,
     block,
-    felt,
+    noisy,
     plan,
-    stroke,
+    slide,
     times,
     to_and_fro,
     trapezium,
     trial,
 )
-from made_strokes import wrench as made
+from closed_form import wrench as made
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusTable, bit
@@ -37,14 +37,14 @@ HALF = 0.5 * np.ones_like(T)
 @dataclass(frozen=True)
 class Case:
     readings: ReadingBlock
-    gone: tuple[str, ...] = ()  # numbers of the first stroke that must be withheld
-    kept: tuple[str, ...] = ("mu_dynamic",)  # and those that must not
+    withheld: tuple[str, ...] = ()  # numbers of the first stroke that must be withheld
+    given_numbers: tuple[str, ...] = ("mu_dynamic",)  # and those that must not
     also: frozenset[str] = frozenset()  # flaws that come with it by necessity
     extra: dict = field(default_factory=dict)  # further arguments
 
 
 def cut(keep):
-    return block(T[keep], felt(PLAIN)[keep], sequence=np.flatnonzero(keep))
+    return block(T[keep], noisy(PLAIN)[keep], sequence=np.flatnonzero(keep))
 
 
 def without(start, stop):
@@ -53,15 +53,15 @@ def without(start, stop):
     return cut(keep)
 
 
-def changed(rows, values):
-    raw = felt(PLAIN)
+def with_rows(rows, values):
+    raw = noisy(PLAIN)
     raw[rows] = raw[values] if isinstance(values, int) else values
     return block(T, raw)
 
 
-def moved(**columns):
+def with_columns(**columns):
     """A plain stroke with columns of its readings changed."""
-    raw = felt(PLAIN)
+    raw = noisy(PLAIN)
     for name, change in columns.items():
         at = ("fx", "fy", "fz", "tx", "ty", "tz").index(name)
         raw[:, at] = change(raw[:, at])
@@ -92,9 +92,9 @@ def creeping():
 
 LONG = times(8.0)
 DIP = trapezium(LONG, 1.0, 7.0, 0.1) * (3.0 - 2.8 * trapezium(LONG, 3.6, 4.4, 0.2))
-BOTH = felt(stroke(LONG, begin=1.0, end=3.0) + stroke(LONG, begin=5.0, end=7.0))
+TWO_SLIDES = noisy(slide(LONG, begin=1.0, end=3.0) + slide(LONG, begin=5.0, end=7.0))
 TAPS = sum(made(LONG, trapezium(LONG, at, at + 0.12, 0.02, 2.0), 0 * LONG, 0 * LONG) for at in (1.0, 3.0, 5.0))
-BRUSH = felt(stroke(LONG) + made(LONG, trapezium(LONG, 6.0, 7.0, 0.1, 0.2), 0.1 + 0 * LONG, 0 * LONG))
+BRUSH = noisy(slide(LONG) + made(LONG, trapezium(LONG, 6.0, 7.0, 0.1, 0.2), 0.1 + 0 * LONG, 0 * LONG))
 INSIDE = (T > 1.3) & (T < 2.8)
 SWAYING = 2.0 + 0.5 * np.sin(2 * np.pi * 2.0 * T)
 FRICTION = ("mu_dynamic", "mu_max", "tau_max")
@@ -102,96 +102,98 @@ FRICTION = ("mu_dynamic", "mu_max", "tau_max")
 SAW = 0.5 * (1.0 - 0.25 * (1.0 - 8.0 * T % 1.0) * INSIDE)
 
 CASES = {
-    "stick_slip": Case(block(T, felt(made(T, N, SAW, ALONG)))),
+    "stick_slip": Case(block(T, noisy(made(T, N, SAW, ALONG)))),
     "lost_readings": Case(without(400, 430), ("tau_max", "mu_max")),
     "saturated": Case(
-        block(T, felt(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 1 << 17, 0)), ("tau_max", "peak_normal")
+        block(T, noisy(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 1 << 17, 0)), ("tau_max", "peak_normal")
     ),
     "device_fault": Case(
-        block(T, felt(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 0x80000100, 0)),
+        block(T, noisy(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 0x80000100, 0)),
         ("tau_max", "peak_normal"),
         also=frozenset({"saturated"}),
         extra={"info": replace(INFO, status=StatusTable((bit(8, "gauge excitation", "doubtful"),), 1 << 31))},
     ),
-    "frozen_sensor": Case(changed(slice(420, 460), 419), ("tau_max",)),
-    "dead_sensor": Case(moved(ty=lambda t: 0 * t), ("speed", *FRICTION), (), frozenset({"no_steady_sliding"})),
-    "wild_reading": Case(changed(slice(420, 421), np.array([20.0, 0, 0, 0, 0, 0])), kept=FRICTION),
-    "irregular_time": Case(block(T + np.random.default_rng(3).uniform(0, 0.002, len(T)), felt(PLAIN))),
-    "unknown_rate": Case(block(0 * T, felt(PLAIN)), (), ()),
-    "recording": Case(block(T, felt(PLAIN)), extra={"told": [Flaw(FlawName.RECORDING, "Lost.", "doubtful")]}),
+    "frozen_sensor": Case(with_rows(slice(420, 460), 419), ("tau_max",)),
+    "dead_sensor": Case(with_columns(ty=lambda t: 0 * t), ("speed", *FRICTION), (), frozenset({"no_steady_sliding"})),
+    "wild_reading": Case(with_rows(slice(420, 421), np.array([20.0, 0, 0, 0, 0, 0])), given_numbers=FRICTION),
+    "irregular_time": Case(block(T + np.random.default_rng(3).uniform(0, 0.002, len(T)), noisy(PLAIN))),
+    "unknown_rate": Case(block(0 * T, noisy(PLAIN)), (), ()),
+    "recording": Case(block(T, noisy(PLAIN)), extra={"told": [Flaw(FlawName.RECORDING, "Lost.", "doubtful")]}),
     "no_unloaded_stretch": Case(
-        block(T[INSIDE], felt(made(T, SWAYING, HALF, ALONG))[INSIDE]),
+        block(T[INSIDE], noisy(made(T, SWAYING, HALF, ALONG))[INSIDE]),
         (*FRICTION, "speed", "direction", "onset", "lift"),
         (),
         frozenset({"begins_in_contact", "ends_in_contact"}),
     ),
     "zero_after_contact": Case(cut(T >= 1.5), also=frozenset({"begins_in_contact"})),
-    "drift": Case(block(T, felt(PLAIN + 0.3 * (T > 2.0)[:, None] * np.eye(6)[0])), (*FRICTION, "normal_force"), ()),
+    "drift": Case(block(T, noisy(PLAIN + 0.3 * (T > 2.0)[:, None] * np.eye(6)[0])), (*FRICTION, "normal_force"), ()),
     "normal_axis_implausible": Case(
-        block(T, felt(made(T, N * (1.0 + 0.2 * np.sin(2 * np.pi * 1.7 * T)), HALF, ALONG))),
-        kept=(),
+        block(T, noisy(made(T, N * (1.0 + 0.2 * np.sin(2 * np.pi * 1.7 * T)), HALF, ALONG))),
+        given_numbers=(),
         extra={"frame": Frame("+z", "set", HEIGHT, "set")},
     ),
     "units_implausible": Case(
-        moved(tx=lambda t: 1e3 * t, ty=lambda t: 1e3 * t, tz=lambda t: 1e3 * t),
+        with_columns(tx=lambda t: 1e3 * t, ty=lambda t: 1e3 * t, tz=lambda t: 1e3 * t),
         ("speed", *FRICTION),
         (),
         extra={"info": replace(INFO, calibration=replace(CALIBRATION, rated=np.full(6, np.nan)))},
     ),
-    "no_stroke": Case(block(T, felt(0 * PLAIN)), (), ()),
-    "second_stroke": Case(block(LONG, BOTH)),
+    "no_stroke": Case(block(T, noisy(0 * PLAIN)), (), ()),
+    "second_stroke": Case(block(LONG, TWO_SLIDES)),
     "light_touch": Case(block(LONG, BRUSH)),
-    "tap": Case(block(LONG, felt(TAPS)), (), (), frozenset({"no_stroke"})),
+    "tap": Case(block(LONG, noisy(TAPS)), (), (), frozenset({"no_stroke"})),
     "not_lifted_between": Case(
-        block(LONG, felt(made(LONG, DIP, 0.5 + 0 * LONG, 10.0 * (LONG - 4.0)))),
-        kept=("lift",),
+        block(LONG, noisy(made(LONG, DIP, 0.5 + 0 * LONG, 10.0 * (LONG - 4.0)))),
+        given_numbers=("lift",),
         also=frozenset({"second_stroke", "drift"}),  # 0.2 N are left in the valley
     ),
     "turned_without_lift": Case(
-        block(LONG, felt(to_and_fro(LONG))),
-        kept=("mu_dynamic", "speed", "direction"),
+        block(LONG, noisy(to_and_fro(LONG))),
+        given_numbers=("mu_dynamic", "speed", "direction"),
         also=frozenset({"second_stroke", "wrong_direction"}),
     ),
     "begins_in_contact": Case(cut(T >= 1.5), ("onset",), also=frozenset({"zero_after_contact"})),
     "ends_in_contact": Case(cut(T <= 2.5), ("lift",)),
-    "slow_onset": Case(block(T, felt(creeping()))),
+    "slow_onset": Case(block(T, noisy(creeping()))),
     "too_little_force": Case(
-        block(T, felt(stroke(T, newtons=0.2))), (*FRICTION, "speed"), (), frozenset({"no_steady_sliding", "drift"})
+        block(T, noisy(slide(T, newtons=0.2))), (*FRICTION, "speed"), (), frozenset({"no_steady_sliding", "drift"})
     ),
     "ratio_above_one_at_low_force": Case(
-        block(T, felt(made(T, trapezium(T, 1.0, 3.0, 0.4, 3.0), np.where(T < 1.12, 1.6, 0.5), ALONG))), ("mu_static",)
+        block(T, noisy(made(T, trapezium(T, 1.0, 3.0, 0.4, 3.0), np.where(T < 1.12, 1.6, 0.5), ALONG))), ("mu_static",)
     ),
-    "ratio_above_one": Case(block(T, felt(stroke(T, mu=1.4))), kept=("mu_max", "mu_dynamic")),
-    "side_load": Case(block(T, felt(sideways(0.3)))),
-    "no_steady_sliding": Case(block(T, felt(made(T, N, 0.3 + 0 * T, 0 * T))), (*FRICTION, "speed", "direction"), ()),
+    "ratio_above_one": Case(block(T, noisy(slide(T, mu=1.4))), given_numbers=("mu_max", "mu_dynamic")),
+    "side_load": Case(block(T, noisy(sideways(0.3)))),
+    "no_steady_sliding": Case(block(T, noisy(made(T, N, 0.3 + 0 * T, 0 * T))), (*FRICTION, "speed", "direction"), ()),
     "speed_not_measurable": Case(
-        block(T, felt(made(T, N, HALF, ALONG + 10.0 * np.sin(2 * np.pi * 1.5 * T)))), ("speed", "speed_error")
+        block(T, noisy(made(T, N, HALF, ALONG + 10.0 * np.sin(2 * np.pi * 1.5 * T)))), ("speed", "speed_error")
     ),
     "may_only_roll": Case(
-        block(T, felt(made(T, N, 0.1 + 0 * T, 3.0 * (T - 2.0)))), (*FRICTION, "speed", "direction"), ()
+        block(T, noisy(made(T, N, 0.1 + 0 * T, 3.0 * (T - 2.0)))), (*FRICTION, "speed", "direction"), ()
     ),
     "height_unknown": Case(
-        block(T, felt(made(T, N, 0.5 + 0.04 * (T - 2.0), 7.0 * (T - 2.0)))),
+        block(T, noisy(made(T, N, 0.5 + 0.04 * (T - 2.0), 7.0 * (T - 2.0)))),
         ("speed",),
         extra={"frame": Frame("-z", "default", HEIGHT, "default")},
     ),
     "direction_turns": Case(
-        block(T, felt(turning())), ("speed", "direction"), also=frozenset({"speed_not_measurable"})
+        block(T, noisy(turning())), ("speed", "direction"), also=frozenset({"speed_not_measurable"})
     ),
-    "direction_disagrees": Case(block(T, felt(made(T, N, -HALF, ALONG))), ("speed", "direction")),
-    "wrong_direction": Case(block(T, felt(stroke(T, direction=-1)))),
+    "direction_disagrees": Case(block(T, noisy(made(T, N, -HALF, ALONG))), ("speed", "direction")),
+    "wrong_direction": Case(block(T, noisy(slide(T, direction=-1)))),
     "decision": Case(
-        block(T, felt(PLAIN)),
+        block(T, noisy(PLAIN)),
         extra={"decisions": Decisions((Decision("E02", "w", "lift", 1, 7, None, 2.0, number=1),))},
     ),
 }
 """The fault by the flaw it must raise; trials ask for one stroke from proximal to distal."""
 
 
-def found(case, of):
-    given = {"frame": None, "info": INFO, "told": (), "decisions": None, **case.extra}
-    planned = plan([of], given["frame"])
-    return analyse_blocks([(of, case.readings)], planned, given["info"], SETTINGS, given["told"], given["decisions"])
+def analyse_case(case, of):
+    arguments = {"frame": None, "info": INFO, "told": (), "decisions": None, **case.extra}
+    session_plan = plan([of], arguments["frame"])
+    return analyse_blocks(
+        [(of, case.readings)], session_plan, arguments["info"], SETTINGS, arguments["told"], arguments["decisions"]
+    )
 
 
 def test_every_flaw_there_is_has_a_fault_here():
@@ -202,7 +204,7 @@ def test_every_flaw_there_is_has_a_fault_here():
 @pytest.mark.parametrize("name", CASES)
 def test_a_fault_raises_its_flaw_and_no_other(name):
     case = CASES[name]
-    raised = {str(flaw.name) for flaw in found(case, trial()).flaws}
+    raised = {str(flaw.name) for flaw in analyse_case(case, trial()).flaws}
     assert name in raised
     assert raised - {name} <= case.also
 
@@ -210,16 +212,16 @@ def test_a_fault_raises_its_flaw_and_no_other(name):
 @pytest.mark.parametrize("name", CASES)
 def test_a_flaw_withholds_what_it_says_and_leaves_the_rest(name):
     case = CASES[name]
-    analysis = found(case, trial())
-    for number in case.gone:
+    analysis = analyse_case(case, trial())
+    for number in case.withheld:
         assert getattr(analysis.strokes[0], number) is None, number
-    for number in case.kept:
+    for number in case.given_numbers:
         assert getattr(analysis.strokes[0], number) is not None, number
     assert all(not flaw.sentence[0].islower() and flaw.sentence.endswith(".") for flaw in analysis.flaws)
 
 
 def test_a_trial_of_which_no_reading_can_be_used_has_no_stroke_and_says_so():
-    analysis = found(Case(block(T, felt(PLAIN) + 100.0)), trial())  # the rated force is 36 N
+    analysis = analyse_case(Case(block(T, noisy(PLAIN) + 100.0)), trial())  # the rated force is 36 N
     assert analysis.strokes == ()
     assert {str(flaw.name) for flaw in analysis.flaws} == {"saturated", "no_stroke"}
     assert "Only 0 of 800 readings can be used" in analysis.flaws[-1].sentence
@@ -228,5 +230,5 @@ def test_a_trial_of_which_no_reading_can_be_used_has_no_stroke_and_says_so():
 @pytest.mark.parametrize(("share", "fires"), [(0.10, False), (0.3, True)])
 def test_a_push_from_the_side_is_named_by_its_share_of_the_drag(share, fires):
     """A tenth of N beside a drag of half of N is 20 % of the tangential force; three tenths are 51 %."""
-    names = {str(flaw.name) for flaw in found(Case(block(T, felt(sideways(share)))), trial()).flaws}
+    names = {str(flaw.name) for flaw in analyse_case(Case(block(T, noisy(sideways(share)))), trial()).flaws}
     assert ("side_load" in names) == fires

@@ -13,28 +13,28 @@ pytestmark = pytest.mark.skipif(library() is None, reason="Python's SQLite is bu
 
 @pytest.mark.parametrize(("number", "code"), list(itertools.product([3, 60, 140, 260], [IOERR_WRITE, IOERR_FSYNC])))
 def test_one_failed_write_loses_nothing_acknowledged_and_ends_the_session_so_that_it_can_go_on(tmp_path, number, code):
-    ran = OnADisk(tmp_path / "s", failing_once(number, code))
-    recording = ran.check()
-    if ran.end is not None and not ran.end.complete:
+    session = OnADisk(tmp_path / "s", failing_once(number, code))
+    recording = session.check()
+    if session.end is not None and not session.end.complete:
         assert recording.end["cause"] == "disk"
         assert "check the disk and its cable, and resume" in recording.end["reason"]
 
 
 @pytest.mark.parametrize("number", [3, 60, 140, 260])
 def test_a_disk_that_takes_nothing_more_gives_one_sentence_and_keeps_what_was_acknowledged(tmp_path, number):
-    ran = OnADisk(tmp_path / "s", failing_from(number))
-    ran.check()
-    assert ran.end is None
-    assert "free space on the disk" in ran.error
+    session = OnADisk(tmp_path / "s", failing_from(number))
+    session.check()
+    assert session.end is None
+    assert "free space on the disk" in session.error
     assert not (tmp_path / "s" / "session.reserve").exists()
 
 
 def test_at_a_quota_the_session_ends_from_its_reserve_with_all_that_was_measured(tmp_path):
     folder = tmp_path / "s"
-    ran = OnADisk(folder, Quota(folder, 500_000))
-    assert (ran.error, ran.end.cause) == (None, "disk")
-    recording = ran.check()
-    assert recording.end["readings"] == len(recording.readings()) == ran.end.readings > 1000
+    session = OnADisk(folder, Quota(folder, 500_000))
+    assert (session.error, session.end.cause) == (None, "disk")
+    recording = session.check()
+    assert recording.end["readings"] == len(recording.readings()) == session.end.readings > 1000
     assert [event.kind for event in recording.events][-2:] == ["take_discarded", "ended"]
     assert sorted(path.name for path in folder.iterdir()) == ["session.sqlite"]
     seal(folder)

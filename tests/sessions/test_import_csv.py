@@ -26,23 +26,23 @@ BARE = "t,Fx,Fy,Fz,Tx,Ty,Tz"
 ROWS = [f"{i / 100:.2f},0.1,{i},-2.5,0.01,0.02,-0.03" for i in range(20)]
 
 
-def given_file(folder, header=HEADER, rows=ROWS, name="foreign.csv", end="\n"):
+def write_file(folder, header=HEADER, rows=ROWS, name="foreign.csv", end="\n"):
     path = folder / name
     path.write_text("\n".join(([header] if header else []) + list(rows)) + end)
     return path
 
 
-def taken(tmp_path, options=None, **file):
-    path = given_file(tmp_path, **file)
-    made = import_csv(path, tmp_path / "session", options)
-    return made, Recording.open(tmp_path / "session")
+def import_file(tmp_path, options=None, **file):
+    path = write_file(tmp_path, **file)
+    result = import_csv(path, tmp_path / "session", options)
+    return result, Recording.open(tmp_path / "session")
 
 
 def refusal(tmp_path, kind=ImportRefused, options=None, **file):
-    path = given_file(tmp_path, **file)
-    with pytest.raises(kind) as caught:
+    path = write_file(tmp_path, **file)
+    with pytest.raises(kind) as caught_error:
         import_csv(path, tmp_path / "session", options)
-    sentence = str(caught.value)
+    sentence = str(caught_error.value)
     assert str(path) in sentence
     assert "\n" not in sentence
     assert not (tmp_path / "session").exists()  # nothing was written
@@ -53,9 +53,9 @@ def refusal(tmp_path, kind=ImportRefused, options=None, **file):
 
 
 def test_readings_stay_as_the_file_has_them_and_become_newton_millimetres_by_the_matrix(tmp_path):
-    made, recording = taken(tmp_path)
+    result, recording = import_file(tmp_path)
     block = recording.readings()
-    assert made.readings == len(block) == 20
+    assert result.readings == len(block) == 20
     assert block.raw[3].tolist() == [0.1, 3.0, -2.5, 0.01, 0.02, -0.03]
     calibration = recording.info.calibration
     assert calibration.raw_unit == "N, N mm"
@@ -63,29 +63,29 @@ def test_readings_stay_as_the_file_has_them_and_become_newton_millimetres_by_the
 
 
 def test_the_file_itself_is_kept_with_its_hash(tmp_path):
-    made, recording = taken(tmp_path, rows=[row + ",0.5,left" for row in ROWS], header=HEADER + ",x_m,hand")
+    result, recording = import_file(tmp_path, rows=[row + ",0.5,left" for row in ROWS], header=HEADER + ",x_m,hand")
     original = (tmp_path / "foreign.csv").read_bytes()
     assert (tmp_path / "session" / ORIGINAL_FILE).read_bytes() == original
     source = recording.provenance["imported"]
     assert source["sha256"] == hashlib.sha256(original).hexdigest()
     assert source["extra_columns"] == ["x_m", "hand"]
-    assert made.extra == ("x_m", "hand")
+    assert result.extra == ("x_m", "hand")
 
 
 def test_times_count_from_the_first_reading_and_the_first_is_remembered(tmp_path):
-    _, recording = taken(tmp_path, rows=[f"{100 + i / 50:.2f},0,0,{i},0,0,0" for i in range(10)])
+    _, recording = import_file(tmp_path, rows=[f"{100 + i / 50:.2f},0,0,{i},0,0,0" for i in range(10)])
     assert recording.readings().time.tolist() == pytest.approx([i / 50 for i in range(10)])
     assert recording.provenance["imported"]["first_time_s"] == 100.0
 
 
 def test_the_rate_is_that_of_the_file_and_says_so(tmp_path):
-    made, recording = taken(tmp_path)
-    assert made.rate == pytest.approx(100.0)
+    result, recording = import_file(tmp_path)
+    assert result.rate == pytest.approx(100.0)
     assert recording.provenance["settings"]["rate"]["origin"] == "measured"
 
 
 def test_the_recording_ends_and_has_no_losses(tmp_path):
-    _, recording = taken(tmp_path)
+    _, recording = import_file(tmp_path)
     assert recording.losses == ()
     assert recording.trials == ()
     assert not recording.simulated
@@ -103,39 +103,39 @@ def test_a_file_that_says_it_was_simulated_stays_simulated(tmp_path):
 
 
 def test_normal_and_height_nobody_stated_are_defaults_marked_as_such(tmp_path):
-    made, recording = taken(tmp_path)
+    result, recording = import_file(tmp_path)
     frame = recording.plan.frame
     assert (frame.normal, frame.normal_origin, frame.height, frame.height_origin) == ("-z", "default", 0.0, "default")
-    assert len(made.defaults) == 2
+    assert len(result.defaults) == 2
 
 
 def test_what_was_stated_is_kept_as_stated(tmp_path):
-    made, recording = taken(tmp_path, ImportOptions(normal="+y", height=12.5, zeroed=True))
+    result, recording = import_file(tmp_path, ImportOptions(normal="+y", height=12.5, zeroed=True))
     frame = recording.plan.frame
     assert (frame.normal, frame.normal_origin, frame.height, frame.height_origin) == ("+y", "set", 12.5, "set")
     assert recording.info.settings[ZERO_SETTING] == ZERO_STATED
-    assert made.defaults == ()
+    assert result.defaults == ()
 
 
 def test_units_and_axes_can_be_stated_for_a_file_without_a_header(tmp_path):
     options = ImportOptions(units=("N", "Nmm"), axes=tuple(BARE.split(",")))
-    _, recording = taken(tmp_path, options, header=None)
+    _, recording = import_file(tmp_path, options, header=None)
     assert recording.info.calibration.matrix.tolist() == np.eye(6).tolist()
 
 
 def test_columns_may_stand_in_any_order(tmp_path):
     options = ImportOptions(units=("mN", "Ncm"), axes=("-", "Tz", "Ty", "Tx", "Fz", "Fy", "Fx"), rate=50.0)
-    made, recording = taken(tmp_path, options, header=None, rows=["9,1,2,3,4,5,6", "9,1.5,2,3,4,5,6"])
+    result, recording = import_file(tmp_path, options, header=None, rows=["9,1,2,3,4,5,6", "9,1.5,2,3,4,5,6"])
     block = recording.readings()
     assert block.raw[0].tolist() == [6, 5, 4, 3, 2, 1]
     assert np.diag(recording.info.calibration.matrix).tolist() == [1e-3] * 3 + [10.0] * 3
     assert block.time.tolist() == [0.0, 0.02]
-    assert made.rate == 50.0
+    assert result.rate == 50.0
 
 
 def test_a_header_without_units_needs_them_stated(tmp_path):
     assert "--units" in refusal(tmp_path, SettingsError, header=BARE)
-    _, recording = taken(tmp_path, ImportOptions(units=("N", "Nm")), header=BARE, name="again.csv")
+    _, recording = import_file(tmp_path, ImportOptions(units=("N", "Nm")), header=BARE, name="again.csv")
     assert recording.info.calibration.matrix[3, 3] == 1000.0
 
 
@@ -159,10 +159,10 @@ def test_forces_in_an_unknown_unit_are_refused(tmp_path, unit):
     ],
 )
 def test_headers_are_understood_in_the_usual_spellings(header, torque):
-    told = columns(header.split(","), None, None, 7)
-    assert told.axes == (1, 2, 3, 4, 5, 6)
-    assert told.time == 0
-    assert told.units == ("N", torque)
+    layout = columns(header.split(","), None, None, 7)
+    assert layout.axes == (1, 2, 3, 4, 5, 6)
+    assert layout.time == 0
+    assert layout.units == ("N", torque)
 
 
 def test_headers_of_other_things_are_no_axes():
@@ -183,8 +183,8 @@ def test_a_rate_the_file_does_not_hold_is_refused(tmp_path):
 
 
 def test_a_rate_the_file_does_hold_is_taken(tmp_path):
-    made, _ = taken(tmp_path, ImportOptions(rate=100.0))
-    assert made.rate == pytest.approx(100.0)
+    result, _ = import_file(tmp_path, ImportOptions(rate=100.0))
+    assert result.rate == pytest.approx(100.0)
 
 
 def test_a_rate_for_uneven_times_is_refused(tmp_path):
@@ -235,8 +235,8 @@ def test_what_is_no_number_is_refused_with_its_line(tmp_path, cell):
 
 
 def test_no_number_in_a_column_that_is_not_used_is_kept_as_it_is(tmp_path):
-    made, _ = taken(tmp_path, header=HEADER + ",note", rows=[row + ",nan" for row in ROWS])
-    assert made.readings == 20
+    result, _ = import_file(tmp_path, header=HEADER + ",note", rows=[row + ",nan" for row in ROWS])
+    assert result.readings == 20
 
 
 @pytest.mark.parametrize(("second", "word"), [("0.01", "repeats"), ("0.005", "lies before")])
@@ -249,8 +249,8 @@ def test_times_that_do_not_rise_are_refused_with_their_line(tmp_path, second, wo
 
 def test_an_empty_row_in_the_middle_is_refused_and_at_the_end_is_not(tmp_path):
     assert "line 7 is empty" in refusal(tmp_path, rows=[*ROWS[:5], "", *ROWS[5:]])
-    made, _ = taken(tmp_path, rows=ROWS, end="\n\n\n", name="again.csv")
-    assert made.readings == 20
+    result, _ = import_file(tmp_path, rows=ROWS, end="\n\n\n", name="again.csv")
+    assert result.readings == 20
 
 
 @pytest.mark.parametrize("content", [b"", b"\n\n", b"\xff\xfe\x00P", b"PK\x03\x04\x00\x00\xff"])
@@ -262,8 +262,10 @@ def test_what_is_no_csv_is_refused(tmp_path, content):
 
 
 def test_a_separator_that_ends_no_line_of_a_file_ends_none_here(tmp_path):
-    made, _ = taken(tmp_path, header=f"{HEADER},note", rows=[f"{row},one\u2028two\x0bthree\x85four" for row in ROWS])
-    assert made.readings == len(ROWS)
+    result, _ = import_file(
+        tmp_path, header=f"{HEADER},note", rows=[f"{row},one\u2028two\x0bthree\x85four" for row in ROWS]
+    )
+    assert result.readings == len(ROWS)
 
 
 @pytest.mark.parametrize(("header", "rate"), [(HEADER, None), (HEADER.replace("t_s", "n"), 1e-12)])
@@ -297,7 +299,7 @@ def test_nothing_is_written_over(tmp_path):
     folder.mkdir()
     (folder / "note.txt").write_text("mine")
     with pytest.raises(RecordingError, match="not empty"):
-        import_csv(given_file(tmp_path), folder)
+        import_csv(write_file(tmp_path), folder)
     assert [path.name for path in folder.iterdir()] == ["note.txt"]
 
 
@@ -307,9 +309,9 @@ def test_whatever_bytes_come_they_are_taken_or_refused_in_one_sentence(tmp_path_
     folder = tmp_path_factory.mktemp("junk")
     path = folder / "foreign.csv"
     path.write_bytes(junk)
-    with pytest.raises((ImportRefused, SettingsError)) as caught:
+    with pytest.raises((ImportRefused, SettingsError)) as caught_error:
         import_csv(path, folder / "session")
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(caught_error.value)
 
 
 @settings(deadline=None, max_examples=25)
@@ -317,10 +319,10 @@ def test_whatever_bytes_come_they_are_taken_or_refused_in_one_sentence(tmp_path_
 def test_every_number_survives_to_the_last_bit(tmp_path_factory, rows):
     folder = tmp_path_factory.mktemp("bits")
     text = [f"{i},{','.join(map(repr, row))}" for i, row in enumerate(rows)]
-    _, recording = taken(folder, rows=text)
+    _, recording = import_file(folder, rows=text)
     assert recording.readings().raw.tolist() == rows
 
 
 def test_the_provenance_is_plain_json(tmp_path):
-    _, recording = taken(tmp_path)
+    _, recording = import_file(tmp_path)
     json.dumps(recording.provenance, allow_nan=False)

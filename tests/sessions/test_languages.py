@@ -17,10 +17,10 @@ def test_built_in_protocols_have_every_text_in_five_languages_and_the_plan_says_
     assert ours.languages == LANGUAGES
     instructions = set()
     for language in LANGUAGES:
-        made = plan(ours, "S01", 3, setting=VisitSetting(language=language))
-        assert made.language == language
-        assert [trial.stimulus for trial in made.trials] == [trial.stimulus for trial in plan(ours, "S01", 3).trials]
-        instructions |= {block.instruction for block in made.blocks}
+        session_plan = plan(ours, "S01", 3, setting=VisitSetting(language=language))
+        assert session_plan.language == language
+        assert [t.stimulus for t in session_plan.trials] == [t.stimulus for t in plan(ours, "S01", 3).trials]
+        instructions |= {block.instruction for block in session_plan.blocks}
     english = {block.instruction for block in plan(ours, "S01", 3).blocks}
     assert len(instructions) == len(english) * len(LANGUAGES), "an instruction is the same in two languages"
     assert plan(ours, "S01", 3).language == "en"
@@ -38,7 +38,7 @@ def test_without_translations_a_protocol_has_its_own_language_alone_and_refuses_
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "sentence"),
     [
         ('language = "de"', "the texts of slipperiness are missing"),
         ('language = "en"', "the protocol's own"),
@@ -46,32 +46,32 @@ def test_without_translations_a_protocol_has_its_own_language_alone_and_refuses_
         ('language = "nl"', "the texts of slipperiness are missing"),
     ],
 )
-def test_a_translation_that_is_not_whole_is_refused_and_the_sentence_names_what_lacks(tmp_path, wrong, said):
+def test_a_translation_that_is_not_whole_is_refused_and_the_sentence_names_what_lacks(tmp_path, wrong, sentence):
     text = (FOLDER / f"{PAPER}.toml").read_text().split("# What subjects read")[0]
     texts = 'instruction = "x"\nscale_ends = ["a", "b"]\nquestion = "?"'
     table = f'\n[[translations]]\n{wrong}\nblock = "stickiness"\n{texts}\n'
     file = tmp_path / "own.toml"
     file.write_text(text + table)
-    with pytest.raises(SettingsError, match=said):
+    with pytest.raises(SettingsError, match=sentence):
         protocol(file)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "sentence"),
     [
         (('block = "slipperiness"\n', 'block = "slimness"\n'), "must be one of stickiness"),
         (('scale_ends = ["gar nicht klebrig", "so klebrig wie möglich"]\n', ""), "name both ends"),
         (("Legen Sie Ihren", ""), None),
     ],
 )
-def test_a_text_too_many_or_too_few_in_a_block_is_refused(tmp_path, change, said):
+def test_a_text_too_many_or_too_few_in_a_block_is_refused(tmp_path, change, sentence):
     head, tail = (FOLDER / f"{PAPER}.toml").read_text().split("# What subjects read")
     file = tmp_path / "own.toml"
     file.write_text(f"{head}#{tail.replace(*change, 1)}")
-    if said is None:
+    if sentence is None:
         assert protocol(file).languages == LANGUAGES
         return
-    with pytest.raises(SettingsError, match=said):
+    with pytest.raises(SettingsError, match=sentence):
         protocol(file)
 
 

@@ -31,52 +31,52 @@ def judgements(rng, people, repeats=1):
 
 def study(rng, people):
     """The trials of people who score, estimate and choose, and compare with a standard."""
-    rows = [(who, {"index": i, "score": 50.0 + 12.0 * x}) for who, i, x in judgements(rng, people)]
-    rows += [(who, {"index": i, "estimate": math.exp(0.3 * x)}) for who, i, x in judgements(rng, people, 3)]
+    rows = [(subject, {"index": i, "score": 50.0 + 12.0 * x}) for subject, i, x in judgements(rng, people)]
+    rows += [(subject, {"index": i, "estimate": math.exp(0.3 * x)}) for subject, i, x in judgements(rng, people, 3)]
     rows += [
-        (who, {"index": i, "standard": 50, "mu": math.exp(v / PER_LOG_MU)})
-        for who in ("P0",)
+        (subject, {"index": i, "standard": 50, "mu": math.exp(v / PER_LOG_MU)})
+        for subject in ("P0",)
         for i, v in VALUES.items()
     ]
-    chosen = [
+    choices = [
         Choice(f"P{n}", a, b, bool(VALUES[a] - VALUES[b] > rng.standard_normal()))
         for n in range(people) for a in VALUES for b in VALUES if a != b
     ]  # fmt: skip
     blank = {"score": None, "estimate": None, "standard": None, "mu": None}
-    trials = [(SimpleNamespace(subject=who), SimpleNamespace(**{**blank, **row})) for who, row in rows]
+    trials = [(SimpleNamespace(subject=subject), SimpleNamespace(**{**blank, **row})) for subject, row in rows]
     jnds = [math.log(QUARTILE / PER_LOG_MU) + rng.normal(0.0, 0.2) for _ in range(people)]
-    return latent_scales(trials, [paired_scale(chosen, "Thurstone V")], ConstantStimuli({}, None, average(jnds)))
+    return latent_scales(trials, [paired_scale(choices, "Thurstone V")], ConstantStimuli({}, None, average(jnds)))
 
 
 def test_every_kind_of_judgement_finds_the_planted_values_in_one_unit():
-    found = study(np.random.default_rng(4), 60)
-    assert tuple(found) == JUDGEMENTS
-    for values in found.values():
-        assert {index: one.value for index, one in values.items()} == pytest.approx(VALUES, abs=0.2)
-        assert all(one.low < one.value < one.high or index == 20 for index, one in values.items())
+    scales = study(np.random.default_rng(4), 60)
+    assert tuple(scales) == JUDGEMENTS
+    for values in scales.values():
+        assert {index: estimate.value for index, estimate in values.items()} == pytest.approx(VALUES, abs=0.2)
+        assert all(estimate.low < estimate.value < estimate.high or index == 20 for index, estimate in values.items())
 
 
 @pytest.mark.parametrize("people", [3, 5, 12])
 def test_intervals_of_scores_hold_the_planted_values(people):
     rng = np.random.default_rng(11)
-    held = []
+    coverage = []
     for _ in range(100):
-        found = of_judgements(judgements(rng, people, 2))
-        held += [one.low <= VALUES[index] <= one.high for index, one in found.items()]
-    assert 0.92 <= np.mean(held) <= 0.99  # three standard errors of 500
+        scale = of_judgements(judgements(rng, people, 2))
+        coverage += [estimate.low <= VALUES[index] <= estimate.high for index, estimate in scale.items()]
+    assert 0.92 <= np.mean(coverage) <= 0.99  # three standard errors of 500
 
 
 def test_a_choice_of_unit_or_of_level_changes_no_latent_value():
     points = judgements(np.random.default_rng(2), 8)
-    other = [(who, index, 7.0 * x + (40.0 if who == "P1" else -3.0)) for who, index, x in points]
-    for index, one in of_judgements(points).items():
-        again = of_judgements(other)[index]
-        assert (again.value, again.low, again.high) == pytest.approx((one.value, one.low, one.high))
+    rescaled = [(subject, index, 7.0 * x + (40.0 if subject == "P1" else -3.0)) for subject, index, x in points]
+    for index, estimate in of_judgements(points).items():
+        other = of_judgements(rescaled)[index]
+        assert (other.value, other.low, other.high) == pytest.approx((estimate.value, estimate.low, estimate.high))
 
 
 def test_one_just_noticeable_difference_is_0_674():
-    found = of_comparisons({0: 0.4, 100: 0.5}, (math.log(math.log(1.25)),) * 3)
-    assert found[100].value - found[0].value == pytest.approx(0.6745, abs=1e-4)
+    scale = of_comparisons({0: 0.4, 100: 0.5}, (math.log(math.log(1.25)),) * 3)
+    assert scale[100].value - scale[0].value == pytest.approx(0.6745, abs=1e-4)
 
 
 def test_too_few_people_and_answers_that_do_not_scatter_have_no_latent_scale():
@@ -87,10 +87,10 @@ def test_too_few_people_and_answers_that_do_not_scatter_have_no_latent_scale():
 def test_the_table_lays_all_kinds_beside_the_scores_and_is_left_out_of_scores_alone():
     latent = study(np.random.default_rng(4), 20)
     means = tuple(SimpleNamespace(index=index, mean=50.0 + 12.0 * value) for index, value in VALUES.items())
-    one = SimpleNamespace(descriptor="stickiness", scores=means, indices=tuple(VALUES), latent=latent)
-    shown = latent_table([one])
-    assert [column.name for column in shown.columns[1:]] == ["mean score", *(f"by {kind}" for kind in JUDGEMENTS)]
-    assert [row[0].text for row in shown.groups[0].rows] == [str(index) for index in VALUES]
-    assert all(cell.interval for row in shown.groups[0].rows for cell in row[2:])
-    one.latent = {"scores": latent["scores"]}
-    assert latent_table([one]) is None
+    finding = SimpleNamespace(descriptor="stickiness", scores=means, indices=tuple(VALUES), latent=latent)
+    table = latent_table([finding])
+    assert [column.name for column in table.columns[1:]] == ["mean score", *(f"by {kind}" for kind in JUDGEMENTS)]
+    assert [row[0].text for row in table.groups[0].rows] == [str(index) for index in VALUES]
+    assert all(cell.interval for row in table.groups[0].rows for cell in row[2:])
+    finding.latent = {"scores": latent["scores"]}
+    assert latent_table([finding]) is None

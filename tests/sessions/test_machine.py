@@ -1,7 +1,7 @@
 """The course of a session, case by case; `test_machine_walks` goes through it at random."""
 
 import pytest
-from walks import CODES, FIRST, FORCES, NUMBERS, PAIRS, RESTFUL, SCORES, made_plan
+from walks import CODES, FIRST, FORCES, NUMBERS, PAIRS, RESTFUL, SCORES, plan_of
 
 from sessions.plan.plan import Frame, Rests, SessionPlan
 from sessions.run.machine import advance, resume_interrupted, start, trial_in_hand
@@ -60,22 +60,22 @@ def commands_after(plan, *events):
     return after(plan, *events)[1]
 
 
-def mounted(trial=0):
+def mount(trial=0):
     return StimulusMounted(CODES[trial])
 
 
 STROKE = (ContactOnset(), FingerLifted())
 
 
-def done(trial=0, score=50.0):
-    return (mounted(trial), Zeroed(), *STROKE, Settled(), Scored(score))
+def do_trial(trial=0, score=50.0):
+    return (mount(trial), Zeroed(), *STROKE, Settled(), Scored(score))
 
 
 def put_on(plan, number):
     return StimulusMounted(plan.trials[number - 1].stimulus.code)
 
 
-def stroked(plan, number):
+def stroke(plan, number):
     if plan.forces:
         return (put_on(plan, number), Zeroed(), *STROKE, Settled())
     return (put_on(plan, number), StrokeDone())
@@ -92,44 +92,44 @@ def test_a_session_waits_for_the_experimenter_and_then_reads_the_first_instructi
 
 
 def test_a_trial_with_forces_goes_mount_zero_stroke_score():
-    assert commands_after(FORCES, Begin(), mounted()) == (StartTake(1, 1), MeasureZero())
-    assert commands_after(FORCES, Begin(), mounted(), Zeroed()) == (AskStroke(FIRST),)
-    assert isinstance(after(FORCES, Begin(), mounted(), Zeroed(), ContactOnset())[0], Stroking)
-    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE)
+    assert commands_after(FORCES, Begin(), mount()) == (StartTake(1, 1), MeasureZero())
+    assert commands_after(FORCES, Begin(), mount(), Zeroed()) == (AskStroke(FIRST),)
+    assert isinstance(after(FORCES, Begin(), mount(), Zeroed(), ContactOnset())[0], Stroking)
+    state, commands = after(FORCES, Begin(), mount(), Zeroed(), *STROKE)
     assert isinstance(state, Scoring)
     assert commands == (AskScore(FIRST, FORCES.blocks[0].scale_ends),)
-    commands = commands_after(FORCES, Begin(), *done())
+    commands = commands_after(FORCES, Begin(), *do_trial())
     assert commands == (KeepTake(1, 1), AskMount(FORCES.trials[1]))
 
 
 def test_a_trial_without_forces_has_no_zero_and_its_stroke_is_reported():
-    assert commands_after(SCORES, Begin(), mounted()) == (StartTake(1, 1), AskStroke(SCORES.trials[0]))
-    commands = commands_after(SCORES, Begin(), mounted(), StrokeDone(), Scored(None))
+    assert commands_after(SCORES, Begin(), mount()) == (StartTake(1, 1), AskStroke(SCORES.trials[0]))
+    commands = commands_after(SCORES, Begin(), mount(), StrokeDone(), Scored(None))
     assert commands == (KeepTake(1, 1), AskMount(SCORES.trials[1]))
 
 
 def test_a_new_block_begins_with_its_instruction():
-    five = [event for trial in range(5) for event in done(trial)]
+    five = [event for trial in range(5) for event in do_trial(trial)]
     assert commands_after(FORCES, Begin(), *five)[1:] == (ShowInstruction(FORCES.blocks[1]), AskMount(FORCES.trials[5]))
 
 
 def test_a_whole_session_visits_every_trial_once_in_the_plans_order_and_ends_complete():
     state, commands = start(FORCES)
-    kept = []
-    for event in (Begin(), *(event for trial in range(10) for event in done(trial)), Finish()):
+    kept_trials = []
+    for event in (Begin(), *(event for trial in range(10) for event in do_trial(trial)), Finish()):
         state, commands = advance(state, event)
-        kept += [command.trial for command in commands if isinstance(command, KeepTake)]
-    assert kept == list(range(1, 11))
+        kept_trials += [command.trial for command in commands if isinstance(command, KeepTake)]
+    assert kept_trials == list(range(1, 11))
     assert state == Ended("every trial is done", complete=True)
     assert commands == (EndSession("every trial is done", complete=True),)
 
 
 def test_the_last_trial_can_be_repeated_before_the_session_is_ended():
-    all_done = (Begin(), *(event for trial in range(10) for event in done(trial)))
+    all_done = (Begin(), *(event for trial in range(10) for event in do_trial(trial)))
     assert commands_after(FORCES, *all_done) == (KeepTake(10, 1), AskFinish())
     commands = commands_after(FORCES, *all_done, Redo("finger slipped off"))
     assert commands == (DiscardTake(10, 1, "finger slipped off"), AskMount(FORCES.trials[9]))
-    state, commands = after(FORCES, *all_done, Redo("finger slipped off"), *done(9), Finish())
+    state, commands = after(FORCES, *all_done, Redo("finger slipped off"), *do_trial(9), Finish())
     assert state == Ended("every trial is done", complete=True)
 
 
@@ -138,22 +138,22 @@ def test_the_last_trial_can_be_repeated_before_the_session_is_ended():
 
 def test_the_wrong_stimulus_is_refused_by_its_label():
     state, _ = after(FORCES, Begin())
-    same, (refused,) = advance(state, StimulusMounted(CODES[1]))
+    same, (refusal,) = advance(state, StimulusMounted(CODES[1]))
     assert same == state
-    assert refused == Refuse(f"trial 1 needs the stimulus {CODES[0]}, not {CODES[1]}")
+    assert refusal == Refuse(f"trial 1 needs the stimulus {CODES[0]}, not {CODES[1]}")
 
 
 @pytest.mark.parametrize("score", [-0.1, 100.1, float("nan"), float("inf")])
 def test_a_score_off_the_line_is_refused(score):
-    state, _ = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE)
-    same, (refused,) = advance(state, Scored(score))
+    state, _ = after(FORCES, Begin(), mount(), Zeroed(), *STROKE)
+    same, (refusal,) = advance(state, Scored(score))
     assert same == state
-    assert refused.sentence.startswith("a score lies between 0 and 100")
+    assert refusal.sentence.startswith("a score lies between 0 and 100")
 
 
 @pytest.mark.parametrize("event", [Redo(" "), Skip("")])
 def test_redo_and_skip_without_a_reason_are_refused(event):
-    state, _ = after(FORCES, Begin(), mounted())
+    state, _ = after(FORCES, Begin(), mount())
     assert advance(state, event)[0] == state
     assert "needs a reason" in advance(state, event)[1][0].sentence
 
@@ -164,9 +164,9 @@ def test_a_plan_without_trials_is_not_run():
 
 
 def test_a_transducers_events_mean_nothing_in_a_visit_without_one_and_the_other_way_round():
-    state, _ = after(SCORES, Begin(), mounted())
+    state, _ = after(SCORES, Begin(), mount())
     assert isinstance(advance(state, ContactOnset())[1][0], Refuse)
-    state, _ = after(FORCES, Begin(), mounted(), Zeroed())
+    state, _ = after(FORCES, Begin(), mount(), Zeroed())
     assert isinstance(advance(state, StrokeDone())[1][0], Refuse)
 
 
@@ -178,28 +178,28 @@ def test_a_transducers_events_mean_nothing_in_a_visit_without_one_and_the_other_
     [(), (Zeroed(),), (Zeroed(), STROKE[0]), (Zeroed(), *STROKE), (Zeroed(), *STROKE, Scored(3.0))],
 )
 def test_redo_discards_the_take_and_opens_another_of_the_same_trial(so_far):
-    state, commands = after(FORCES, Begin(), mounted(), *so_far, Redo("sneezed"))
+    state, commands = after(FORCES, Begin(), mount(), *so_far, Redo("sneezed"))
     assert commands == (DiscardTake(1, 1, "sneezed"), StartTake(1, 2), MeasureZero())
     assert isinstance(state, Taring)
     assert trial_in_hand(state) == 1
 
 
 def test_redo_just_before_a_trial_repeats_the_one_before_and_the_order_goes_on_as_planned():
-    commands = commands_after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"))
+    commands = commands_after(FORCES, Begin(), *do_trial(0), *do_trial(1), Redo("wrong finger"))
     assert commands == (DiscardTake(2, 1, "wrong finger"), AskMount(FORCES.trials[1]))
-    commands = commands_after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"), *done(1))
+    commands = commands_after(FORCES, Begin(), *do_trial(0), *do_trial(1), Redo("wrong finger"), *do_trial(1))
     assert commands == (KeepTake(2, 2), AskMount(FORCES.trials[2]))
 
 
 def test_pressing_redo_twice_does_not_reach_further_back():
-    state, _ = after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"))
-    same, (refused,) = advance(state, Redo("wrong finger"))
+    state, _ = after(FORCES, Begin(), *do_trial(0), *do_trial(1), Redo("wrong finger"))
+    same, (refusal,) = advance(state, Redo("wrong finger"))
     assert same == state
-    assert refused == Refuse("trial 2 is about to be repeated already")
+    assert refusal == Refuse("trial 2 is about to be repeated already")
 
 
 def test_a_redo_is_undone_until_the_next_stroke_and_the_answer_is_asked_for_again():
-    so_far = (Begin(), mounted(), Zeroed(), *STROKE, Redo("mistaken"))
+    so_far = (Begin(), mount(), Zeroed(), *STROKE, Redo("mistaken"))
     undone = (DiscardTake(1, 2, "the redo was undone"), RestoreTake(1, 1))
     for more in ((), (Zeroed(),)):
         state, commands = after(FORCES, *so_far, *more, UndoRedo())
@@ -211,14 +211,14 @@ def test_a_redo_is_undone_until_the_next_stroke_and_the_answer_is_asked_for_agai
         DiscardTake(1, 1, "after all"),
         StartTake(1, 3),
     )
-    (refused,) = advance(after(FORCES, *so_far, Zeroed(), *STROKE)[0], UndoRedo())[1]
-    assert refused == Refuse("there is no redo to undo: it can be undone until the next stroke")
+    (refusal,) = advance(after(FORCES, *so_far, Zeroed(), *STROKE)[0], UndoRedo())[1]
+    assert refusal == Refuse("there is no redo to undo: it can be undone until the next stroke")
 
 
 def test_undoing_the_redo_of_a_trial_that_was_done_restores_it_and_of_one_that_was_skipped_leaves_it_out():
-    commands = commands_after(FORCES, Begin(), *done(0), *done(1), Redo("mistaken"), UndoRedo())
+    commands = commands_after(FORCES, Begin(), *do_trial(0), *do_trial(1), Redo("mistaken"), UndoRedo())
     assert commands == (RestoreTake(2, 1), KeepTake(2, 1), AskMount(FORCES.trials[2]))
-    skipped = (Begin(), mounted(), Skip("surface dirty"), Redo("cleaned"), mounted(), UndoRedo())
+    skipped = (Begin(), mount(), Skip("surface dirty"), Redo("cleaned"), mount(), UndoRedo())
     assert commands_after(FORCES, *skipped) == (
         DiscardTake(1, 2, "the redo was undone"),
         LeaveOut(1, "the redo was undone"),
@@ -227,35 +227,35 @@ def test_undoing_the_redo_of_a_trial_that_was_done_restores_it_and_of_one_that_w
 
 
 def test_a_skipped_trial_can_be_taken_up_again():
-    commands = commands_after(FORCES, Begin(), mounted(), Skip("surface dirty"))
+    commands = commands_after(FORCES, Begin(), mount(), Skip("surface dirty"))
     assert commands == (DiscardTake(1, 1, "skipped: surface dirty"), AskMount(FORCES.trials[1]))
-    commands = commands_after(FORCES, Begin(), mounted(), Skip("surface dirty"), Redo("cleaned"))
+    commands = commands_after(FORCES, Begin(), mount(), Skip("surface dirty"), Redo("cleaned"))
     assert commands == (AskMount(FIRST),)
 
 
 def test_a_pause_before_the_stroke_is_done_discards_the_take_and_mounts_anew():
-    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), Pause())
+    commands = commands_after(FORCES, Begin(), mount(), Zeroed(), Pause())
     assert [type(command) for command in commands] == [DiscardTake]
-    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume())
+    commands = commands_after(FORCES, Begin(), mount(), Zeroed(), Pause(), Resume())
     assert commands == (AskMount(FIRST),)
-    assert commands_after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume(), mounted())[0] == StartTake(1, 2)
+    assert commands_after(FORCES, Begin(), mount(), Zeroed(), Pause(), Resume(), mount())[0] == StartTake(1, 2)
 
 
 def test_a_pause_before_the_score_keeps_the_stroke_and_asks_again():
-    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, Pause(), Resume())
+    state, commands = after(FORCES, Begin(), mount(), Zeroed(), *STROKE, Pause(), Resume())
     assert isinstance(state, Scoring)
     assert [type(command) for command in commands] == [AskScore]
 
 
 def test_a_further_stroke_before_the_score_is_told_and_the_take_stays():
-    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, ContactOnset())
+    commands = commands_after(FORCES, Begin(), mount(), Zeroed(), *STROKE, ContactOnset())
     assert [type(command) for command in commands] == [Tell]
-    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, *STROKE, Scored(1.0), Settled())
+    commands = commands_after(FORCES, Begin(), mount(), Zeroed(), *STROKE, *STROKE, Scored(1.0), Settled())
     assert commands[0] == KeepTake(1, 1)
 
 
 def test_strokes_that_are_allowed_are_taken_in_silence_and_the_next_is_told():
-    plan = made_plan(["line"], strokes_allowed=2)
+    plan = plan_of(["line"], strokes_allowed=2)
     so_far = (Begin(), put_on(plan, 1), Zeroed())
     assert commands_after(plan, *so_far) == (AskStroke(plan.trials[0], 2),)
     assert commands_after(plan, *so_far, *STROKE, ContactOnset()) == ()
@@ -269,15 +269,15 @@ def test_strokes_that_are_allowed_are_taken_in_silence_and_the_next_is_told():
 
 
 def test_a_score_given_before_the_finger_has_been_off_for_a_moment_is_taken_and_the_take_runs_on():
-    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, Scored(40.0))
+    state, commands = after(FORCES, Begin(), mount(), Zeroed(), *STROKE, Scored(40.0))
     assert isinstance(state, Settling)
     assert commands == ()
-    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, Scored(40.0), Settled())
+    commands = commands_after(FORCES, Begin(), mount(), Zeroed(), *STROKE, Scored(40.0), Settled())
     assert commands == (KeepTake(1, 1), AskMount(FORCES.trials[1]))
 
 
 def test_a_take_never_ends_while_the_finger_touches():
-    so_far = (Begin(), mounted(), Zeroed(), *STROKE, ContactOnset(), Scored(40.0))
+    so_far = (Begin(), mount(), Zeroed(), *STROKE, ContactOnset(), Scored(40.0))
     state, _ = after(FORCES, *so_far)
     assert state.touching
     assert isinstance(advance(state, Settled())[1][0], Refuse)
@@ -288,7 +288,7 @@ def test_a_take_never_ends_while_the_finger_touches():
 
 
 def test_a_rest_comes_after_as_many_trials_as_the_plan_says_and_ends_by_clock_or_experimenter():
-    so_far = (Begin(), *stroked(RESTFUL, 1), Scored(1.0), *stroked(RESTFUL, 2), Scored(2.0))
+    so_far = (Begin(), *stroke(RESTFUL, 1), Scored(1.0), *stroke(RESTFUL, 2), Scored(2.0))
     state, commands = after(RESTFUL, *so_far)
     assert isinstance(state, Resting)
     assert commands == (KeepTake(2, 1), AskRest(30.0))
@@ -299,7 +299,7 @@ def test_a_rest_comes_after_as_many_trials_as_the_plan_says_and_ends_by_clock_or
 
 def test_a_rest_between_blocks_comes_before_the_instruction_of_the_next():
     plan = SessionPlan(**{f: getattr(FORCES, f) for f in FORCES.__slots__} | {"rests": Rests(between_blocks=True)})
-    five = [event for trial in range(5) for event in done(trial)]
+    five = [event for trial in range(5) for event in do_trial(trial)]
     assert commands_after(plan, Begin(), *five)[1:] == (AskRest(None),)
     assert commands_after(plan, Begin(), *five, Resume()) == (ShowInstruction(plan.blocks[1]), AskMount(plan.trials[5]))
 
@@ -308,7 +308,7 @@ def test_a_rest_between_blocks_comes_before_the_instruction_of_the_next():
 
 
 def test_a_number_is_asked_for_and_must_be_above_nought():
-    state, commands = after(NUMBERS, Begin(), *stroked(NUMBERS, 1))
+    state, commands = after(NUMBERS, Begin(), *stroke(NUMBERS, 1))
     assert commands == (AskNumber(NUMBERS.trials[0], "Which?"),)
     for wrong in (0.0, -1.0, float("inf"), float("nan")):
         assert "above 0" in advance(state, MagnitudeEstimate(wrong))[1][0].sentence
@@ -317,26 +317,28 @@ def test_a_number_is_asked_for_and_must_be_above_nought():
 
 
 def test_an_answer_of_another_kind_is_refused_by_what_is_asked_for():
-    state, _ = after(NUMBERS, Begin(), *stroked(NUMBERS, 1))
+    state, _ = after(NUMBERS, Begin(), *stroke(NUMBERS, 1))
     assert advance(state, Scored(50.0))[1] == (Refuse("this trial asks for a number, not for a score"),)
 
 
 def test_two_are_presented_one_after_the_other_and_then_one_is_chosen():
     first, second = PAIRS.trials[:2]
-    commands = commands_after(PAIRS, Begin(), *stroked(PAIRS, 1))
+    commands = commands_after(PAIRS, Begin(), *stroke(PAIRS, 1))
     assert commands == (KeepTake(1, 1), AskMount(second))
-    commands = commands_after(PAIRS, Begin(), *stroked(PAIRS, 1), *stroked(PAIRS, 2)[:-1])
+    commands = commands_after(PAIRS, Begin(), *stroke(PAIRS, 1), *stroke(PAIRS, 2)[:-1])
     assert commands == (AskChoice(first, second, "Which?"),)
-    commands = commands_after(PAIRS, Begin(), *stroked(PAIRS, 1), *stroked(PAIRS, 2), PairedChoice("second"))
+    commands = commands_after(PAIRS, Begin(), *stroke(PAIRS, 1), *stroke(PAIRS, 2), PairedChoice("second"))
     assert commands == (KeepTake(2, 1), AskMount(PAIRS.trials[2]))
 
 
 def test_a_pair_is_repeated_as_a_pair():
-    one, two = stroked(PAIRS, 1), stroked(PAIRS, 2)
+    first, second = stroke(PAIRS, 1), stroke(PAIRS, 2)
     back = (DiscardTake(2, 1, "slip"), DiscardTake(1, 1, "slip"), AskMount(PAIRS.trials[0]))
-    assert commands_after(PAIRS, Begin(), *one, *two, Redo("slip")) == back
-    assert commands_after(PAIRS, Begin(), *one, *two, PairedChoice("first"), Redo("slip")) == back
-    state, _ = after(PAIRS, Begin(), *one, *two, PairedChoice("first"), Redo("slip"), *one, *two, PairedChoice("first"))
+    assert commands_after(PAIRS, Begin(), *first, *second, Redo("slip")) == back
+    assert commands_after(PAIRS, Begin(), *first, *second, PairedChoice("first"), Redo("slip")) == back
+    state, _ = after(
+        PAIRS, Begin(), *first, *second, PairedChoice("first"), Redo("slip"), *first, *second, PairedChoice("first")
+    )
     assert trial_in_hand(state) == 3
 
 
@@ -346,7 +348,7 @@ def test_a_pair_is_left_out_as_a_pair():
 
 
 def test_a_pause_or_a_crash_between_the_two_of_a_pair_presents_both_again():
-    so_far = (Begin(), *stroked(PAIRS, 1), put_on(PAIRS, 2))
+    so_far = (Begin(), *stroke(PAIRS, 1), put_on(PAIRS, 2))
     commands = commands_after(PAIRS, *so_far, Pause(), Resume())
     assert commands == (DiscardTake(1, 1, "a pause parted the two stimuli"), AskMount(PAIRS.trials[0]))
     _, commands = resume_interrupted(after(PAIRS, *so_far)[0], "cut short")
@@ -358,12 +360,12 @@ def test_a_pause_or_a_crash_between_the_two_of_a_pair_presents_both_again():
 
 
 def test_a_note_changes_nothing_and_an_empty_one_is_refused():
-    state, _ = after(FORCES, Begin(), mounted())
+    state, _ = after(FORCES, Begin(), mount())
     assert advance(state, Note("the subject yawned")) == (state, ())
     assert isinstance(advance(state, Note(" "))[1][0], Refuse)
 
 
 def test_abort_names_its_reason_and_discards_the_open_take():
-    state, commands = after(FORCES, Begin(), mounted(), Abort("fire alarm"))
+    state, commands = after(FORCES, Begin(), mount(), Abort("fire alarm"))
     assert commands == (DiscardTake(1, 1, "fire alarm"), EndSession("fire alarm", complete=False))
     assert state == Ended("fire alarm", complete=False)

@@ -1,7 +1,7 @@
 """What holds in any session, whatever is done in whatever order."""
 
 from hypothesis import given, settings
-from walks import meant, steps, walks
+from walks import next_event, steps, walks
 
 from sessions.run.machine import advance, start
 from sessions.run.states import Closing, Ended, Ready, Settling, Stroking, Taring
@@ -41,22 +41,22 @@ def test_the_same_plan_and_events_give_the_same_session(walk):
 @given(walk=walks())
 @settings(max_examples=200)
 def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
-    kept, open_take, begun, discarded, asked, left_out = {}, None, set(), set(), {}, set()
+    kept_takes, open_take, started, discarded, mounted, left_out = {}, None, set(), set(), {}, set()
     for _, _, state, commands in steps(*walk):
         for command in commands:
             match command:
                 case StartTake(trial, take):
                     assert open_take is None
-                    assert (trial, take - 1) in begun or take == 1
-                    assert (trial, take) not in begun
-                    begun.add((trial, take))
+                    assert (trial, take - 1) in started or take == 1
+                    assert (trial, take) not in started
+                    started.add((trial, take))
                     open_take = (trial, take)
                 case KeepTake(trial, take):
                     assert open_take == (trial, take)
-                    assert trial not in kept
-                    kept[trial], open_take = take, None
+                    assert trial not in kept_takes
+                    kept_takes[trial], open_take = take, None
                 case DiscardTake(trial, take):
-                    assert (trial, take) == open_take or kept.pop(trial) == take
+                    assert (trial, take) == open_take or kept_takes.pop(trial) == take
                     discarded.add((trial, take))
                     open_take = None
                 case RestoreTake(trial, take):
@@ -64,15 +64,15 @@ def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
                     assert (trial, take) in discarded
                     open_take = (trial, take)
                 case AskMount(trial):
-                    asked.setdefault(trial.number)
+                    mounted.setdefault(trial.number)
                 case LeaveOut(trial):
                     left_out.add(trial)
         if isinstance(state, Closing):
             assert open_take is None
-    reached = max(asked, default=0)
-    assert set(range(1, reached + 1)) <= {*asked, *left_out}
-    first_asked = [number for number in asked if number not in left_out]
-    assert first_asked == sorted(first_asked)
+    reached = max(mounted, default=0)
+    assert set(range(1, reached + 1)) <= {*mounted, *left_out}
+    in_order = [number for number in mounted if number not in left_out]
+    assert in_order == sorted(in_order)
 
 
 @given(walk=walks())
@@ -84,7 +84,7 @@ def test_every_walk_can_be_completed_and_can_be_aborted(walk):
     for _ in range(100):
         if isinstance(state, Ended):
             break
-        state, _ = advance(state, meant(state))
+        state, _ = advance(state, next_event(state))
     assert isinstance(state, Ended)
 
 
@@ -101,10 +101,10 @@ def test_a_redo_that_is_undone_leaves_every_trial_as_it_was(walk):
         if isinstance(before, Taring | Ready):
             assert before.place.before_redo is not None
             before = before.place.before_redo
-        counted = {number: trial.take for number, trial in enumerate(before.place.progress) if trial.kept}
+        kept_takes = {number: trial.take for number, trial in enumerate(before.place.progress) if trial.kept}
         if isinstance(before, Settling):
-            counted[before.place.index] = before.place.take
-        assert {n: trial.take for n, trial in enumerate(after.place.progress) if trial.kept} == counted
+            kept_takes[before.place.index] = before.place.take
+        assert {n: trial.take for n, trial in enumerate(after.place.progress) if trial.kept} == kept_takes
         assert all(a.takes >= b.takes for a, b in zip(after.place.progress, state.place.progress, strict=True))
         if not isinstance(before, Settling):
             assert (type(after), after.place.index) == (type(before), before.place.index)

@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_form import times, trapezium
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_strokes import times, trapezium
 
 from sessions.strokes.contacts import Baseline, ContactDetector, Lift, Onset, onset_threshold
 from sessions.strokes.settings import DetectorSettings
@@ -17,8 +17,8 @@ def noisy(force, sd=0.004, seed=0):
 
 
 T = times(4.0)
-PRESSED = trapezium(T, 1.0, 3.0, 0.2, 2.0)  # rises by 10 N/s: 12 mN after 1.2 ms
-FORCE = noisy(PRESSED)
+PRESS = trapezium(T, 1.0, 3.0, 0.2, 2.0)  # rises by 10 N/s: 12 mN after 1.2 ms
+FORCE = noisy(PRESS)
 EVENTS = ContactDetector().feed(T, FORCE)
 
 
@@ -28,7 +28,7 @@ def test_a_press_is_one_onset_and_one_lift():
 
 def test_onset_lies_within_two_readings_of_where_the_force_leaves_three_standard_deviations():
     for seed in range(200):
-        onset = ContactDetector().feed(T, noisy(PRESSED, seed=seed))[0]
+        onset = ContactDetector().feed(T, noisy(PRESS, seed=seed))[0]
         assert abs(onset.time - 1.0012) <= 2 / 200
 
 
@@ -46,11 +46,11 @@ def test_an_event_is_noticed_once_it_has_held():
 @settings(max_examples=40, deadline=None)
 @given(cuts=st.lists(st.integers(0, len(T)), max_size=12).map(sorted))
 def test_events_do_not_depend_on_how_the_readings_were_cut(cuts):
-    detector, told = ContactDetector(), []
+    detector, events = ContactDetector(), []
     edges = [0, *cuts, len(T)]
     for a, b in pairwise(edges):
-        told += detector.feed(T[a:b], FORCE[a:b])
-    assert tuple(told) == EVENTS
+        events += detector.feed(T[a:b], FORCE[a:b])
+    assert tuple(events) == EVENTS
 
 
 def test_the_zero_is_the_unloaded_force_whatever_it_is():
@@ -62,11 +62,11 @@ def test_the_threshold_lies_above_the_measured_noise():
     assert onset_threshold(0.1, DetectorSettings()) == pytest.approx(0.5)
     rough = noisy(np.zeros_like(T), sd=0.1)
     assert ContactDetector().feed(T, rough) == ()
-    assert [type(e) for e in ContactDetector().feed(T, noisy(PRESSED, sd=0.1))] == [Onset, Lift]
+    assert [type(e) for e in ContactDetector().feed(T, noisy(PRESS, sd=0.1))] == [Onset, Lift]
 
 
 def test_a_force_that_dips_between_the_thresholds_is_one_contact():
-    force = PRESSED.copy()
+    force = PRESS.copy()
     force[(T > 1.8) & (T < 2.0)] = 0.04  # below the onset threshold, above the lift threshold
     assert [type(event) for event in ContactDetector().feed(T, noisy(force, sd=0.001))] == [Onset, Lift]
 
@@ -97,23 +97,23 @@ def test_nothing_is_detected_before_an_unloaded_stretch_was_seen():
 
 
 def test_a_zero_taken_in_contact_is_taken_anew_once_the_finger_has_left():
-    held = np.where(T < 1.0, 1.5, 0.0) + trapezium(T, 2.0, 3.0, 0.1, 2.0)
-    events = ContactDetector().feed(T, noisy(held))
+    sticking = np.where(T < 1.0, 1.5, 0.0) + trapezium(T, 2.0, 3.0, 0.1, 2.0)
+    events = ContactDetector().feed(T, noisy(sticking))
     assert [type(event) for event in events] == [Onset, Lift]
     assert events[0].time == pytest.approx(2.0, abs=0.01)
 
 
 def test_a_baseline_given_is_used_from_the_first_reading_on():
-    held = np.where(T < 1.0, 1.5, 0.0)
-    events = ContactDetector(baseline=Baseline(0.0, 0.004)).feed(T, noisy(held))
+    sticking = np.where(T < 1.0, 1.5, 0.0)
+    events = ContactDetector(baseline=Baseline(0.0, 0.004)).feed(T, noisy(sticking))
     assert [type(event) for event in events] == [Onset, Lift]
     assert events[0].time == 0.0
 
 
 def test_readings_lost_in_the_middle_of_a_press_change_nothing_else():
-    kept = np.ones(len(T), bool)
-    kept[400:460] = False
-    assert ContactDetector().feed(T[kept], FORCE[kept]) == EVENTS
+    arrived = np.ones(len(T), bool)
+    arrived[400:460] = False
+    assert ContactDetector().feed(T[arrived], FORCE[arrived]) == EVENTS
 
 
 def test_it_tells_whether_something_touches():

@@ -16,9 +16,9 @@ def test_a_shuffled_order_holds_every_stimulus_once(seed, name):
     assert sorted(shuffle(STIMULI, seed, name)) == list(STIMULI)
 
 
-@given(seed=st.integers(0, 2**31 - 1), given=st.permutations(STIMULI))
-def test_the_order_depends_on_seed_and_name_alone_not_on_how_the_stimuli_were_listed(seed, given):
-    assert shuffle(given, seed, "stickiness") == shuffle(STIMULI, seed, "stickiness")
+@given(seed=st.integers(0, 2**31 - 1), listed=st.permutations(STIMULI))
+def test_the_order_depends_on_seed_and_name_alone_not_on_how_the_stimuli_were_listed(seed, listed):
+    assert shuffle(listed, seed, "stickiness") == shuffle(STIMULI, seed, "stickiness")
 
 
 def test_blocks_of_one_session_are_shuffled_apart():
@@ -95,9 +95,9 @@ def test_an_order_that_is_to_meet_a_constraint_meets_it_and_one_that_does_at_onc
 
 def test_all_fourteen_orders_of_five_without_neighbours_come_about_equally_often():
     # 14 is the fifth number of Hertzsprung's problem (OEIS A002464).
-    counted = Counter(draw(STIMULI, seed, "b", apart) for seed in range(1400))
-    assert len(counted) == 14
-    assert all(abs(count - 100) < 50 for count in counted.values())  # five standard deviations of a binomial count
+    counts = Counter(draw(STIMULI, seed, "b", apart) for seed in range(1400))
+    assert len(counts) == 14
+    assert all(abs(count - 100) < 50 for count in counts.values())  # five standard deviations of a binomial count
 
 
 def test_a_constraint_that_no_order_meets_gives_none():
@@ -109,9 +109,9 @@ def test_a_constraint_that_no_order_meets_gives_none():
 
 @given(seed=st.integers(0, 2**31 - 1), count=st.integers(2, 9))
 def test_every_two_are_compared_once_and_each_is_first_as_often_as_second(seed, count):
-    made = pairs(range(count), seed, "b")
-    assert sorted(tuple(sorted(pair)) for pair in made) == [(a, b) for a in range(count) for b in range(a + 1, count)]
-    first = Counter(a for a, _ in made)
+    order = pairs(range(count), seed, "b")
+    assert sorted(tuple(sorted(pair)) for pair in order) == [(a, b) for a in range(count) for b in range(a + 1, count)]
+    first = Counter(a for a, _ in order)
     assert all(abs(2 * first[item] - (count - 1)) <= (count % 2 == 0) for item in range(count))
 
 

@@ -28,18 +28,18 @@ class Elements(HTMLParser):
         self.names, self.ids, self.policy = [], [], None
 
     def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
+        attributes = dict(attrs)
         self.names.append(tag)
-        self.ids += [given["id"]] if "id" in given else []
-        if given.get("http-equiv") == "Content-Security-Policy":
-            self.policy = given["content"]
+        self.ids += [attributes["id"]] if "id" in attributes else []
+        if attributes.get("http-equiv") == "Content-Security-Policy":
+            self.policy = attributes["content"]
 
 
-def read(text):
+def elements_of(text):
     """Return the elements of a page."""
-    found = Elements()
-    found.feed(text)
-    return found
+    elements = Elements()
+    elements.feed(text)
+    return elements
 
 
 def hostile(report):
@@ -65,10 +65,10 @@ def drawings(report):
 
 
 def test_a_protocol_named_like_a_script_brings_no_element_into_the_page(report, drawings):
-    found = read(page(report, drawings))
-    assert "script" not in found.names
-    assert len(found.ids) == len(set(found.ids))
-    assert all(re.fullmatch(r"[\w.:-]+", name) for name in found.ids)
+    elements = elements_of(page(report, drawings))
+    assert "script" not in elements.names
+    assert len(elements.ids) == len(set(elements.ids))
+    assert all(re.fullmatch(r"[\w.:-]+", name) for name in elements.ids)
 
 
 def test_every_picture_of_such_a_page_is_valid_xml(report, drawings):
@@ -81,22 +81,22 @@ def test_every_picture_of_such_a_page_is_valid_xml(report, drawings):
 
 def test_a_name_with_control_characters_and_dollar_signs_still_makes_a_picture_that_xml_allows():
     with look():
-        drawn = sheet(200, 100)
-        drawn.axes[0].set_title("a $\\frac$")
-        ET.fromstring(svg(drawn, "a\x01b", "a\x01b"))
+        figure = sheet(200, 100)
+        figure.axes[0].set_title("a $\\frac$")
+        ET.fromstring(svg(figure, "a\x01b", "a\x01b"))
 
 
 def test_different_names_have_different_identifiers():
     with look():
-        one, other = (svg(sheet(100, 50), name, name) for name in ("a b", "a_b"))
-    assert not set(re.findall(r'\bid="([^"]+)"', one)) & set(re.findall(r'\bid="([^"]+)"', other))
+        first, second = (svg(sheet(100, 50), name, name) for name in ("a b", "a_b"))
+    assert not set(re.findall(r'\bid="([^"]+)"', first)) & set(re.findall(r'\bid="([^"]+)"', second))
 
 
 @pytest.mark.parametrize(
     "text", [lambda: page(bare()), lambda: study_page(study(), "example")], ids=["report", "study"]
 )
 def test_every_page_forbids_scripts_and_asks_no_network(text):
-    policy = read(text()).policy
+    policy = elements_of(text()).policy
     assert policy is not None
     assert "default-src 'none'" in policy
     assert "script-src" not in policy

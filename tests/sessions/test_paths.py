@@ -38,22 +38,22 @@ def analysis(recording):
 
 
 @pytest.fixture(scope="module")
-def predicted(recording, analysis):
+def prediction(recording, analysis):
     return predict(analysis, recording.plan, STEADY)
 
 
 @pytest.fixture(scope="module")
-def along(recording, predicted):
-    return trial_paths(recording, predicted)
+def seds_along(recording, prediction):
+    return trial_paths(recording, prediction)
 
 
-def test_the_usual_path_comes_to_what_is_predicted_without_any_others(predicted, along):
-    for row in predicted.trials:
+def test_the_usual_path_comes_to_what_is_predicted_without_any_others(prediction, seds_along):
+    for row in prediction.trials:
         (usual,) = [n for n, path in enumerate(SMALL) if path.usual(row.mu_rule, "small")]
-        assert along[row.trial][usual] == pytest.approx(row.sed, rel=1e-9)
+        assert seds_along[row.trial][usual] == pytest.approx(row.sed, rel=1e-9)
 
 
-def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recording, analysis, along):
+def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recording, analysis, seds_along):
     trial = 1
     scene = scenes_of(analysis, recording.plan, STEADY)[trial]
     mu = scene.friction.mu
@@ -69,16 +69,16 @@ def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recordin
                 if (path.filter, path.window, path.mu) == (first, SMALL[0].window, "maximum")
                 and (path.area, path.receptor) == (area, receptor)
             ]
-            assert along[trial][n] == pytest.approx(value, rel=1e-9), (mu, area)
+            assert seds_along[trial][n] == pytest.approx(value, rel=1e-9), (mu, area)
 
 
-def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysis, along):
+def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysis, seds_along):
     (deepest, scene), trial = scenes_of(analysis, recording.plan, STEADY).values(), 2  # slipperiness: the mean
     mus = [
         next(
-            one.mu_dynamic
-            for one in analyse(recording, AnalysisSettings(steady=SteadySettings(steady_rule=rule))).strokes
-            if one.trial == 2
+            stroke.mu_dynamic
+            for stroke in analyse(recording, AnalysisSettings(steady=SteadySettings(steady_rule=rule))).strokes
+            if stroke.trial == 2
         )
         for rule in WINDOWS.values()
     ]
@@ -86,23 +86,23 @@ def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysi
     alone = settled_predictions([deepest, *(replace(scene, friction=replace(scene.friction, mu=mu)) for mu in mus)])[1:]
     for window, answer in zip(WINDOWS, alone, strict=True):
         (n,) = [n for n, path in enumerate(SMALL) if path == replace(SMALL[0], window=window)]
-        assert along[trial][n] == pytest.approx(answer.sed_ending, rel=1e-9)
+        assert seds_along[trial][n] == pytest.approx(answer.sed_ending, rel=1e-9)
 
 
-def test_paths_of_another_quantity_come_to_what_the_model_predicts_of_it(recording, predicted):
+def test_paths_of_another_quantity_come_to_what_the_model_predicts_of_it(recording, prediction):
     quantity = BY_NAME["shear_along_skin"]
-    sheared = trial_paths(recording, predicted, quantity=quantity)
-    for row in predicted.trials:
+    sheared = trial_paths(recording, prediction, quantity=quantity)
+    for row in prediction.trials:
         (usual,) = [n for n, path in enumerate(SMALL) if path.usual(row.mu_rule, "small")]
         assert sheared[row.trial][usual] == pytest.approx(row.responses[quantity.name].value, rel=1e-9)
 
 
-def test_finite_strain_is_left_out_unless_it_is_asked_for(along):
-    assert {len(seds) for seds in along.values()} == {len(SMALL)}
+def test_finite_strain_is_left_out_unless_it_is_asked_for(seds_along):
+    assert {len(seds) for seds in seds_along.values()} == {len(SMALL)}
     assert len(PATHS) > len(SMALL)
 
 
-def planted():
+def turning_paths():
     """Three subjects, four surfaces: SED goes with the score, but at the ending's middle it goes against it."""
     trials = []
     for subject in ("A", "B", "C"):
@@ -114,25 +114,25 @@ def planted():
 
 
 def test_the_choice_that_turns_the_correlation_is_seen_and_the_others_are_not():
-    medians = {(choice, name): of.median for choice, name, of, _ in by_choice(planted())}
+    medians = {(choice, name): of.median for choice, name, of, _ in by_choice(turning_paths())}
     assert medians["receptor", "ending"] == pytest.approx(1.0)
     assert medians["receptor", "its middle"] == pytest.approx(-1.0)
     assert all(abs(m) < 1e-9 for (choice, _), m in medians.items() if choice not in ("receptor",))
 
 
 def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
-    found = planted()
-    (usual,) = [one for one in found if one.usual]
+    findings = turning_paths()
+    (usual,) = [finding for finding in findings if finding.usual]
     assert usual.path.mu == "maximum"
     assert usual.r == pytest.approx(1.0)
-    whole = spread(correlations(found))
+    whole = spread(correlations(findings))
     assert (whole.paths, whole.correlated, whole.least, whole.greatest) == (len(SMALL), len(SMALL), -1.0, 1.0)
     assert whole.distinct == 2  # of so many paths, one result for each receptor
 
 
 def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted():
     trials = [PathTrial("A", i, float(i), "maximum", (8.0 + i, *(None for _ in SMALL[1:]))) for i in (0, 20, 50)]
-    found = path_findings(trials, "small", within=False)
-    assert [one.surfaces for one in found[:2]] == [3, 0]
-    whole = spread(correlations(found))
+    findings = path_findings(trials, "small", within=False)
+    assert [finding.surfaces for finding in findings[:2]] == [3, 0]
+    whole = spread(correlations(findings))
     assert (whole.paths, whole.correlated) == (len(SMALL), 1)

@@ -34,78 +34,78 @@ def test_a_visit_survives_its_way_through_plain_data():
 
 def test_a_study_says_what_to_type_for_its_numbers():
     model = PredictionOptions("as-printed", course="steady", kinematics="finite", intervals=True)
-    asked = VisitOptions(model, AreaLaw("hertz", HERTZ, 1.234567891), "finite", 0.003)
+    visit_options = VisitOptions(model, AreaLaw("hertz", HERTZ, 1.234567891), "finite", 0.003)
     options = "--kinematics finite --tau as-printed --area hertz --area-force 1.234567891 --calibration-error 0.3"
-    named = f"daq-app study 'my study' {options} --intervals --paths finite"
-    assert command(pool_visits(VISITS, options=asked), "my study") == named
-    planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "seed": 21}
-    assert command(pool_visits(VISITS, planted=planted), "syn") == "daq-app study --synthetic 21 --out syn"
+    expected = f"daq-app study 'my study' {options} --intervals --paths finite"
+    assert command(pool_visits(VISITS, options=visit_options), "my study") == expected
+    truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "seed": 21}
+    assert command(pool_visits(VISITS, planted=truth), "syn") == "daq-app study --synthetic 21 --out syn"
 
 
 def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
-    planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
-    found = {one.effect: one for one in pool_visits(VISITS, planted=planted).effects}
-    assert set(found) == {INDEX, FRICTION, DRIFT, CARRY_OVER}
-    assert found[INDEX].estimate == pytest.approx(0.8, abs=0.05)
-    assert found[INDEX].covered
+    truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
+    effects = {effect.effect: effect for effect in pool_visits(VISITS, planted=truth).effects}
+    assert set(effects) == {INDEX, FRICTION, DRIFT, CARRY_OVER}
+    assert effects[INDEX].estimate == pytest.approx(0.8, abs=0.05)
+    assert effects[INDEX].covered
 
 
 def test_the_planted_relation_of_people_at_large_stands_beside_the_intervals_for_them():
     score = {"gain": 0.0, "drift": 0.0, "carry_over": 0.0}
-    planted = {"score": score, "strokes": [], "relation": {"stickiness": {"r": 0.9, "slope": 60.0}}}
-    study = pool_visits(VISITS, planted=planted)
-    found = {one.effect: one for one in study.effects}
-    of = study.descriptors[0]
-    assert (found[WITHIN].planted, found[WITHIN].low, found[WITHIN].high) == (0.9, *of.repeated.people)
-    assert (found[SED_TERM].planted, found[SED_TERM].low) == (60.0, of.on_response.term(SED_TERM).low)
+    truth = {"score": score, "strokes": [], "relation": {"stickiness": {"r": 0.9, "slope": 60.0}}}
+    findings = pool_visits(VISITS, planted=truth)
+    effects = {effect.effect: effect for effect in findings.effects}
+    finding = findings.descriptors[0]
+    assert (effects[WITHIN].planted, effects[WITHIN].low, effects[WITHIN].high) == (0.9, *finding.repeated.people)
+    assert (effects[SED_TERM].planted, effects[SED_TERM].low) == (60.0, finding.on_response.term(SED_TERM).low)
 
 
 def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
     out = (Exclusion("S03", "asked to", "the experimenter"),)
-    with_it, without = pool_visits(VISITS, exclusions=out), pool_visits([v for v in VISITS if v.subject != "S03"])
-    assert with_it.descriptors == without.descriptors
-    assert len(with_it.visits) == 10
-    assert "asked to" in study_page(with_it, "x")
+    findings, without = pool_visits(VISITS, exclusions=out), pool_visits([v for v in VISITS if v.subject != "S03"])
+    assert findings.descriptors == without.descriptors
+    assert len(findings.visits) == 10
+    assert "asked to" in study_page(findings, "x")
 
 
 def test_the_same_recording_in_two_folders_counts_once_and_is_named():
     first, again = replace(VISITS[0], sha256="a" * 64), replace(VISITS[0], session="S01-backup", sha256="a" * 64)
-    found = pool_visits([*VISITS[1:], again, first])
-    assert found.descriptors == pool_visits([*VISITS[1:], first]).descriptors
-    assert "Session S01-backup holds the same recording as S01" in study_page(found, "x")
-    assert trials_csv(found).count("the same recording as S01") == 5
+    findings = pool_visits([*VISITS[1:], again, first])
+    assert findings.descriptors == pool_visits([*VISITS[1:], first]).descriptors
+    assert "Session S01-backup holds the same recording as S01" in study_page(findings, "x")
+    assert trials_csv(findings).count("the same recording as S01") == 5
 
 
 def test_scores_that_fall_with_the_index_are_doubted_and_kept():
-    found = pool_visits([*VISITS[:9], visit(10, gain=-0.8)])
-    assert [(subject, descriptor) for subject, descriptor, _ in found.reversed] == [("S10", "stickiness")]
-    assert found.descriptors[0].scores[0].n == 10
+    findings = pool_visits([*VISITS[:9], visit(10, gain=-0.8)])
+    assert [(subject, descriptor) for subject, descriptor, _ in findings.reversed] == [("S10", "stickiness")]
+    assert findings.descriptors[0].scores[0].n == 10
 
 
 def test_visits_that_only_scored_give_means_and_no_relation():
-    found = pool_visits([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
-    assert found.mean_relation is None
-    assert found.repeated is None
-    assert "three subjects with scores and strokes of their own" in found.on_response
-    assert [mean.n for mean in found.scores] == [4] * 5
+    finding = pool_visits([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
+    assert finding.mean_relation is None
+    assert finding.repeated is None
+    assert "three subjects with scores and strokes of their own" in finding.on_response
+    assert [mean.n for mean in finding.scores] == [4] * 5
 
 
 def test_choices_of_one_of_two_stand_in_the_table_and_are_told_to_count_for_no_mean():
-    compared = visit(2)
-    rows = tuple(replace(row, outcome="chosen", score=None, choice="first") for row in compared.rows)
-    found = pool_visits([visit(1), replace(compared, rows=rows)])
-    assert [one for one in remarks(found) if "S02" in one and f"{len(rows)} choices of one of two" in one]
-    table = list(csv.DictReader(io.StringIO(trials_csv(found))))
+    chooser = visit(2)
+    rows = tuple(replace(row, outcome="chosen", score=None, choice="first") for row in chooser.rows)
+    findings = pool_visits([visit(1), replace(chooser, rows=rows)])
+    assert [r for r in remarks(findings) if "S02" in r and f"{len(rows)} choices of one of two" in r]
+    table = list(csv.DictReader(io.StringIO(trials_csv(findings))))
     assert {row["choice"] for row in table if row["session"] == "S02"} == {"first"}
 
 
 def test_who_missed_a_surface_does_not_make_it_look_scored_low():
     level = {"S01": 10.0, "S02": 50.0, "S03": 90.0}
-    made = [visit(number, gain=0.0, noise=0.0) for number in (1, 2, 3)]
-    flat = [replace(one, rows=tuple(replace(row, score=level[one.subject]) for row in one.rows)) for one in made]
+    visits = [visit(number, gain=0.0, noise=0.0) for number in (1, 2, 3)]
+    flat = [replace(v, rows=tuple(replace(row, score=level[v.subject]) for row in v.rows)) for v in visits]
     flat[2] = replace(flat[2], rows=flat[2].rows[1:])
-    (found,) = pool_visits(flat).descriptors
-    assert found.mean_relation.pearson is None  # nothing within anybody varies
+    (finding,) = pool_visits(flat).descriptors
+    assert finding.mean_relation.pearson is None  # nothing within anybody varies
 
 
 def test_repeats_of_one_subject_are_averaged_and_make_no_subjects():
@@ -138,10 +138,10 @@ def test_decisions_are_read_from_their_file_and_a_wrong_one_is_named(tmp_path):
 
 
 def test_a_decision_that_fits_no_trial_is_told_as_such():
-    out = (Exclusion("S99", "ill", "E1"), Exclusion("S01", "bad", "E1", "sticky"), Exclusion("S02", "ill", "E1"))
-    found = pool_visits(VISITS[:3], exclusions=out)
-    assert [sentence.split(":")[0] for sentence in exclusion_sentences(found)] == ["Subject S02"]
-    assert [sentence.split("(")[0] for sentence in remarks(found)] == [
+    exclusions = (Exclusion("S99", "ill", "E1"), Exclusion("S01", "bad", "E1", "sticky"), Exclusion("S02", "ill", "E1"))
+    findings = pool_visits(VISITS[:3], exclusions=exclusions)
+    assert [sentence.split(":")[0] for sentence in exclusion_sentences(findings)] == ["Subject S02"]
+    assert [sentence.split("(")[0] for sentence in remarks(findings)] == [
         "A decision of E1 leaves out every trial of subject S99 ",
         "A decision of E1 leaves out trials on sticky of subject S01 ",
     ]
@@ -149,49 +149,49 @@ def test_a_decision_that_fits_no_trial_is_told_as_such():
 
 def test_scores_that_are_all_the_same_leave_a_reason_and_no_model():
     flat = [replace(v, rows=tuple(replace(row, score=50.0) for row in v.rows)) for v in VISITS]
-    found = pool_visits(flat)
-    assert "nothing to tell an error from" in found.descriptors[0].on_index
-    page = study_page(found, "x")
+    findings = pool_visits(flat)
+    assert "nothing to tell an error from" in findings.descriptors[0].on_index
+    page = study_page(findings, "x")
     assert "No mixed model of stickiness on SED, stickiness on index" in page
 
 
 def test_means_that_are_related_are_those_of_subjects_with_both():
     # The one subject whose stroke gives no SED scores far off: it must not move the other half of the comparison.
     odd = replace(VISITS[0], rows=tuple(replace(row, sed=None, score=99.0 - 0.9 * row.index) for row in VISITS[0].rows))
-    related = pool_visits([odd, *VISITS[1:]]).descriptors[0].mean_relation
+    relation = pool_visits([odd, *VISITS[1:]]).descriptors[0].mean_relation
     without = pool_visits(VISITS[1:]).descriptors[0].mean_relation
-    assert related.pearson == pytest.approx(without.pearson, rel=1e-12)
+    assert relation.pearson == pytest.approx(without.pearson, rel=1e-12)
 
 
 def test_scores_stand_raw_and_standardised_side_by_side():
-    found = pool_visits([*VISITS[:9], visit(10, gain=0.2)]).descriptors[0]
+    finding = pool_visits([*VISITS[:9], visit(10, gain=0.2)]).descriptors[0]
     # The tenth subject uses a quarter of the scale: standardised it agrees with the others.
-    spread = [found.normalised.means[index].sd for index in (0, 100)]
+    spread = [finding.normalised.means[index].sd for index in (0, 100)]
     assert all(sd < 0.15 for sd in spread)
-    assert [mean.sd for mean in found.scores if mean.index in (0, 100)] > [10.0, 10.0]
-    assert found.normalised.repeated.r > found.repeated.r
+    assert [mean.sd for mean in finding.scores if mean.index in (0, 100)] > [10.0, 10.0]
+    assert finding.normalised.repeated.r > finding.repeated.r
 
 
 def test_leaving_out_the_one_subject_who_differs_raises_the_correlation_most():
-    found = pool_visits([*VISITS[:9], visit(10, gain=-0.8)]).descriptors[0]
-    assert max(found.without_subject, key=lambda one: one[1])[0] == "S10"
-    assert len(found.without_subject) == 10
+    finding = pool_visits([*VISITS[:9], visit(10, gain=-0.8)]).descriptors[0]
+    assert max(finding.without_subject, key=lambda pair: pair[1])[0] == "S10"
+    assert len(finding.without_subject) == 10
 
 
 def test_magnitude_estimates_of_any_modulus_come_to_the_same_means_at_one_modulus():
-    def estimated(number, modulus):
-        made = visit(number)
-        rows = [replace(row, score=None, estimate=modulus * 2.0 ** (row.index / 50)) for row in made.rows]
-        return replace(made, rows=tuple(rows))
+    def estimate_visit(number, modulus):
+        scored = visit(number)
+        rows = [replace(row, score=None, estimate=modulus * 2.0 ** (row.index / 50)) for row in scored.rows]
+        return replace(scored, rows=tuple(rows))
 
-    found = pool_visits([estimated(1, 1.0), estimated(2, 100.0), estimated(3, 10.0)]).descriptors[0]
-    means = found.estimates.equal_moduli
+    finding = pool_visits([estimate_visit(1, 1.0), estimate_visit(2, 100.0), estimate_visit(3, 10.0)]).descriptors[0]
+    means = finding.estimates.equal_moduli
     assert [np.exp(means[i].mean) for i in (0, 50, 100)] == pytest.approx([10.0, 20.0, 40.0])
     assert all(mean.sd == pytest.approx(0.0, abs=1e-9) for mean in means.values())
-    assert found.estimates.geometric[0].sd > 2.0  # of the logarithms, as they were given
-    assert found.estimates.repeated.r > 0.9
-    none = replace(VISITS[3], rows=tuple(replace(r, score=None, estimate=0.0) for r in VISITS[3].rows))
-    assert pool_visits([estimated(1, 1.0), none]).descriptors[0].estimates.left_out == ("S04",)
+    assert finding.estimates.geometric[0].sd > 2.0  # of the logarithms, as they were given
+    assert finding.estimates.repeated.r > 0.9
+    zero_visit = replace(VISITS[3], rows=tuple(replace(r, score=None, estimate=0.0) for r in VISITS[3].rows))
+    assert pool_visits([estimate_visit(1, 1.0), zero_visit]).descriptors[0].estimates.left_out == ("S04",)
 
 
 def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
@@ -201,36 +201,36 @@ def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
         "S03": {"reversed": True, "expected": "backwards"},
         "S99": {"expected": "damaged"},
     }
-    planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": spoilt}
-    made = [*VISITS[:2], visit(3, gain=-0.8)]
-    assert [flaw.detected for flaw in pool_visits(made, planted=planted).flaws] == [False, False, True, False]
-    lost = replace(
-        made[0], rows=tuple(replace(r, flaws=("lost_readings",)) if r.trial == 2 else r for r in made[0].rows)
+    truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": spoilt}
+    visits = [*VISITS[:2], visit(3, gain=-0.8)]
+    assert [flaw.detected for flaw in pool_visits(visits, planted=truth).flaws] == [False, False, True, False]
+    lossy = replace(
+        visits[0], rows=tuple(replace(r, flaws=("lost_readings",)) if r.trial == 2 else r for r in visits[0].rows)
     )
-    found = pool_visits([lost, *made[1:]], [("S99", "damaged")], planted=planted).flaws
-    assert [flaw.detected for flaw in found] == [True, False, True, True]
+    flaws = pool_visits([lossy, *visits[1:]], [("S99", "damaged")], planted=truth).flaws
+    assert [flaw.detected for flaw in flaws] == [True, False, True, True]
 
 
 def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
-    made = study()
-    told = " ".join(exclusion_sentences(made))
-    assert "Subject S03: every trial left out by E02: used the scale backwards" in told
-    kept = "Session S04: decision 1 by E02: stroke 1 of trial 2 is kept: it was good."
-    assert kept in remarks(made)
-    assert kept not in told
+    study_findings = study()
+    sentences = " ".join(exclusion_sentences(study_findings))
+    assert "Subject S03: every trial left out by E02: used the scale backwards" in sentences
+    decision_remark = "Session S04: decision 1 by E02: stroke 1 of trial 2 is kept: it was good."
+    assert decision_remark in remarks(study_findings)
+    assert decision_remark not in sentences
     rows = [replace(row, sed=None, why=f"No settled sliding at mu = 0.{row.trial}.") for row in VISITS[0].rows]
-    (one,) = exclusion_sentences(pool_visits([replace(VISITS[0], rows=tuple(rows))]))
-    assert one.startswith("The model gives no SED for 5 trials (S01 trial 1, S01 trial 2,")
-    assert one.endswith("of the first: No settled sliding at mu = 0.1.")
+    (sentence,) = exclusion_sentences(pool_visits([replace(VISITS[0], rows=tuple(rows))]))
+    assert sentence.startswith("The model gives no SED for 5 trials (S01 trial 1, S01 trial 2,")
+    assert sentence.endswith("of the first: No settled sliding at mu = 0.1.")
 
 
 def test_trials_that_the_session_did_not_come_to_are_not_done_and_nothing_was_excluded():
     rows = [replace(row, outcome="open", score=None, sed=None, why="The trial was not done.") for row in VISITS[0].rows]
-    found = pool_visits([replace(VISITS[0], rows=tuple(rows), complete=False), *VISITS[1:]])
-    assert exclusion_sentences(found) == []
-    told = remarks(found)
-    assert "Session S01 ended before its last trial; what it holds counts." in told
-    assert any(sentence.startswith("Not done: S01 trial 1, S01 trial 2") for sentence in told)
+    findings = pool_visits([replace(VISITS[0], rows=tuple(rows), complete=False), *VISITS[1:]])
+    assert exclusion_sentences(findings) == []
+    sentences = remarks(findings)
+    assert "Session S01 ended before its last trial; what it holds counts." in sentences
+    assert any(sentence.startswith("Not done: S01 trial 1, S01 trial 2") for sentence in sentences)
 
 
 SENSE = {"small": 1.0, "finite": -1.0}  # of the SED along a path
@@ -241,7 +241,7 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
     untried = summary(plain)[1]
     assert "at small strain go together by r = " in untried
     assert untried.endswith("at finite strain, which was not tried here, the sign may differ.")
-    turned = [
+    opposite_visits = [
         replace(
             v,
             rows=tuple(
@@ -251,9 +251,9 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
         )
         for v in VISITS[:4]
     ]
-    tried = summary(pool_visits(turned))[1]
-    assert f"at finite strain r = −{plain.descriptors[0].repeated.r:.2f}" in tried
-    assert "of the 20 trials that have one there" in tried
+    sentence = summary(pool_visits(opposite_visits))[1]
+    assert f"at finite strain r = −{plain.descriptors[0].repeated.r:.2f}" in sentence
+    assert "of the 20 trials that have one there" in sentence
 
 
 def test_a_study_of_one_subject_says_why_tables_are_missing():
@@ -270,8 +270,8 @@ def test_a_pair_of_surfaces_that_has_no_test_is_named():
         replace(v, rows=tuple(replace(r, score=float(r.index)) if r.index < 30 else r for r in v.rows))
         for v in VISITS[:4]
     ]
-    (said,) = missing_scores(pool_visits(alike))
-    assert said.startswith("No difference of surfaces 20 − 0 of stickiness: it takes three subjects who scored both")
+    (text,) = missing_scores(pool_visits(alike))
+    assert text.startswith("No difference of surfaces 20 − 0 of stickiness: it takes three subjects who scored both")
 
 
 def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that_a_study_finds():
@@ -282,16 +282,19 @@ def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that
 
     visits = [replace(visit, rows=tuple(map(with_shear, visit.rows))) for visit in VISITS]
     by_sed, by_shear = pool_visits(visits), pool_visits(visits, quantity=BY_NAME["shear_along_skin"])
-    for one, other in zip(by_sed.descriptors, by_shear.descriptors, strict=True):
-        assert other.repeated.r == pytest.approx(one.repeated.r)
-        assert other.mean_relation.pearson == pytest.approx(one.mean_relation.pearson)
-        slopes = one.on_response.term(SED_TERM).estimate, other.on_response.term("shear along the skin [1]").estimate
-        assert slopes[1] == pytest.approx(100.0 * slopes[0], rel=1e-6)  # points per kPa, and per unit of 10 / MPa
-        assert [s.response.mean for s in other.surfaces] == pytest.approx(
-            [10.0 * s.response.mean - 0.02 for s in one.surfaces]
+    for finding, shear in zip(by_sed.descriptors, by_shear.descriptors, strict=True):
+        assert shear.repeated.r == pytest.approx(finding.repeated.r)
+        assert shear.mean_relation.pearson == pytest.approx(finding.mean_relation.pearson)
+        slopes = (
+            finding.on_response.term(SED_TERM).estimate,
+            shear.on_response.term("shear along the skin [1]").estimate,
         )
-        assert other.rivals[0].name == "shear along the skin"
-        assert next(rival for rival in other.rivals if rival.name == "SED").contrast.difference == pytest.approx(
+        assert slopes[1] == pytest.approx(100.0 * slopes[0], rel=1e-6)  # points per kPa, and per unit of 10 / MPa
+        assert [s.response.mean for s in shear.surfaces] == pytest.approx(
+            [10.0 * s.response.mean - 0.02 for s in finding.surfaces]
+        )
+        assert shear.rivals[0].name == "shear along the skin"
+        assert next(rival for rival in shear.rivals if rival.name == "SED").contrast.difference == pytest.approx(
             0.0, abs=1e-9
         )
     page = study_page(by_shear, "made")
@@ -300,8 +303,8 @@ def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that
 
 
 def test_the_table_of_standardised_scores_has_the_scores_as_given_beside_them():
-    (shown,) = [one for one in study_tables(pool_visits(VISITS))["scores"] if one.name == "table-normalised"]
-    scores = np.array([[{row.index: row.score for row in one.rows}[index] for index in INDICES] for one in VISITS])
+    (shown,) = [table for table in study_tables(pool_visits(VISITS))["scores"] if table.name == "table-normalised"]
+    scores = np.array([[{row.index: row.score for row in visit.rows}[index] for index in INDICES] for visit in VISITS])
     standardised = (scores - scores.mean(axis=1, keepdims=True)) / scores.std(axis=1, ddof=1, keepdims=True)
     cells = [[float(row[n].text.replace("−", "-")) for n in (2, 5)] for row in shown.groups[0].rows]
     expected = np.column_stack([scores.mean(axis=0), standardised.mean(axis=0)])

@@ -16,15 +16,15 @@ def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_te
     mu = np.linspace(*FRICTION, 5)
     slope = PLAIN.effect / np.ptp(mu)
     error = PLAIN.noise / np.sqrt(np.sum((mu - mu.mean()) ** 2))
-    for one in power(PLAIN, (8, 16), (5,), 400, 1):
-        n = one.subjects
+    for design in power(PLAIN, (8, 16), (5,), 400, 1):
+        n = design.subjects
         closed = stats.nct.sf(stats.t.ppf(0.975, n - 1), n - 1, slope / error * np.sqrt(n))
-        assert one.share == pytest.approx(closed, abs=0.1)
+        assert design.share == pytest.approx(closed, abs=0.1)
 
 
 def test_where_nothing_is_planted_the_test_finds_something_in_about_five_of_a_hundred():
-    (found,) = power(PlantedEffects(effect=0.0), (10,), (5,), 600, 2)
-    assert 0.02 <= (found.detections + found.wrong) / found.studies <= 0.08
+    (design,) = power(PlantedEffects(effect=0.0), (10,), (5,), 600, 2)
+    assert 0.02 <= (design.detections + design.wrong) / design.studies <= 0.08
 
 
 def test_more_subjects_find_more_and_spread_people_less():
@@ -38,9 +38,9 @@ def test_the_verb_prints_a_table_and_refuses_nonsense(capsys, monkeypatch):
     monkeypatch.setattr("daq_app.cli.verbs.study.SUBJECTS", (4,))
     monkeypatch.setattr("daq_app.cli.verbs.study.SURFACES", (3,))
     assert run(["study", "--power", "effect=30", "--studies", "20", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["planted"]["effect"] == 30.0
-    assert [(one["subjects"], one["surfaces"]) for one in told["designs"]] == [(4, 3)]
+    document = json.loads(capsys.readouterr().out)
+    assert document["planted"]["effect"] == 30.0
+    assert [(design["subjects"], design["surfaces"]) for design in document["designs"]] == [(4, 3)]
     assert run(["study", "--power", "--studies", "20"]) == 0
     assert "assumed, not measured" in capsys.readouterr().out
     for wrong in (["effect"], ["effect=1000"], ["toe=1"], ["--studies", "2"], ["--seed", "-1"]):

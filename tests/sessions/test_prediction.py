@@ -32,42 +32,42 @@ def beginning(whole, count):
 
 
 @pytest.fixture(scope="module")
-def watched(tables):
+def progress_calls(tables):
     """The prediction, and what was told on the way to it when the seventh trial was wanted first."""
-    told = []
-    return predict(tables, PLAN, watch=lambda *one: told.append(one), first=6), told
+    calls = []
+    return predict(tables, PLAN, watch=lambda *call: calls.append(call), first=6), calls
 
 
 @pytest.fixture(scope="module")
-def predicted(watched):
-    return watched[0]
+def prediction(progress_calls):
+    return progress_calls[0]
 
 
-def test_the_trial_that_is_wanted_first_is_told_first_and_each_as_it_stays(watched):
-    found, told = watched
-    assert [number for number, _, _ in told] == [6, 0, 1, 2, 3, 4, 5, 7, 8, 9]
-    for number, row, _ in told:
-        assert row.to_dict() == found.trials[number].to_dict()
+def test_the_trial_that_is_wanted_first_is_told_first_and_each_as_it_stays(progress_calls):
+    prediction, calls = progress_calls
+    assert [number for number, _, _ in calls] == [6, 0, 1, 2, 3, 4, 5, 7, 8, 9]
+    for number, row, _ in calls:
+        assert row.to_dict() == prediction.trials[number].to_dict()
 
 
-def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(watched):
-    _, row, way = watched[1][0]
+def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(progress_calls):
+    _, row, way = progress_calls[1][0]
     instants = [way.march[at] for at in (5, 30, -1)]
-    pressed, dragged, last = stills(way.finger, instants, Sketch.of(way.finger.geometry.mesh, way.scene))
+    at_depth, sliding, last = stills(way.finger, instants, Sketch.of(way.finger.geometry.mesh, way.scene))
     history = row.history
-    for still, at in ((pressed, 5), (dragged, 30), (last, -1)):
+    for still, at in ((at_depth, 5), (sliding, 30), (last, -1)):
         assert still.sed == pytest.approx(history.sed_ending[at], rel=1e-9)
     settled, skin = row.picture()
     np.testing.assert_allclose(last.fields.nodes, settled.nodes, atol=1e-9)
     np.testing.assert_allclose(last.fields.sed, settled.sed, rtol=1e-6)
     assert last.skin.state == skin.state
     np.testing.assert_allclose(last.row, row.prediction.row.sed, rtol=1e-6)
-    lowest = pressed.fields.outlines["skin"][:, 1].min()
+    lowest = at_depth.fields.outlines["skin"][:, 1].min()
     assert lowest == pytest.approx(0.0, abs=0.01)  # the skin lies on the surface
 
 
-def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
-    _, _, way = watched[1][0]
+def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(progress_calls):
+    _, _, way = progress_calls[1][0]
     slippery = replace(way.scene, friction=Friction(3.0, None))
     instants, why = way_until(slippery, way.finger)
     assert why is not None
@@ -83,69 +83,69 @@ def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
     assert y <= nodes[:, 1].max()
 
 
-def test_every_trial_has_its_row_in_the_order_of_the_plan(predicted):
-    assert [row.trial for row in predicted.trials] == list(range(1, 11))
-    assert [row.stimulus.index for row in predicted.trials] == [0, 20, 50, 80, 100, 0, 20, 55, 75, 100]
-    assert [row.indentation for row in predicted.trials] == [2.0] * 5 + [1.5] * 5
-    assert all(row.sed > 0 and row.error_estimate < 0.01 for row in predicted.trials)
+def test_every_trial_has_its_row_in_the_order_of_the_plan(prediction):
+    assert [row.trial for row in prediction.trials] == list(range(1, 11))
+    assert [row.stimulus.index for row in prediction.trials] == [0, 20, 50, 80, 100, 0, 20, 55, 75, 100]
+    assert [row.indentation for row in prediction.trials] == [2.0] * 5 + [1.5] * 5
+    assert all(row.sed > 0 and row.error_estimate < 0.01 for row in prediction.trials)
 
 
-def test_the_paper_s_friction_gives_the_paper_s_finding(predicted):
-    seds = np.array([row.sed for row in predicted.trials])
-    index = np.array([row.stimulus.index for row in predicted.trials])
+def test_the_paper_s_friction_gives_the_paper_s_finding(prediction):
+    seds = np.array([row.sed for row in prediction.trials])
+    index = np.array([row.stimulus.index for row in prediction.trials])
     assert np.corrcoef(seds[:5], index[:5])[0, 1] >= 0.95
     assert np.corrcoef(seds[5:], index[5:])[0, 1] <= -0.85
     assert seds[7] < seds[8]  # 55 below 75
 
 
-def test_all_trials_share_one_mesh(predicted):
-    assert len({row.prediction.dofs for row in predicted.trials}) == 1
+def test_all_trials_share_one_mesh(prediction):
+    assert len({row.prediction.dofs for row in prediction.trials}) == 1
 
 
-def test_model_forces_are_those_per_mm_times_the_finger_s_width_which_is_marked_as_assumed(predicted):
-    assert (predicted.width, predicted.width_origin) == (15.0, "assumed")
-    for row in predicted.trials:
+def test_model_forces_are_those_per_mm_times_the_finger_s_width_which_is_marked_as_assumed(prediction):
+    assert (prediction.width, prediction.width_origin) == (15.0, "assumed")
+    for row in prediction.trials:
         assert row.normal_force == pytest.approx(15.0 * row.prediction.normal_force)
         assert row.tangential_force == pytest.approx(15.0 * row.prediction.tangential_force)
         assert row.measured_normal == MEASURED
 
 
-def test_at_the_matching_depth_the_model_presses_as_hard_as_the_finger_did(predicted):
-    for row in (predicted.trials[0], predicted.trials[9]):
+def test_at_the_matching_depth_the_model_presses_as_hard_as_the_finger_did(prediction):
+    for row in (prediction.trials[0], prediction.trials[9]):
         scene = row.prediction.scene
         deeper = replace(scene, loading=replace(scene.loading, indentation=row.matching_depth))
         assert solve(deeper).normal_force * 15.0 == pytest.approx(MEASURED, rel=0.01)
 
 
-def test_the_opposite_direction_is_predicted_at_the_same_depth(predicted):
-    row = predicted.trials[4]
+def test_the_opposite_direction_is_predicted_at_the_same_depth(prediction):
+    row = prediction.trials[4]
     scene = row.prediction.scene
     back = solve(replace(scene, loading=replace(scene.loading, slide="-x")))
     assert row.opposite_sed == pytest.approx(back.sed_ending, rel=row.opposite_error + back.error_estimate)
     assert row.opposite_sed != pytest.approx(row.sed, rel=0.05)
 
 
-def test_the_course_presses_a_second_then_slides_at_the_measured_speed(predicted):
-    row = predicted.trials[2]
+def test_the_course_presses_a_second_then_slides_at_the_measured_speed(prediction):
+    row = prediction.trials[2]
     late = row.history.time > 1.0
     assert np.allclose(row.history.bone_x[late], row.speed * (row.history.time[late] - 1.0))
     assert row.history.sed_ending[-1] == pytest.approx(row.sed)
 
 
 def test_the_bound_read_as_printed_is_a_named_choice_that_leaves_next_to_no_drag(tables):
-    found = predict(beginning(tables, 2), PLAN, PredictionOptions(tau_reading="as-printed", course="steady"))
-    assert found.trials[0].tau_max == pytest.approx(0.8033e-4)
-    assert max(row.tangential_per_mm for row in found.trials[:2]) < 0.0040
-    assert found.to_dict()["options"]["tau_reading"] == "as-printed"
+    prediction = predict(beginning(tables, 2), PLAN, PredictionOptions(tau_reading="as-printed", course="steady"))
+    assert prediction.trials[0].tau_max == pytest.approx(0.8033e-4)
+    assert max(row.tangential_per_mm for row in prediction.trials[:2]) < 0.0040
+    assert prediction.to_dict()["options"]["tau_reading"] == "as-printed"
 
 
 def test_another_finger_is_taken_from_a_scene(tables):
     other = Scene(finger=Finger(tip_radius=6.0, width=12.0), friction=Friction(0.1), loading=Loading(1.0))
-    found = predict(beginning(tables, 1), PLAN, PredictionOptions(scene=other, course="steady"))
-    assert (found.width, found.width_origin) == (12.0, "set")
-    assert found.trials[0].prediction.scene.finger.tip_radius == 6.0
-    assert found.trials[0].prediction.scene.loading.indentation == 2.0
-    assert found.trials[0].mu == 0.28
+    prediction = predict(beginning(tables, 1), PLAN, PredictionOptions(scene=other, course="steady"))
+    assert (prediction.width, prediction.width_origin) == (12.0, "set")
+    assert prediction.trials[0].prediction.scene.finger.tip_radius == 6.0
+    assert prediction.trials[0].prediction.scene.loading.indentation == 2.0
+    assert prediction.trials[0].mu == 0.28
 
 
 def test_what_the_stroke_does_not_tell_is_missing_with_its_reason(tables):
@@ -154,23 +154,23 @@ def test_what_the_stroke_does_not_tell_is_missing_with_its_reason(tables):
     strokes = list(tables.strokes)
     strokes[1] = stroke(2, flaws=("no_steady_sliding",))
     strokes[3] = stroke(4, normal_force=None)
-    found = predict(analysis(friction[:4], strokes[:4]), PLAN, PredictionOptions(course="steady"))
-    assert found.trials[1].sed is None
-    assert "no_steady_sliding" in found.trials[1].reasons["sed"]
-    assert found.trials[3].sed is not None
-    assert found.trials[3].matching_depth is None
-    assert "steady normal force" in found.trials[3].reasons["matching_depth"]
-    assert found.trials[4].reasons["sed"] == "No stroke was found in this trial."
-    json.dumps(found.to_dict(), allow_nan=False)
+    prediction = predict(analysis(friction[:4], strokes[:4]), PLAN, PredictionOptions(course="steady"))
+    assert prediction.trials[1].sed is None
+    assert "no_steady_sliding" in prediction.trials[1].reasons["sed"]
+    assert prediction.trials[3].sed is not None
+    assert prediction.trials[3].matching_depth is None
+    assert "steady normal force" in prediction.trials[3].reasons["matching_depth"]
+    assert prediction.trials[4].reasons["sed"] == "No stroke was found in this trial."
+    json.dumps(prediction.to_dict(), allow_nan=False)
 
 
 @pytest.mark.slow
 def test_a_surface_without_a_settled_slide_keeps_its_row_with_the_solver_s_sentence(tables):
     sticky = analysis([*tables.friction[:2], parameters(3, 5.0, 9e9, -1)], tables.strokes[:3])
-    found = predict(sticky, PLAN, PredictionOptions(course="steady"))
-    assert found.trials[1].sed is not None
-    assert found.trials[2].sed is None
-    assert "no steady sliding" in found.trials[2].reasons["sed"]
+    prediction = predict(sticky, PLAN, PredictionOptions(course="steady"))
+    assert prediction.trials[1].sed is not None
+    assert prediction.trials[2].sed is None
+    assert "no steady sliding" in prediction.trials[2].reasons["sed"]
 
 
 def test_a_force_that_would_press_the_model_to_its_bone_has_no_matching_depth(tables):
@@ -201,18 +201,18 @@ def test_a_visit_for_scores_only_predicts_nothing():
     assert predict(analysis([], []), replace(PLAN, forces=False)).trials == ()
 
 
-def test_it_is_plain_data_that_says_simulated_at_its_head(predicted):
-    told = predicted.to_dict()
-    assert next(iter(told)) == "simulated"
-    assert told["simulated"] == "SIMULATED"
-    assert json.loads(json.dumps(told, allow_nan=False)) == json.loads(json.dumps(told))
-    row = told["trials"][0]
+def test_it_is_plain_data_that_says_simulated_at_its_head(prediction):
+    document = prediction.to_dict()
+    assert next(iter(document)) == "simulated"
+    assert document["simulated"] == "SIMULATED"
+    assert json.loads(json.dumps(document, allow_nan=False)) == json.loads(json.dumps(document))
+    row = document["trials"][0]
     assert row["stimulus"] == {"descriptor": "stickiness", "index": 0, "code": "K1"}
     assert len(row["solver"]["time"]) == len(row["solver"]["history"]["sed_ending"])
 
 
-def test_a_picture_can_be_drawn_of_every_row(predicted):
-    fields, skin = predicted.trials[0].picture()
+def test_a_picture_can_be_drawn_of_every_row(prediction):
+    fields, skin = prediction.trials[0].picture()
     assert len(fields.sed) == len(fields.nodes)
     assert len(skin.pressure) == len(skin.state)
 

@@ -12,22 +12,22 @@ from sessions.toml_file import SettingsError
 PAPER = "sensotact-friction"
 
 
-def refused(tmp_path, name, was, written, named):
+def refusal(tmp_path, name, old, new, pattern):
     """Return what a built-in protocol with one text changed is refused with."""
     text = (FOLDER / f"{name}.toml").read_text()
-    assert was in text
+    assert old in text
     wrong = tmp_path / "wrong.toml"
-    wrong.write_text(text.replace(was, written))
-    with pytest.raises(SettingsError, match=named) as caught:
+    wrong.write_text(text.replace(old, new))
+    with pytest.raises(SettingsError, match=pattern) as caught_error:
         protocol(wrong)
-    return str(caught.value)
+    return str(caught_error.value)
 
 
 @pytest.mark.parametrize("name", protocol_names())
 def test_every_built_in_protocol_is_named_as_its_file_and_gives_a_plan(name):
-    made = plan(protocol(name), "S01", 1)
-    assert made.protocol == name
-    assert [trial.number for trial in made.trials] == list(range(1, len(made.trials) + 1))
+    session_plan = plan(protocol(name), "S01", 1)
+    assert session_plan.protocol == name
+    assert [trial.number for trial in session_plan.trials] == list(range(1, len(session_plan.trials) + 1))
 
 
 def test_the_papers_protocol_is_two_blocks_of_five_surfaces_with_their_direction_and_depth():
@@ -52,7 +52,7 @@ def test_a_stimulus_bears_the_same_label_whatever_the_order():
         {(t.stimulus.descriptor, t.stimulus.index): t.stimulus.code for t in plan(paper, "S01", seed).trials}
         for seed in range(5)
     ]
-    assert all(found == labels[0] for found in labels)
+    assert all(of_seed == labels[0] for of_seed in labels)
     assert len(set(labels[0].values())) == 10
 
 
@@ -60,21 +60,21 @@ def test_what_nobody_stated_is_marked_as_default_and_what_was_stated_is_not(tmp_
     plain = plan(protocol(PAPER), "S01", 1)
     assert (plain.contact_area, plain.contact_area_origin) == (100.0, "default")
     assert (plain.frame.height_origin, plain.frame.normal_origin) == ("default", "default")
-    stated = tmp_path / "ours.toml"
-    stated.write_text(
+    file = tmp_path / "ours.toml"
+    file.write_text(
         (FOLDER / f"{PAPER}.toml").read_text()
         + '\n[face]\nheight = 12.5\nheight_origin = "measured"\ncontact_area = 80\nnormal = "+z"\n'
     )
-    made = plan(protocol(stated), "S01", 1)
-    assert made.frame == Frame("+z", "set", 12.5, "measured")
-    assert (made.contact_area, made.contact_area_origin) == (80.0, "set")
+    session_plan = plan(protocol(file), "S01", 1)
+    assert session_plan.frame == Frame("+z", "set", 12.5, "measured")
+    assert (session_plan.contact_area, session_plan.contact_area_origin) == (80.0, "set")
 
 
 def test_a_frame_and_an_area_given_for_the_session_replace_the_protocols():
     setting = VisitSetting(frame=Frame(height=20.0, height_origin="set"), contact_area=90.0)
-    made = plan(protocol(PAPER), "S01", 1, setting=setting)
-    assert made.frame.height == 20.0
-    assert (made.contact_area, made.contact_area_origin) == (90.0, "set")
+    session_plan = plan(protocol(PAPER), "S01", 1, setting=setting)
+    assert session_plan.frame.height == 20.0
+    assert (session_plan.contact_area, session_plan.contact_area_origin) == (90.0, "set")
 
 
 @pytest.mark.parametrize("subject", ["", "Jane Doe", "../S01", "-S01", "x" * 33, "S\n01"])
@@ -94,7 +94,7 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
 
 
 @pytest.mark.parametrize(
-    ("was", "written", "named"),
+    ("old", "new", "pattern"),
     [
         ("indentation = 2.0", "indentation = 200.0", r"blocks\[0\].indentation = 200.0 .*up to 10 mm"),
         ("indices = [0, 20, 55, 75, 100]", "indices = [0, 0]", r"blocks\[1\].indices = \[0, 0\] .*twice"),
@@ -115,18 +115,18 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
         ("# duration = 60 ", "duration = 0.5", r"rests.duration = 0.5 .*between 1 and 3600 s"),
     ],
 )
-def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowed(tmp_path, was, written, named):
-    message = refused(tmp_path, PAPER, was, written, named)
+def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowed(tmp_path, old, new, pattern):
+    message = refusal(tmp_path, PAPER, old, new, pattern)
     assert message.startswith(f"{tmp_path / 'wrong.toml'}, line ")
     assert "\n" not in message
     if "no order of these" in message:
         return  # the constraint is in one place and the stimuli it shuts out in another
     line = int(message.removeprefix(f"{tmp_path / 'wrong.toml'}, line ").split(":")[0])
-    assert written in (tmp_path / "wrong.toml").read_text().splitlines()[line - 1]
+    assert new in (tmp_path / "wrong.toml").read_text().splitlines()[line - 1]
 
 
 @pytest.mark.parametrize(
-    ("name", "was", "written", "named"),
+    ("name", "old", "new", "pattern"),
     [
         (
             "magnitude-estimation",
@@ -172,15 +172,15 @@ def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowe
         ),
     ],
 )
-def test_what_does_not_go_together_is_refused_with_its_line(tmp_path, name, was, written, named):
-    assert ", line " in refused(tmp_path, name, was, written, named)
+def test_what_does_not_go_together_is_refused_with_its_line(tmp_path, name, old, new, pattern):
+    assert ", line " in refusal(tmp_path, name, old, new, pattern)
 
 
-def edited(tmp_path, *changes, name=PAPER):
+def edit_protocol(tmp_path, *changes, name=PAPER):
     text = (FOLDER / f"{name}.toml").read_text()
-    for was, written in changes:
-        assert was in text
-        text = text.replace(was, written)
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
     path = tmp_path / "ours.toml"
     path.write_text(text)
     return protocol(path)
@@ -191,14 +191,14 @@ def indices(block):
 
 
 def test_pre_evaluation_and_practice_are_blocks_of_their_own_before_what_they_are_for():
-    made = plan(protocol(PAPER), "S01", 1, phases=("main", "practice", "pre-evaluation"))
-    assert [block.phase for block in made.blocks] == ["pre-evaluation"] * 2 + ["practice", "main"] * 2
-    assert [len(block.trials) for block in made.blocks] == [5, 5, 2, 5, 2, 5]
-    assert indices(made.blocks[2]) == [0, 100]
-    assert all(trial.phase == block.phase for block in made.blocks for trial in block.trials)
-    assert [trial.number for trial in made.trials] == list(range(1, 25))
+    session_plan = plan(protocol(PAPER), "S01", 1, phases=("main", "practice", "pre-evaluation"))
+    assert [block.phase for block in session_plan.blocks] == ["pre-evaluation"] * 2 + ["practice", "main"] * 2
+    assert [len(block.trials) for block in session_plan.blocks] == [5, 5, 2, 5, 2, 5]
+    assert indices(session_plan.blocks[2]) == [0, 100]
+    assert all(trial.phase == block.phase for block in session_plan.blocks for trial in block.trials)
+    assert [trial.number for trial in session_plan.trials] == list(range(1, 25))
     # The experiment itself is in the order it has without them.
-    assert indices(made.blocks[3]) == indices(plan(protocol(PAPER), "S01", 1).blocks[0])
+    assert indices(session_plan.blocks[3]) == indices(plan(protocol(PAPER), "S01", 1).blocks[0])
 
 
 def test_phases_a_protocol_does_not_have_are_refused():
@@ -210,21 +210,21 @@ def test_magnitude_estimation_asks_for_numbers_in_rounds_that_begin_with_differe
     for seed in range(30):
         sticky = plan(protocol("magnitude-estimation"), "S01", seed).blocks[0]
         rounds = [indices(sticky)[at : at + 5] for at in (0, 5, 10)]
-        assert all(sorted(one) == [0, 20, 50, 80, 100] for one in rounds)
-        assert len({one[0] for one in rounds}) == 3
+        assert all(sorted(order) == [0, 20, 50, 80, 100] for order in rounds)
+        assert len({order[0] for order in rounds}) == 3
         assert {trial.answer for trial in sticky.trials} == {"number"}
         assert [trial.repetition for trial in sticky.trials if trial.stimulus.index == 50] == [1, 2, 3]
 
 
 def test_paired_comparison_presents_two_by_two_and_asks_after_the_second():
-    made = plan(protocol("paired-comparison"), "S01", 1)
-    for block in made.blocks:
+    session_plan = plan(protocol("paired-comparison"), "S01", 1)
+    for block in session_plan.blocks:
         assert len(block.trials) == 20
         for first, second in zip(block.trials[::2], block.trials[1::2], strict=True):
             assert (first.answer, second.answer) == ("none", "choice")
             assert second.compared_with == first.number == second.number - 1
-        compared = {frozenset((a, b)) for a, b in zip(indices(block)[::2], indices(block)[1::2], strict=True)}
-        assert len(compared) == 10
+        pairs = {frozenset((a, b)) for a, b in zip(indices(block)[::2], indices(block)[1::2], strict=True)}
+        assert len(pairs) == 10
 
 
 def test_the_same_surfaces_bear_the_same_labels_in_all_built_in_protocols():
@@ -233,21 +233,21 @@ def test_the_same_surfaces_bear_the_same_labels_in_all_built_in_protocols():
 
 
 def test_the_rows_of_a_williams_design_are_balanced_over_ten_subjects(tmp_path):
-    williams = edited(tmp_path, ('rule = "shuffled"', 'rule = "williams"'))
+    williams = edit_protocol(tmp_path, ('rule = "shuffled"', 'rule = "williams"'))
     places = [StudyPlace("s", row - 1, row, 5, williams.labels) for row in range(1, 11)]
     plans = [plan(williams, "S01", 1, place=place) for place in places]
-    follows = Counter(pair for made in plans for pair in pairwise(indices(made.blocks[1])))
+    follows = Counter(pair for session_plan in plans for pair in pairwise(indices(session_plan.blocks[1])))
     assert set(follows.values()) == {2}
     assert len(follows) == 20
-    assert [made.order_row for made in plans] == list(range(1, 11))
+    assert [session_plan.order_row for session_plan in plans] == list(range(1, 11))
     assert plans[2].order_rule == "williams, row 3 of 10"
     # Another study deals the letters of the design otherwise.
-    other = plan(williams, "S01", 1, place=StudyPlace("t", 0, 1, 6, williams.labels))
-    assert indices(other.blocks[0]) != indices(plans[0].blocks[0])
+    other_plan = plan(williams, "S01", 1, place=StudyPlace("t", 0, 1, 6, williams.labels))
+    assert indices(other_plan.blocks[0]) != indices(plans[0].blocks[0])
 
 
 def test_constraints_of_the_file_hold_in_every_plan(tmp_path):
-    apart = edited(
+    apart = edit_protocol(
         tmp_path, ("neighbours_apart = false", "neighbours_apart = true"), ("not_first = []", "not_first = [100]")
     )
     for seed in range(40):
@@ -259,14 +259,14 @@ def test_constraints_of_the_file_hold_in_every_plan(tmp_path):
 
 def test_a_subjects_own_finger_angle_and_depths_are_in_the_plan_as_measured():
     body = Body(Finger(tip_radius=6.5, width=17.0), 40.0, {"slipperiness": 1.2})
-    made = plan(protocol(PAPER), "S01", 1, body=body)
-    assert made.finger == Finger(6.5, 17.0)
-    assert (made.contact_angle, made.contact_angle_origin) == (40.0, "measured")
-    assert [(block.indentation, block.indentation_origin) for block in made.blocks] == [(2.0, "set"), (1.2, "measured")]
+    session_plan = plan(protocol(PAPER), "S01", 1, body=body)
+    assert session_plan.finger == Finger(6.5, 17.0)
+    assert (session_plan.contact_angle, session_plan.contact_angle_origin) == (40.0, "measured")
+    assert [(b.indentation, b.indentation_origin) for b in session_plan.blocks] == [(2.0, "set"), (1.2, "measured")]
 
 
 @pytest.mark.parametrize(
-    ("body", "named"),
+    ("body", "pattern"),
     [
         (Body(Finger(tip_radius=50.0)), "tip_radius = 50.0 is not allowed: it must lie between 3 and 15 mm"),
         (Body(contact_angle=120.0), "contact_angle = 120.0 .*90 degrees"),
@@ -274,19 +274,19 @@ def test_a_subjects_own_finger_angle_and_depths_are_in_the_plan_as_measured():
         (Body(indentations={"stickiness": 0.0}), "depth of stickiness = 0.0"),
     ],
 )
-def test_a_subjects_own_value_out_of_range_is_refused(body, named):
-    with pytest.raises(SettingsError, match=named):
+def test_a_subjects_own_value_out_of_range_is_refused(body, pattern):
+    with pytest.raises(SettingsError, match=pattern):
         plan(protocol(PAPER), "S01", 1, body=body)
 
 
 def test_a_blinded_plan_names_codes_alone():
     paper = protocol(PAPER)
-    made = plan(paper, "S01", 1, place=StudyPlace("s", 0, 1, 5, paper.labels, key_sha256="ab"))
-    assert made.blinded
-    assert {trial.stimulus.index for trial in made.trials} == {None}
-    assert [t.stimulus.code for t in made.trials] == [t.stimulus.code for t in plan(paper, "S01", 1).trials]
+    session_plan = plan(paper, "S01", 1, place=StudyPlace("s", 0, 1, 5, paper.labels, key_sha256="ab"))
+    assert session_plan.blinded
+    assert {trial.stimulus.index for trial in session_plan.trials} == {None}
+    assert [t.stimulus.code for t in session_plan.trials] == [t.stimulus.code for t in plan(paper, "S01", 1).trials]
     with pytest.raises(Blinded, match="unblind"):
-        _ = made.trials[0].stimulus.known_index
+        _ = session_plan.trials[0].stimulus.known_index
 
 
 def counterbalanced(tmp_path, name=PAPER, blocks=2):
@@ -302,12 +302,12 @@ def counterbalanced(tmp_path, name=PAPER, blocks=2):
 def test_counterbalanced_blocks_begin_with_each_block_for_half_of_the_subjects_and_the_plan_says_so(tmp_path):
     ours = counterbalanced(tmp_path)
     places = [StudyPlace("study", slot, 1, 3, ours.labels) for slot in range(4)]
-    made = [plan(ours, "S01", 9, place=place) for place in places]
-    assert [[block.name for block in one.blocks] for one in made] == [
+    plans = [plan(ours, "S01", 9, place=place) for place in places]
+    assert [[block.name for block in session_plan.blocks] for session_plan in plans] == [
         ["stickiness", "slipperiness"], ["slipperiness", "stickiness"],
     ] * 2  # fmt: skip
-    assert [trial.number for trial in made[1].trials] == list(range(1, 11))
-    assert made[1].order_rule.endswith("blocks counterbalanced, slipperiness first")
+    assert [trial.number for trial in plans[1].trials] == list(range(1, 11))
+    assert plans[1].order_rule.endswith("blocks counterbalanced, slipperiness first")
     by_seed = {plan(ours, "S01", seed).blocks[0].name for seed in (4, 5)}
     assert by_seed == {"stickiness", "slipperiness"}
 
@@ -318,11 +318,11 @@ def test_within_a_block_the_order_of_surfaces_is_the_same_wherever_the_block_com
         orders = [
             [
                 trial.stimulus.index
-                for block in plan(one, "S01", 5).blocks
+                for block in plan(document, "S01", 5).blocks
                 if block.name == name
                 for trial in block.trials
             ]
-            for one in (ours, listed)
+            for document in (ours, listed)
         ]
         assert orders[0] == orders[1]
 
@@ -332,20 +332,22 @@ def test_one_block_alone_cannot_be_counterbalanced(tmp_path):
         counterbalanced(tmp_path, "magnitude-estimation", blocks=1)
 
 
-@pytest.mark.parametrize(("planted", "said"), [("[0.3]", "one number for each"), ("[0.3, 0.0]", "between 0.01 and 5")])
-def test_planted_friction_has_a_number_for_each_surface(tmp_path, planted, said):
+@pytest.mark.parametrize(
+    ("friction", "sentence"), [("[0.3]", "one number for each"), ("[0.3, 0.0]", "between 0.01 and 5")]
+)
+def test_planted_friction_has_a_number_for_each_surface(tmp_path, friction, sentence):
     file = tmp_path / "own.toml"
-    file.write_text(OWN.replace("[3, 70]", f"[3, 70]\nplanted_friction = {planted}"))
-    with pytest.raises(SettingsError, match=said):
+    file.write_text(OWN.replace("[3, 70]", f"[3, 70]\nplanted_friction = {friction}"))
+    with pytest.raises(SettingsError, match=sentence):
         protocol(file)
 
 
 def test_constant_stimuli_meet_every_comparison_with_the_standard_as_often_first_as_second():
     for block, standard in zip(plan(protocol("constant-stimuli"), "S01", 1).blocks, (50, 55), strict=True):
-        met = Counter(zip(indices(block)[::2], indices(block)[1::2], strict=True))
-        others = set(indices(block)) - {standard}
-        assert met == {pair: 5 for other in others for pair in ((standard, other), (other, standard))}
+        pair_counts = Counter(zip(indices(block)[::2], indices(block)[1::2], strict=True))
+        comparisons = set(indices(block)) - {standard}
+        assert pair_counts == {pair: 5 for c in comparisons for pair in ((standard, c), (c, standard))}
         assert {trial.stimulus.index for trial in block.trials if trial.standard} == {standard}
         rounds = [tuple(indices(block)[8 * n : 8 * n + 8]) for n in range(10)]
-        assert all(set(one) - {standard} == others for one in rounds)
+        assert all(set(stimuli) - {standard} == comparisons for stimuli in rounds)
         assert len(set(rounds)) > 8

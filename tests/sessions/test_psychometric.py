@@ -23,11 +23,11 @@ def scattered():
 
 def test_without_lapses_the_function_is_the_probit_that_r_prints():
     # R: glm(cbind(Yes, Trial - Yes) ~ Intensity, binomial(link = "probit")) prints -2.874139, 0.077472, deviance 2.8119
-    found = psychometric(brightness(), lapse=0.0)
-    assert found.pse.value == pytest.approx(2.874139 / 0.077472, abs=3e-4)
-    assert found.jnd.value == pytest.approx(0.6744898 / 0.077472, abs=1e-4)
-    assert found.deviance == pytest.approx(2.8119, abs=5e-5)
-    assert (found.freedom, found.lapse.value, found.correlation.value, found.answers) == (4, 0.0, 0.0, 291)
+    fit = psychometric(brightness(), lapse=0.0)
+    assert fit.pse.value == pytest.approx(2.874139 / 0.077472, abs=3e-4)
+    assert fit.jnd.value == pytest.approx(0.6744898 / 0.077472, abs=1e-4)
+    assert fit.deviance == pytest.approx(2.8119, abs=5e-5)
+    assert (fit.freedom, fit.lapse.value, fit.correlation.value, fit.answers) == (4, 0.0, 0.0, 291)
 
 
 @pytest.mark.parametrize(
@@ -38,36 +38,36 @@ def test_without_lapses_the_function_is_the_probit_that_r_prints():
     ],
 )
 def test_with_lapses_and_scatter_the_function_is_the_one_that_psignifit_finds(levels, pse, jnd, lapse, correlation):
-    found = psychometric(levels)
-    assert found.pse.value == pytest.approx(pse, rel=5e-4)
-    assert found.jnd.value == pytest.approx(jnd, rel=5e-4)
-    assert found.lapse.value == pytest.approx(lapse, rel=2e-3)
-    assert found.correlation.value == pytest.approx(correlation, abs=2e-5)
+    fit = psychometric(levels)
+    assert fit.pse.value == pytest.approx(pse, rel=5e-4)
+    assert fit.jnd.value == pytest.approx(jnd, rel=5e-4)
+    assert fit.lapse.value == pytest.approx(lapse, rel=2e-3)
+    assert fit.correlation.value == pytest.approx(correlation, abs=2e-5)
 
 
-def lost(at, levels):
+def loss(at, levels):
     """Return what another likelihood of beta-binomial answers falls short of 0 by."""
     pse, slope, lapse, correlation = at
     if not (0.0 <= lapse <= 0.5 and 0.0 < correlation < 0.5):
         return 1e9
     beta = (1.0 - correlation) / correlation
     total = 0.0
-    for one in levels:
-        p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (one.log_ratio - pse))
-        total -= stats.betabinom.logpmf(one.chosen, one.presented, p * beta, (1.0 - p) * beta)
+    for level in levels:
+        p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (level.log_ratio - pse))
+        total -= stats.betabinom.logpmf(level.chosen, level.presented, p * beta, (1.0 - p) * beta)
     return total
 
 
 def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelihood_greatest():
-    found = psychometric(scattered())
+    fit = psychometric(scattered())
     best = optimize.minimize(
-        lost, [0.0, 3.0, 0.05, 0.01], (scattered(),), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-11}
+        loss, [0.0, 3.0, 0.05, 0.01], (scattered(),), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-11}
     )
     assert [
-        found.pse.value, QUARTILE / found.jnd.value, found.lapse.value, found.correlation.value
+        fit.pse.value, QUARTILE / fit.jnd.value, fit.lapse.value, fit.correlation.value
     ] == pytest.approx(best.x, rel=1e-4)  # fmt: skip
-    coefficient = sum(math.log(math.comb(one.presented, one.chosen)) for one in scattered())
-    assert found.log_likelihood + coefficient == pytest.approx(-best.fun, abs=1e-7)
+    coefficient = sum(math.log(math.comb(level.presented, level.chosen)) for level in scattered())
+    assert fit.log_likelihood + coefficient == pytest.approx(-best.fun, abs=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -89,39 +89,39 @@ def test_of_several_maxima_the_greatest_is_found(answers, at):
     pse, slope, order, lapse, theta = at
     x, chosen, presented, side = np.array(answers).T
     p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (x - pse + order * side))
-    there = stats.betabinom.logpmf(chosen, presented, p / theta, (1.0 - p) / theta).sum()
-    found = psychometric([Level(*one) for one in answers])
-    assert found.log_likelihood + np.log(special.binom(presented, chosen)).sum() >= there - 1e-5
+    likelihood = stats.betabinom.logpmf(chosen, presented, p / theta, (1.0 - p) / theta).sum()
+    fit = psychometric([Level(*answer) for answer in answers])
+    assert fit.log_likelihood + np.log(special.binom(presented, chosen)).sum() >= likelihood - 1e-5
 
 
 def test_an_end_of_an_interval_is_where_the_likelihood_adjusted_for_three_fitted_parameters_has_dropped():
     def adjusted(at):  # of cells of 20 answers: correlated answers tell less by 1 + 19 times their correlation
-        return lost(at, scattered()) - 1.5 * math.log(1.0 + 19.0 * at[3])
+        return loss(at, scattered()) - 1.5 * math.log(1.0 + 19.0 * at[3])
 
-    def least(held=()):
-        rest = optimize.minimize(
-            lambda at: adjusted([*held, *at]), [0.0, 3.0, 0.05, 0.02][len(held) :], method="Nelder-Mead",
+    def least(fixed=()):
+        minimum = optimize.minimize(
+            lambda at: adjusted([*fixed, *at]), [0.0, 3.0, 0.05, 0.02][len(fixed) :], method="Nelder-Mead",
             options={"xatol": 1e-8, "fatol": 1e-11, "maxiter": 4000},
         )  # fmt: skip
-        return rest.fun
+        return minimum.fun
 
     # Five cells are left: Student's interval of a mean is where n ln(1 + t^2 / n) has been lost.
     dropped = 2.5 * math.log(1.0 + stats.t.ppf(0.975, 5) ** 2 / 5.0)
     assert least([psychometric(scattered()).pse.high]) - least() == pytest.approx(dropped, abs=5e-3)
 
 
-def observer(rng, ratios, each, planted, correlation=0.0):
+def observer(rng, ratios, each, truth, correlation=0.0):
     """Return the answers of an observer to `each` presentations of every ratio in either order."""
-    pse, spread, lapse, order = planted
-    out = []
+    pse, spread, lapse, order = truth
+    levels = []
     for ratio in ratios:
         for side in (-1, 1):
             p = lapse / 2.0 + (1.0 - lapse) * special.ndtr((ratio - pse + order * side) / spread)
             if correlation:
                 beta = (1.0 - correlation) / correlation
                 p = rng.beta(p * beta, (1.0 - p) * beta)
-            out.append(Level(ratio, int(rng.binomial(each, p)), each, side))
-    return out
+            levels.append(Level(ratio, int(rng.binomial(each, p)), each, side))
+    return levels
 
 
 SIX = (-0.45, -0.3, -0.15, 0.15, 0.3, 0.45)
@@ -133,29 +133,29 @@ STICKY = tuple(math.log(mu / 0.48) for mu in (0.28, 0.44, 0.64, 0.67))  # of the
     ("ratios", "lapse", "correlation"), [(SIX, 0.04, 0.0), (SIX, 0.0, 0.0), (STICKY, 0.04, 0.0), (SIX, 0.04, 0.05)]
 )
 def test_intervals_hold_planted_observers_in_90_to_98_of_a_hundred(ratios, lapse, correlation):
-    planted, held, counted = (0.05, 0.25, lapse, 0.04), np.zeros(4), 0
+    parameters, coverage, fits = (0.05, 0.25, lapse, 0.04), np.zeros(4), 0
     for study in range(200):
-        found = psychometric(observer(np.random.default_rng([5, study]), ratios, 10, planted, correlation))
-        if found.reason:
+        fit = psychometric(observer(np.random.default_rng([5, study]), ratios, 10, parameters, correlation))
+        if fit.reason:
             continue
-        counted += 1
-        truth = (planted[0], planted[1] * QUARTILE, planted[2], planted[3])
-        ends = (found.pse, found.jnd, found.lapse, found.order)
-        held += [
-            (one.low is None or one.low <= true) and (one.high is None or true <= one.high)
-            for one, true in zip(ends, truth, strict=True)
+        fits += 1
+        truth = (parameters[0], parameters[1] * QUARTILE, parameters[2], parameters[3])
+        ends = (fit.pse, fit.jnd, fit.lapse, fit.order)
+        coverage += [
+            (level.low is None or level.low <= true) and (level.high is None or true <= level.high)
+            for level, true in zip(ends, truth, strict=True)
         ]
-    assert counted >= 198
-    assert 0.90 <= held.sum() / (4 * counted) <= 0.98
+    assert fits >= 198
+    assert 0.90 <= coverage.sum() / (4 * fits) <= 0.98
 
 
 def test_an_observer_who_says_the_opposite_has_the_same_pse_and_jnd():
     levels = observer(np.random.default_rng(1), SIX, 40, (0.05, 0.25, 0.02, 0.0))
-    there = psychometric(levels)
-    back = psychometric([Level(one.log_ratio, one.presented - one.chosen, one.presented, one.order) for one in levels])
-    assert (there.rises, back.rises) == (True, False)
+    forward = psychometric(levels)
+    opposite = psychometric([Level(v.log_ratio, v.presented - v.chosen, v.presented, v.order) for v in levels])
+    assert (forward.rises, opposite.rises) == (True, False)
     for name in ("pse", "jnd", "lapse"):
-        assert getattr(back, name).value == pytest.approx(getattr(there, name).value, abs=1e-5)
+        assert getattr(opposite, name).value == pytest.approx(getattr(forward, name).value, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -168,14 +168,14 @@ def test_an_observer_who_says_the_opposite_has_the_same_pse_and_jnd():
     ],
 )
 def test_answers_that_fix_no_function_say_why(levels, reason):
-    found = psychometric(levels)
-    assert found.pse is None
-    assert reason in found.reason
+    fit = psychometric(levels)
+    assert fit.pse is None
+    assert reason in fit.reason
 
 
 def test_answers_that_step_between_two_levels_bound_the_jnd_above_and_the_pse_on_both_sides():
-    found = psychometric([Level(x, 10 * (x > 0.0), 10) for x in SIX])
-    assert (found.jnd.value, found.jnd.low) == (0.0, 0.0)
+    fit = psychometric([Level(x, 10 * (x > 0.0), 10) for x in SIX])
+    assert (fit.jnd.value, fit.jnd.low) == (0.0, 0.0)
 
     # Ten answers all right, as likely as may be: a beta law of uniform shape, Γ(p + 10) / (Γ(p) 10!) at p = Φ(slope x)
     def loss(slope):
@@ -184,14 +184,14 @@ def test_answers_that_step_between_two_levels_bound_the_jnd_above_and_the_pse_on
 
     dropped = 1.5 * math.log(1.0 + stats.f.ppf(0.95, 1, 3) / 3.0)  # six levels, three parameters
     slope = optimize.brentq(lambda at: loss(at) - dropped, 1.0, 50.0)
-    assert found.jnd.high == pytest.approx(QUARTILE / slope, rel=0.01)
-    assert -0.3 < found.pse.low < -0.14 < 0.14 < found.pse.high < 0.3
+    assert fit.jnd.high == pytest.approx(QUARTILE / slope, rel=0.01)
+    assert -0.3 < fit.pse.low < -0.14 < 0.14 < fit.pse.high < 0.3
 
 
 def test_a_jnd_that_the_answers_do_not_bound_has_no_upper_end():
-    found = psychometric([Level(-0.3, 3, 10), Level(-0.1, 4, 10), Level(0.1, 6, 10), Level(0.3, 7, 10)], lapse=0.0)
-    assert found.jnd.high is None
-    assert found.jnd.low > 0.0
+    fit = psychometric([Level(-0.3, 3, 10), Level(-0.1, 4, 10), Level(0.1, 6, 10), Level(0.3, 7, 10)], lapse=0.0)
+    assert fit.jnd.high is None
+    assert fit.jnd.low > 0.0
 
 
 def test_answers_that_are_single_or_all_one_way_tell_no_scatter():
@@ -205,6 +205,6 @@ def test_answers_that_are_single_or_all_one_way_tell_no_scatter():
 
 
 def test_an_order_at_the_end_of_what_was_searched_is_bounded_on_one_side():
-    found = psychometric([Level(x, 10 * (side > 0), 10, side) for x in (-0.4, -0.2, 0.2, 0.4) for side in (1, -1)])
-    assert found.order.low is None
-    assert found.order.high < 0.0
+    fit = psychometric([Level(x, 10 * (side > 0), 10, side) for x in (-0.4, -0.2, 0.2, 0.4) for side in (1, -1)])
+    assert fit.order.low is None
+    assert fit.order.high < 0.0

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from recordings import change, plainly_read, rows
-from told_session import Session
+from recordings import change, read_plainly, rows
+from simulated_session import Session
 
 from sessions.exchange import ExportSource, export
 from sessions.recording import Recording
@@ -19,27 +19,27 @@ READERS = Path(__file__).parents[2] / "docs" / "readers"
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def session(tmp_path_factory):
     folder = tmp_path_factory.mktemp("readers") / "s"
     Session(folder, lost=(700, 701)).run()
     seal(folder)
     return folder
 
 
-def told(command, **options):
-    run = subprocess.run(command, capture_output=True, text=True, check=False, encoding="utf-8", **options)
-    assert run.returncode == 0, run.stderr
-    return run.stdout
+def stdout(command, **options):
+    process = subprocess.run(command, capture_output=True, text=True, check=False, encoding="utf-8", **options)
+    assert process.returncode == 0, process.stderr
+    return process.stdout
 
 
 def check(text, folder):
     """Compare with the file as sqlite3 and struct read it; the stand-in has 1e-6 N and 1e-3 N mm a count."""
-    readings = plainly_read(folder)
+    readings = read_plainly(folder)
     assert text.startswith("SIMULATED: the transducer and the subject")
     assert f"{len(readings)} readings {rows(folder, 'SELECT count(*) FROM events')[0][0]} events" in text
-    found = re.findall(r"reading (\d+) at (\S+) s: (.*)", text)
-    assert len(found) == 3
-    for (sequence, time, wrench), reading in zip(found, readings, strict=False):
+    readings_text = re.findall(r"reading (\d+) at (\S+) s: (.*)", text)
+    assert len(readings_text) == 3
+    for (sequence, time, wrench), reading in zip(readings_text, readings, strict=False):
         assert int(sequence) == reading[0]
         assert float(time) == pytest.approx(reading[3], abs=1e-6)
         expected = [raw * scale for raw, scale in zip(reading[5:], [1e-6] * 3 + [1e-3] * 3, strict=True)]
@@ -49,28 +49,28 @@ def check(text, folder):
     assert len(scores) == 10
 
 
-def test_python_alone_reads_the_live_file(recorded):
-    check(told([sys.executable, "-I", READERS / "read_session.py", recorded]), recorded)
+def test_python_alone_reads_the_live_file(session):
+    check(stdout([sys.executable, "-I", READERS / "read_session.py", session]), session)
 
 
-def test_python_alone_names_what_is_damaged(recorded, tmp_path):
-    folder = shutil.copytree(recorded, tmp_path / "s")
+def test_python_alone_names_what_is_damaged(session, tmp_path):
+    folder = shutil.copytree(session, tmp_path / "s")
     change(folder, "UPDATE blocks SET raw = zeroblob(length(raw)) WHERE number = 2")
     change(folder, "UPDATE events SET data = '{}' WHERE number = 1")
-    text = told([sys.executable, "-I", READERS / "read_session.py", folder])
+    text = stdout([sys.executable, "-I", READERS / "read_session.py", folder])
     assert "block 2 is damaged and left out" in text
     assert "event 1 is damaged and left out" in text
 
 
 @pytest.mark.skipif(shutil.which("octave") is None, reason="GNU Octave is not installed")
-def test_octave_reads_the_sealed_copy(recorded):
-    words = ["octave", "--no-gui", "--quiet", "--no-init-file", "--eval", f"read_session('{recorded}/session.h5')"]
-    check(told(words, cwd=READERS), recorded)
+def test_octave_reads_the_sealed_copy(session):
+    words = ["octave", "--no-gui", "--quiet", "--no-init-file", "--eval", f"read_session('{session}/session.h5')"]
+    check(stdout(words, cwd=READERS), session)
 
 
 @pytest.mark.skipif(shutil.which("Rscript") is None, reason="R is not installed")
-def test_r_alone_reads_the_csv_export(recorded, tmp_path):
-    recording = Recording.open(recorded)
+def test_r_alone_reads_the_csv_export(session, tmp_path):
+    recording = Recording.open(session)
     analysis = {"made_by": {}, **analyse(recording).to_dict()}
     folder = export(ExportSource(recording, analysis, None), "csv", tmp_path / "csv")
-    check(told(["Rscript", "--vanilla", READERS / "read_session.R", folder]), recorded)
+    check(stdout(["Rscript", "--vanilla", READERS / "read_session.R", folder]), session)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from recordings import PLAN, begun, change, crashed, ended, readings, with_a_long_answer
+from recordings import PLAN, change, new_writer, readings, record_crash, record_session, with_a_long_answer
 from stand_ins import CALIBRATION, INFO
 
 from sessions.recording import Recording, RecordingError
@@ -24,16 +24,16 @@ REAL = replace(INFO, simulated=False)
 
 
 @pytest.fixture(scope="module")
-def sealed_once(tmp_path_factory):
-    folder = ended(tmp_path_factory.mktemp("sealed") / "s", blocks=5, subject_simulated=True)
+def sealed_original(tmp_path_factory):
+    folder = record_session(tmp_path_factory.mktemp("sealed") / "s", blocks=5, subject_simulated=True)
     seal(folder)
     return folder
 
 
 @pytest.fixture
-def sealed(sealed_once, tmp_path):
+def sealed_dir(sealed_original, tmp_path):
     """Return a copy of the sealed session, to be spoilt."""
-    return shutil.copytree(sealed_once, tmp_path / "s")
+    return shutil.copytree(sealed_original, tmp_path / "s")
 
 
 def writable(path):
@@ -49,20 +49,20 @@ def never_sealed(folder):
     return f"the session was never sealed: there is no MANIFEST.json; 'daq-app resume {folder} --end' seals it"
 
 
-def test_a_sealed_session_has_no_problems_and_its_files_are_read_only(sealed):
-    assert problems(sealed) == ()
-    assert sorted(path.name for path in sealed.iterdir()) == [
+def test_a_sealed_session_has_no_problems_and_its_files_are_read_only(sealed_dir):
+    assert problems(sealed_dir) == ()
+    assert sorted(path.name for path in sealed_dir.iterdir()) == [
         "MANIFEST.json",
         "session.h5",
         "session.json",
         "session.sqlite",
     ]
     for name in ("session.h5", "session.json", "session.sqlite"):
-        assert not (sealed / name).stat().st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH)
+        assert not (sealed_dir / name).stat().st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH)
 
 
-def test_the_copy_can_be_opened_by_hdf5_1_8(sealed):
-    content = (sealed / "session.h5").read_bytes()
+def test_the_copy_can_be_opened_by_hdf5_1_8(sealed_dir):
+    content = (sealed_dir / "session.h5").read_bytes()
     assert content[:8] == b"\x89HDF\r\n\x1a\n"
     assert content[8] == 2  # superblock version; 1.8 reads up to 2
     # Fixed and extensible arrays of chunks came with 1.10; before that chunks were found by a B-tree of version 1.
@@ -70,9 +70,9 @@ def test_the_copy_can_be_opened_by_hdf5_1_8(sealed):
     assert not any(signature in content for signature in (b"FAHD", b"EAHD"))
 
 
-def test_the_copy_holds_every_reading_with_units_and_check_sums(sealed):
-    live = Recording.open(sealed).readings()
-    with h5py.File(sealed / "session.h5") as copy:
+def test_the_copy_holds_every_reading_with_units_and_check_sums(sealed_dir):
+    live = Recording.open(sealed_dir).readings()
+    with h5py.File(sealed_dir / "session.h5") as copy:
         for name in ("sequence", "counter", "status", "time", "received_ns", "raw"):
             column = copy["readings"][name]
             assert column[...].tobytes() == getattr(live, name).tobytes()
@@ -84,9 +84,9 @@ def test_the_copy_holds_every_reading_with_units_and_check_sums(sealed):
         assert copy["calibration/raw_unit"][...].tolist() == [b"counts"]
 
 
-def test_the_copy_holds_events_trials_and_the_plan(sealed):
-    recording = Recording.open(sealed)
-    with h5py.File(sealed / "session.h5") as copy:
+def test_the_copy_holds_events_trials_and_the_plan(sealed_dir):
+    recording = Recording.open(sealed_dir)
+    with h5py.File(sealed_dir / "session.h5") as copy:
         assert copy["events/kind"][...].tolist() == [event.kind.encode() for event in recording.events]
         ends = copy["events/data_end"][...].tolist()
         data = [copy["events/data"][a:b].tobytes() for a, b in itertools.pairwise([0, *ends])]
@@ -106,7 +106,7 @@ def test_the_copy_holds_events_trials_and_the_plan(sealed):
 
 
 def test_a_score_that_was_not_given_is_not_a_number_in_the_copy(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.event("take_started", 1, {"take": 1})
     writer.event("scored", 1, {"score": None})
     writer.event("take_kept", 1, {"take": 1})
@@ -120,35 +120,35 @@ def test_a_score_that_was_not_given_is_not_a_number_in_the_copy(tmp_path):
     assert problems(tmp_path / "s") == ()
 
 
-def test_the_manifest_lists_the_sha_256_of_each_file(sealed):
-    listed = json.loads((sealed / "MANIFEST.json").read_bytes())["files"]
+def test_the_manifest_lists_the_sha_256_of_each_file(sealed_dir):
+    listed = json.loads((sealed_dir / "MANIFEST.json").read_bytes())["files"]
     assert set(listed) == {"session.h5", "session.json", "session.sqlite"}
-    for name, told in listed.items():
-        assert told["sha256"] == hashlib.sha256((sealed / name).read_bytes()).hexdigest()
-        assert told["bytes"] == (sealed / name).stat().st_size
+    for name, entry in listed.items():
+        assert entry["sha256"] == hashlib.sha256((sealed_dir / name).read_bytes()).hexdigest()
+        assert entry["bytes"] == (sealed_dir / name).stat().st_size
 
 
-def test_the_description_tells_plan_device_trials_and_end(sealed):
-    told = json.loads((sealed / "session.json").read_bytes())
-    assert told["plan"]["subject"] == "S01"
-    assert told["transducer"]["calibration"]["matrix"] == CALIBRATION.matrix.tolist()
-    matrix = np.array(told["transducer"]["calibration"]["matrix"], "<f8").tobytes()
-    assert told["transducer"]["calibration"]["sha256"] == hashlib.sha256(matrix).hexdigest()
-    assert told["readings"] == 500
-    assert told["trials"][0]["score"] == 42.5
-    assert told["ended"] == {"reason": "every trial is done"}
-    assert told["losses"] == []
+def test_the_description_tells_plan_device_trials_and_end(sealed_dir):
+    document = json.loads((sealed_dir / "session.json").read_bytes())
+    assert document["plan"]["subject"] == "S01"
+    assert document["transducer"]["calibration"]["matrix"] == CALIBRATION.matrix.tolist()
+    matrix = np.array(document["transducer"]["calibration"]["matrix"], "<f8").tobytes()
+    assert document["transducer"]["calibration"]["sha256"] == hashlib.sha256(matrix).hexdigest()
+    assert document["readings"] == 500
+    assert document["trials"][0]["score"] == 42.5
+    assert document["ended"] == {"reason": "every trial is done"}
+    assert document["losses"] == []
 
 
-def test_what_was_simulated_says_so_at_the_head_of_every_file(sealed):
+def test_what_was_simulated_says_so_at_the_head_of_every_file(sealed_dir):
     for name in ("session.json", "MANIFEST.json"):
-        assert (sealed / name).read_text().startswith('{\n "SIMULATED": "SIMULATED: the transducer and the subject')
-    with h5py.File(sealed / "session.h5") as copy:
+        assert (sealed_dir / name).read_text().startswith('{\n "SIMULATED": "SIMULATED: the transducer and the subject')
+    with h5py.File(sealed_dir / "session.h5") as copy:
         assert copy.attrs["SIMULATED"].startswith(b"SIMULATED: the transducer and the subject")
 
 
 def test_what_was_real_says_nothing_of_the_kind(tmp_path):
-    folder = ended(tmp_path / "s", info=REAL)
+    folder = record_session(tmp_path / "s", info=REAL)
     seal(folder)
     for name in ("session.json", "MANIFEST.json"):
         assert "SIMULATED" not in (folder / name).read_text()
@@ -157,7 +157,7 @@ def test_what_was_real_says_nothing_of_the_kind(tmp_path):
 
 
 def test_a_visit_for_scores_only_is_sealed_without_readings_or_calibration(tmp_path):
-    folder = ended(tmp_path / "s", info=None, blocks=0, plan=replace(PLAN, forces=False))
+    folder = record_session(tmp_path / "s", info=None, blocks=0, plan=replace(PLAN, forces=False))
     seal(folder)
     assert problems(folder) == ()
     with h5py.File(folder / "session.h5") as copy:
@@ -166,7 +166,7 @@ def test_a_visit_for_scores_only_is_sealed_without_readings_or_calibration(tmp_p
 
 
 def test_a_recording_without_trials_is_sealed(tmp_path):
-    writer = begun(tmp_path / "s", plan=replace(PLAN, blocks=()))
+    writer = new_writer(tmp_path / "s", plan=replace(PLAN, blocks=()))
     writer.readings(readings(0, 10))
     writer.close()
     seal(tmp_path / "s")
@@ -182,10 +182,10 @@ def test_one_long_answer_takes_room_and_memory_once_not_once_for_each_event(tmp_
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert problems(tmp_path / "s") == ()
-    recorded = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
-    assert recorded > 3e5
-    assert (tmp_path / "s" / "session.h5").stat().st_size < 1.5 * recorded
-    assert peak < 60 * recorded  # the answer as Python holds it, in one recording and in the next; 120 times is padding
+    file_size = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
+    assert file_size > 3e5
+    assert (tmp_path / "s" / "session.h5").stat().st_size < 1.5 * file_size
+    assert peak < 60 * file_size  # the answer as Python holds it in two recordings; 120 times is padding
 
 
 @pytest.mark.parametrize("texts", [(), ("",), ("", "a" * 32_768, "", "b"), ("c" * 100_000, "{}"), ("12",) * 40_000])
@@ -199,13 +199,13 @@ def test_texts_of_any_length_come_back_as_they_were(tmp_path, texts):
 # ---- what is refused
 
 
-def test_a_session_is_sealed_once(sealed):
+def test_a_session_is_sealed_once(sealed_dir):
     with pytest.raises(RecordingError, match="is sealed already"):
-        seal(sealed)
+        seal(sealed_dir)
 
 
 def test_a_session_that_is_still_written_is_not_sealed(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.event("started")
     with pytest.raises(RecordingError, match="end the program that still writes"):
         seal(tmp_path / "s")
@@ -216,7 +216,7 @@ def test_a_session_that_is_still_written_is_not_sealed(tmp_path):
 
 
 def test_a_session_whose_commit_is_half_written_when_somebody_seals_it_goes_on_unaltered(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.event("started")
     log = tmp_path / "s" / "session.sqlite-wal"
     page = int.from_bytes(log.read_bytes()[8:12], "big")
@@ -231,7 +231,7 @@ def test_a_session_whose_commit_is_half_written_when_somebody_seals_it_goes_on_u
 
 
 def test_a_copy_that_came_out_different_is_never_called_sealed(tmp_path, monkeypatch):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     from sessions.recording import archive
 
     def wrong_copy(recording, path):
@@ -250,7 +250,7 @@ def test_a_copy_that_came_out_different_is_never_called_sealed(tmp_path, monkeyp
 
 
 def test_a_disk_that_is_full_while_sealing_leaves_the_live_file_whole(tmp_path, monkeypatch):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     before = (folder / "session.sqlite").read_bytes()
     from sessions.recording import archive
 
@@ -272,15 +272,15 @@ def test_a_disk_that_is_full_while_sealing_leaves_the_live_file_whole(tmp_path, 
 def test_sealing_that_was_cut_short_at_any_step_is_begun_anew(tmp_path, monkeypatch, step):
     from sessions.recording import archive
 
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
 
     class Killed(BaseException):
         """Stands for the end of the process."""
 
-    def killed(*_):
+    def kill(*_):
         raise Killed
 
-    monkeypatch.setattr(archive, step, killed)
+    monkeypatch.setattr(archive, step, kill)
     with pytest.raises(Killed):
         seal(folder)
     assert problems(folder) == (never_sealed(folder),)
@@ -293,75 +293,75 @@ def test_sealing_that_was_cut_short_at_any_step_is_begun_anew(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("name", ["session.h5", "session.json", "session.sqlite"])
-def test_one_changed_byte_in_any_file_is_named(sealed, name):
-    path = writable(sealed / name)
+def test_one_changed_byte_in_any_file_is_named(sealed_dir, name):
+    path = writable(sealed_dir / name)
     content = bytearray(path.read_bytes())
     place = content.rfind(b"42.5") if b"42.5" in content else len(content) // 2
     content[place] ^= 1
     path.write_bytes(content)
-    assert any(problem.startswith(f"{name} is not what it was") for problem in problems(sealed))
+    assert any(problem.startswith(f"{name} is not what it was") for problem in problems(sealed_dir))
 
 
 @pytest.mark.parametrize("name", ["session.json", "session.h5"])
-def test_a_missing_file_is_named_once(sealed, name):
-    (sealed / name).unlink()
-    assert problems(sealed) == (f"{name} is listed in MANIFEST.json and missing",)
+def test_a_missing_file_is_named_once(sealed_dir, name):
+    (sealed_dir / name).unlink()
+    assert problems(sealed_dir) == (f"{name} is listed in MANIFEST.json and missing",)
 
 
-def test_a_reading_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
-    with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
+def test_a_reading_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed_dir):
+    with h5py.File(writable(sealed_dir / "session.h5"), "r+") as copy:
         copy["readings/raw"][250, 3] = 0.0
-    list_in_manifest(sealed, ("session.h5",))
-    assert problems(sealed) == ("raw of the readings 200 to 299 in session.h5 differs from the live file",)
+    list_in_manifest(sealed_dir, ("session.h5",))
+    assert problems(sealed_dir) == ("raw of the readings 200 to 299 in session.h5 differs from the live file",)
 
 
-def test_a_score_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
-    with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
+def test_a_score_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed_dir):
+    with h5py.File(writable(sealed_dir / "session.h5"), "r+") as copy:
         copy["trials/score"][0] = 99.0
-    list_in_manifest(sealed, ("session.h5",))
-    assert problems(sealed) == ("trials/score of session.h5 differs from the live file",)
+    list_in_manifest(sealed_dir, ("session.h5",))
+    assert problems(sealed_dir) == ("trials/score of session.h5 differs from the live file",)
 
 
-def test_an_event_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
-    with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
+def test_an_event_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed_dir):
+    with h5py.File(writable(sealed_dir / "session.h5"), "r+") as copy:
         text = copy["events/data"][...].tobytes()
         copy["events/data"][text.index(b"42.5")] = ord("9")
-    list_in_manifest(sealed, ("session.h5",))
-    assert problems(sealed) == ("events/data of session.h5 differs from the live file",)
+    list_in_manifest(sealed_dir, ("session.h5",))
+    assert problems(sealed_dir) == ("events/data of session.h5 differs from the live file",)
 
 
-def test_a_reading_changed_in_the_live_file_is_named_by_its_block_too(sealed):
-    change(sealed, "UPDATE blocks SET raw = zeroblob(4800) WHERE number = 4")
-    found = problems(sealed)
-    assert any(problem.startswith("session.sqlite is not what it was") for problem in found)
-    assert any(problem.startswith("block 4 of the readings is damaged") for problem in found)
+def test_a_reading_changed_in_the_live_file_is_named_by_its_block_too(sealed_dir):
+    change(sealed_dir, "UPDATE blocks SET raw = zeroblob(4800) WHERE number = 4")
+    sentences = problems(sealed_dir)
+    assert any(problem.startswith("session.sqlite is not what it was") for problem in sentences)
+    assert any(problem.startswith("block 4 of the readings is damaged") for problem in sentences)
 
 
-def test_a_copy_whose_bytes_rotted_is_named_by_its_own_check_sum(sealed):
-    path = writable(sealed / "session.h5")
+def test_a_copy_whose_bytes_rotted_is_named_by_its_own_check_sum(sealed_dir):
+    path = writable(sealed_dir / "session.h5")
     content = bytearray(path.read_bytes())
     place = content.index(np.float64(6 * 321).tobytes())  # a torque of reading 321
     content[place + 6] ^= 1
     path.write_bytes(content)
-    list_in_manifest(sealed, ("session.h5",))
-    assert any(problem.startswith("session.h5 cannot be read") for problem in problems(sealed))
+    list_in_manifest(sealed_dir, ("session.h5",))
+    assert any(problem.startswith("session.h5 cannot be read") for problem in problems(sealed_dir))
 
 
 def test_a_session_that_was_never_sealed_is_named(tmp_path):
-    assert problems(ended(tmp_path / "s")) == (never_sealed(tmp_path / "s"),)
+    assert problems(record_session(tmp_path / "s")) == (never_sealed(tmp_path / "s"),)
 
 
-def test_a_manifest_that_cannot_be_read_is_named(sealed):
-    (sealed / "MANIFEST.json").write_text('{"files": [1]}')
-    (found,) = problems(sealed)
-    assert "MANIFEST.json cannot be read" in found
+def test_a_manifest_that_cannot_be_read_is_named(sealed_dir):
+    (sealed_dir / "MANIFEST.json").write_text('{"files": [1]}')
+    (problem,) = problems(sealed_dir)
+    assert "MANIFEST.json cannot be read" in problem
 
 
 # ---- sealing what a crash left
 
 
 def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its_loss_stays_named(tmp_path):
-    folder = crashed(tmp_path / "crashed", commits=3)
+    folder = record_crash(tmp_path / "crashed", commits=3)
     log = folder / "session.sqlite-wal"
     log.write_bytes(log.read_bytes()[:-100])
     seal(folder)
@@ -375,17 +375,17 @@ def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its
 
 
 def test_a_torn_log_behind_a_damaged_event_is_sealed_with_both_named(tmp_path):
-    folder = crashed(tmp_path / "crashed", commits=3)
+    folder = record_crash(tmp_path / "crashed", commits=3)
     log = folder / "session.sqlite-wal"
     note = "INSERT INTO events VALUES (1, 0, 'note', NULL, 0, '{}', 7)"  # a check sum of nothing
     with closing(sqlite3.connect(folder / "session.sqlite", isolation_level=None)) as connection:
         connection.execute(note)
-        whole = log.read_bytes()
-        torn = shutil.copytree(folder, tmp_path / "torn", ignore=shutil.ignore_patterns("*-shm"))
-    page = int.from_bytes(whole[8:12], "big")
-    (torn / log.name).write_bytes(whole + whole[32 : 32 + 24] + bytes(page // 2))
-    seal(torn)
-    recording = Recording.open(torn)
+        log_bytes = log.read_bytes()
+        torn_folder = shutil.copytree(folder, tmp_path / "torn", ignore=shutil.ignore_patterns("*-shm"))
+    page = int.from_bytes(log_bytes[8:12], "big")
+    (torn_folder / log.name).write_bytes(log_bytes + log_bytes[32 : 32 + 24] + bytes(page // 2))
+    seal(torn_folder)
+    recording = Recording.open(torn_folder)
     assert [(event.number, event.kind) for event in recording.events] == [(2, "log_torn")]
     assert recording.losses[0] == "event 1 is damaged and left out (CRC-32 differs)"
     assert "hold no whole commit" in recording.losses[1]

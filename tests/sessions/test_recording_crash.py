@@ -7,9 +7,9 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from killed_process import forked, killed, reported, whole_session
-from recordings import begun, readings
-from told_session import Session
+from killed_process import fork, kill_later, read_reports, whole_session
+from recordings import new_writer, readings
+from simulated_session import Session
 
 from sessions.recording import Recording, RecordingError
 from sessions.recording.recovery import log_tail
@@ -21,12 +21,12 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process
 @pytest.mark.parametrize("kills", [5, pytest.param(20, marks=pytest.mark.slow)])
 def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log_is_cut_as_well(tmp_path, kills):
     chance = random.Random(1)
-    most = 0
+    most_safe = 0
     for run in range(kills):
         folder = tmp_path / str(run)
 
         def write(report, folder=folder):
-            writer = begun(folder)
+            writer = new_writer(folder)
             for i in range(100_000):
                 writer.readings(readings(50 * i, 50))
                 if i % 3 == 0:
@@ -34,10 +34,10 @@ def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log
                 safe = writer.acknowledged
                 report(safe.readings, safe.events)
 
-        process, reading = forked(write)
-        said = killed(process, reading, chance.randrange(-1, 60), chance.uniform(0.0, 0.005))
-        safe_readings, safe_events = (said or [[0, 0]])[-1]
-        most = max(most, safe_readings)
+        process, reading = fork(write)
+        reports = kill_later(process, reading, chance.randrange(-1, 60), chance.uniform(0.0, 0.005))
+        safe_readings, safe_events = (reports or [[0, 0]])[-1]
+        most_safe = max(most_safe, safe_readings)
         if safe_events == 0 and not (folder / "session.sqlite").exists():
             continue
         try:
@@ -57,10 +57,10 @@ def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log
             cut.write_bytes(content[: len(content) - min(chance.randrange(1, 200_000), len(content))])
             if log_tail(BytesIO(cut.read_bytes())).commits == 0 and (folder / "session.sqlite").stat().st_size < 8192:
                 continue  # the cut reached back to before the tables were there
-            left = Recording.open(folder)
-            sequence = left.readings().sequence.tolist()
+            remainder = Recording.open(folder)
+            sequence = remainder.readings().sequence.tolist()
             assert sequence == list(range(len(sequence)))
-    assert most > 0
+    assert most_safe > 0
 
 
 @pytest.mark.parametrize("kills", [3, pytest.param(12, marks=pytest.mark.slow)])
@@ -70,9 +70,9 @@ def test_a_session_killed_at_any_moment_leaves_a_beginning_of_the_whole_session(
     lengths = set()
     for run in range(kills):
         folder = tmp_path / str(run)
-        process, reading = forked(partial(whole_session, folder))
-        said = killed(process, reading, chance.randrange(-1, len(whole.events)), chance.uniform(0.0, 0.005))
-        safe = [line for line in said if len(line) == 2]
+        process, reading = fork(partial(whole_session, folder))
+        reports = kill_later(process, reading, chance.randrange(-1, len(whole.events)), chance.uniform(0.0, 0.005))
+        safe = [line for line in reports if len(line) == 2]
         recording = Recording.open(folder)
         events = recording.events
         lengths.add(len(events))
@@ -81,8 +81,8 @@ def test_a_session_killed_at_any_moment_leaves_a_beginning_of_the_whole_session(
         assert block.raw.tobytes() == whole.readings().raw[: len(block)].tobytes()
         if safe:
             assert (len(block), len(events)) >= tuple(safe[-1])
-        for record, meant in zip(recording.trials, whole.trials, strict=True):
-            assert record.score in (None, meant.score)
+        for record, original in zip(recording.trials, whole.trials, strict=True):
+            assert record.score in (None, original.score)
     assert len(lengths) > kills / 3
 
 
@@ -91,7 +91,7 @@ def test_a_full_disk_gives_one_sentence_and_all_that_was_acknowledged_can_be_rea
 
     def write(report):
         resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000))
-        writer = begun(folder)
+        writer = new_writer(folder)
         try:
             for i in range(100_000):
                 writer.readings(readings(50 * i, 50))
@@ -101,9 +101,9 @@ def test_a_full_disk_gives_one_sentence_and_all_that_was_acknowledged_can_be_rea
             report(str(error))
             writer.close()
 
-    process, reading = forked(write)
+    process, reading = fork(write)
     os.waitpid(process, 0)
-    *safe, (sentence,) = reported(reading)
+    *safe, (sentence,) = read_reports(reading)
     (acknowledged,) = safe[-1]
     assert acknowledged > 500
     assert f"the first {acknowledged} readings and 0 events are safe; check the disk and its cable" in sentence
@@ -116,12 +116,12 @@ def test_a_disk_that_is_full_from_the_beginning_is_told_so_and_no_folder_is_left
     def write(report):
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
         try:
-            begun(tmp_path / "s")
+            new_writer(tmp_path / "s")
         except RecordingError as error:
             report(str(error))
 
-    process, reading = forked(write)
+    process, reading = fork(write)
     os.waitpid(process, 0)
-    ((sentence,),) = reported(reading)
+    ((sentence,),) = read_reports(reading)
     assert "cannot be begun" in sentence
     assert list(tmp_path.iterdir()) == []

@@ -39,8 +39,8 @@ MAC = """\
 )
 def test_the_innermost_mount_decides_whether_a_folder_lies_on_another_computer(table, folder, kind):
     mounts = (mac_mounts if table is MAC else linux_mounts)(table)
-    found = network_mount(PurePosixPath(folder), mounts)
-    assert (found and found.kind) == kind
+    mount = network_mount(PurePosixPath(folder), mounts)
+    assert (mount and mount.kind) == kind
 
 
 def test_a_mount_over_another_hides_it():

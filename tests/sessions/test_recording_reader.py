@@ -14,7 +14,7 @@ import pytest
 import recordings
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import PLAN, begun, change, ended, readings, rows
+from recordings import PLAN, change, new_writer, readings, record_session, rows
 
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.log import trial_records
@@ -31,8 +31,8 @@ def hashes(folder):
 
 
 @pytest.fixture
-def crashed(tmp_path):
-    return recordings.crashed(tmp_path / "crashed", commits=5)
+def crashed_folder(tmp_path):
+    return recordings.record_crash(tmp_path / "crashed", commits=5)
 
 
 UNENDED = "the session has no end: it was cut short, or is still running"
@@ -51,7 +51,7 @@ def test_a_folder_that_nobody_may_look_into_is_named_with_what_mends_it(tmp_path
 
 
 def test_a_trials_readings_are_those_received_during_its_take(tmp_path):
-    recording = Recording.open(ended(tmp_path / "s", blocks=4))  # the take lasts from 50 to 400, not included
+    recording = Recording.open(record_session(tmp_path / "s", blocks=4))  # the take lasts from 50 to 400, not included
     assert recording.readings(1).sequence.tolist() == list(range(300))
     assert recording.readings().sequence.tolist() == list(range(400))
     assert recording.readings_between(101, 301).sequence.tolist() == list(range(100, 300))
@@ -60,7 +60,7 @@ def test_a_trials_readings_are_those_received_during_its_take(tmp_path):
 
 def test_a_trial_the_plan_does_not_have_is_refused(tmp_path):
     with pytest.raises(KeyError, match="has no trial 9"):
-        Recording.open(ended(tmp_path / "s")).readings(9)
+        Recording.open(record_session(tmp_path / "s")).readings(9)
 
 
 def test_a_folder_without_a_recording_is_refused(tmp_path):
@@ -76,15 +76,15 @@ def test_a_file_that_is_no_recording_is_refused_with_a_sentence(tmp_path, conten
 
 
 def test_a_recording_of_a_later_format_is_refused_by_name(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     later = json.dumps({"name": FORMAT, "version": FORMAT_VERSION + 1})
     change(folder, "UPDATE head SET value=?, crc32=? WHERE name='format'", (later, zlib.crc32(later.encode())))
     with pytest.raises(RecordingError, match=f"up to version {FORMAT_VERSION}: use a later program"):
         Recording.open(folder)
 
 
-def test_opening_and_reading_change_no_byte(tmp_path, crashed):
-    for folder in (ended(tmp_path / "s"), crashed):
+def test_opening_and_reading_change_no_byte(tmp_path, crashed_folder):
+    for folder in (record_session(tmp_path / "s"), crashed_folder):
         before = hashes(folder)
         recording = Recording.open(folder)
         recording.readings()
@@ -96,7 +96,7 @@ def test_opening_and_reading_change_no_byte(tmp_path, crashed):
 
 
 def test_a_damaged_block_is_left_out_and_named(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     change(folder, "UPDATE blocks SET raw = zeroblob(4800) WHERE number = 2")
     recording = Recording.open(folder)
     assert recording.readings().sequence.tolist() == [*range(100), *range(200, 300)]
@@ -106,20 +106,20 @@ def test_a_damaged_block_is_left_out_and_named(tmp_path):
 
 
 def test_a_missing_block_is_named(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     change(folder, "DELETE FROM blocks WHERE number = 2")
     assert Recording.open(folder).losses == ("blocks 2 to 2 of the readings are missing",)
 
 
 @pytest.mark.parametrize("column", ["sequence_last", "counter_first", "received_first_ns", "received_last_ns"])
 def test_a_row_that_tells_of_other_readings_than_it_holds_is_named(tmp_path, column):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     change(folder, f"UPDATE blocks SET {column} = 7 WHERE number = 3")
     assert "not those that its row describes" in Recording.open(folder).losses[0]
 
 
 def test_a_changed_and_a_missing_event_are_named_and_the_others_read(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     change(folder, "UPDATE events SET data = '{\"score\":99.0}' WHERE kind = 'scored'")
     change(folder, "DELETE FROM events WHERE number = 1")
     recording = Recording.open(folder)
@@ -135,7 +135,7 @@ def damage_definition(folder, before, after):
 
 
 def test_all_is_read_of_tables_whose_definition_no_longer_says_what_numbers_them(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     events = Recording.open(folder).events
     damage_definition(folder, "number INTEGER", "number INTEGES")
     recording = Recording.open(folder)
@@ -144,7 +144,7 @@ def test_all_is_read_of_tables_whose_definition_no_longer_says_what_numbers_them
 
 
 def test_a_take_whose_readings_a_damaged_definition_hides_is_named(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     damage_definition(folder, "received_last_ns", "received_lasu_ns")
     recording = Recording.open(folder)
     assert len(recording.readings(1)) == 0
@@ -155,21 +155,21 @@ def test_a_take_whose_readings_a_damaged_definition_hides_is_named(tmp_path):
 
 @pytest.mark.parametrize("name", ["simulated", "format", "plan", "transducer", "provenance"])
 def test_a_head_that_lacks_a_row_is_refused(tmp_path, name):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     change(folder, "UPDATE head SET name = 'damaged' WHERE name = ?", (name,))
     with pytest.raises(RecordingError, match=r"its head is damaged|it holds no format|damaged in its head"):
         Recording.open(folder)
 
 
 def test_a_changed_plan_is_refused(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     change(folder, "UPDATE head SET value = replace(value, 'S01', 'S02') WHERE name = 'plan'")
     with pytest.raises(RecordingError, match=r"plan in its head is damaged"):
         Recording.open(folder)
 
 
 def test_a_file_cut_short_gives_what_can_be_read_or_a_sentence(tmp_path):
-    whole = (ended(tmp_path / "s", blocks=40) / "session.sqlite").read_bytes()
+    whole = (record_session(tmp_path / "s", blocks=40) / "session.sqlite").read_bytes()
     for part in (0.2, 0.5, 0.8, 0.95):
         folder = tmp_path / f"cut-{part}"
         folder.mkdir()
@@ -187,54 +187,54 @@ def test_a_file_cut_short_gives_what_can_be_read_or_a_sentence(tmp_path):
 # ---- after a crash
 
 
-def test_a_log_left_by_a_crash_is_read_and_the_missing_end_named(crashed):
-    recording = Recording.open(crashed)
+def test_a_log_left_by_a_crash_is_read_and_the_missing_end_named(crashed_folder):
+    recording = Recording.open(crashed_folder)
     assert recording.readings().sequence.tolist() == list(range(500))
     assert recording.losses == (UNENDED,)
 
 
-def test_a_log_whose_tail_was_cut_gives_its_whole_commits_and_names_the_rest(crashed):
-    log = crashed / "session.sqlite-wal"
+def test_a_log_whose_tail_was_cut_gives_its_whole_commits_and_names_the_rest(crashed_folder):
+    log = crashed_folder / "session.sqlite-wal"
     whole = log.read_bytes()
-    kept = set()
+    lengths = set()
     for cut in range(0, len(whole) - 32, 509):
         log.write_bytes(whole[: len(whole) - cut])
         tail = log_tail(BytesIO(log.read_bytes()))
         try:
-            recording = Recording.open(crashed)
+            recording = Recording.open(crashed_folder)
         except RecordingError:
             assert tail.commits == 0  # not even the tables were committed
             continue
         sequence = recording.readings().sequence.tolist()
         assert sequence == list(range(100 * (tail.commits - 1)))  # the first commit holds the tables
-        named = any("hold no whole commit" in loss for loss in recording.losses)
-        assert named == (tail.torn_bytes > 0)
-        kept.add(len(sequence))
-    assert kept == {0, 100, 200, 300, 400, 500}
+        is_named = any("hold no whole commit" in loss for loss in recording.losses)
+        assert is_named == (tail.torn_bytes > 0)
+        lengths.add(len(sequence))
+    assert lengths == {0, 100, 200, 300, 400, 500}
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
+def written_folder(tmp_path_factory):
     """A folder with file and log of a recording with 3 commits of 100 readings, its writer not yet closed."""
-    folder, kept = tmp_path_factory.mktemp("written") / "s", tmp_path_factory.mktemp("kept")
-    writer = begun(folder)
+    folder, copy = tmp_path_factory.mktemp("written") / "s", tmp_path_factory.mktemp("kept")
+    writer = new_writer(folder)
     for i in range(3):
         writer.readings(readings(100 * i, 100))
         writer.commit()
-    shutil.copytree(folder, kept, ignore=shutil.ignore_patterns("*-shm"), dirs_exist_ok=True)
-    yield kept
+    shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*-shm"), dirs_exist_ok=True)
+    yield copy
     writer.close()
 
 
 @given(place=st.floats(0, 0.999), bit=st.integers(0, 7))
 @settings(max_examples=60, deadline=None)
-def test_a_flipped_bit_in_the_log_is_never_taken_for_a_reading(written, tmp_path_factory, place, bit):
+def test_a_flipped_bit_in_the_log_is_never_taken_for_a_reading(written_folder, tmp_path_factory, place, bit):
     folder = tmp_path_factory.mktemp("flipped")
-    for path in written.iterdir():
-        changed = bytearray(path.read_bytes())
+    for path in written_folder.iterdir():
+        content = bytearray(path.read_bytes())
         if path.name.endswith("-wal"):
-            changed[int(place * len(changed))] ^= 1 << bit
-        (folder / path.name).write_bytes(changed)
+            content[int(place * len(content))] ^= 1 << bit
+        (folder / path.name).write_bytes(content)
     try:
         recording = Recording.open(folder)
     except RecordingError:
@@ -244,8 +244,8 @@ def test_a_flipped_bit_in_the_log_is_never_taken_for_a_reading(written, tmp_path
     assert len(sequence) == 300 or any("hold no whole commit" in loss for loss in recording.losses)
 
 
-def test_a_damaged_salt_makes_no_frame_one_of_an_earlier_run(written):
-    log = bytearray((written / "session.sqlite-wal").read_bytes())
+def test_a_damaged_salt_makes_no_frame_one_of_an_earlier_run(written_folder):
+    log = bytearray((written_folder / "session.sqlite-wal").read_bytes())
     page = int.from_bytes(log[8:12], "big")
     frames = range(32, len(log), 24 + page)
     assert log_tail(BytesIO(bytes(log))).torn_bytes == 0
@@ -259,7 +259,7 @@ def test_a_damaged_salt_makes_no_frame_one_of_an_earlier_run(written):
 
 
 def test_frames_left_over_from_an_earlier_run_of_the_log_are_no_loss(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     for i in range(30):
         writer.readings(readings(100 * i, 100))
         writer.commit()
@@ -273,13 +273,13 @@ def test_frames_left_over_from_an_earlier_run_of_the_log_are_no_loss(tmp_path):
 
 
 def test_a_log_shorter_than_its_head_holds_nothing():
-    assert log_tail(BytesIO(b"")) == log_tail(BytesIO(b"")) == type(log_tail(BytesIO(b"")))(0, 0)
+    assert (log_tail(BytesIO(b"")).commits, log_tail(BytesIO(b"")).torn_bytes) == (0, 0)
     assert log_tail(BytesIO(bytes(31))).torn_bytes == 31
     assert log_tail(BytesIO(bytes(5000))).torn_bytes == 5000
 
 
 def test_a_change_that_a_crash_cut_short_is_undone_in_a_copy_and_the_file_stays_as_it_is(tmp_path):
-    folder = ended(tmp_path / "s", blocks=20)
+    folder = record_session(tmp_path / "s", blocks=20)
     torn = tmp_path / "torn"
     torn.mkdir()
     with closing(sqlite3.connect(folder / "session.sqlite", isolation_level=None)) as connection:
@@ -298,14 +298,14 @@ def test_a_change_that_a_crash_cut_short_is_undone_in_a_copy_and_the_file_stays_
 # ---- what the log says of a trial
 
 
-def told(*lines):
+def logged_events(*lines):
     return [LoggedEvent(i, 10 * i, kind, trial, 0, data) for i, (kind, trial, data) in enumerate(lines, 1)]
 
 
 def test_a_take_that_was_kept_and_then_discarded_keeps_its_own_end():
     (record,) = trial_records(
         PLAN,
-        told(
+        logged_events(
             ("take_started", 1, {"take": 1}),
             ("scored", 1, {"score": 5.0}),
             ("take_kept", 1, {"take": 1}),
@@ -323,7 +323,7 @@ def test_a_take_that_was_kept_and_then_discarded_keeps_its_own_end():
 def test_a_take_that_is_restored_counts_with_its_own_end_and_the_answer_that_came_after():
     (record,) = trial_records(
         PLAN,
-        told(
+        logged_events(
             ("take_started", 1, {"take": 1}),
             ("contact_onset", 1, {}),
             ("take_discarded", 1, {"take": 1, "reason": "by mistake"}),
@@ -340,7 +340,7 @@ def test_a_take_that_is_restored_counts_with_its_own_end_and_the_answer_that_cam
 
 
 def test_a_recording_without_a_plan_of_trials_has_none():
-    assert trial_records(replace(PLAN, blocks=()), told(("started", None, {}))) == ()
+    assert trial_records(replace(PLAN, blocks=()), logged_events(("started", None, {}))) == ()
 
 
 @pytest.mark.parametrize(
@@ -361,7 +361,7 @@ def test_a_recording_without_a_plan_of_trials_has_none():
     ],
 )
 def test_an_event_of_odd_shape_with_a_right_check_sum_is_named_and_the_rest_is_read(tmp_path, kind, data):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     crc = zlib.crc32(f"3\n90\n{kind}\n1\n0\n{data}".encode())
     before = Recording.open(folder).events
     change(
@@ -378,7 +378,7 @@ def test_an_event_of_odd_shape_with_a_right_check_sum_is_named_and_the_rest_is_r
 
 @pytest.mark.parametrize(("name", "mode"), [("session.sqlite-wal", "wb"), ("session.sqlite", "r+b")])
 def test_a_file_with_twenty_gigabytes_of_nothing_is_read_in_little_memory(tmp_path, name, mode):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     with (folder / name).open(mode) as file:
         file.truncate(20 * 2**30)
     tracemalloc.start()
@@ -388,5 +388,5 @@ def test_a_file_with_twenty_gigabytes_of_nothing_is_read_in_little_memory(tmp_pa
         assert tracemalloc.get_traced_memory()[1] < 50e6
     finally:
         tracemalloc.stop()
-    named = "the last 21474836480 bytes of the write-ahead log hold no whole commit" in "".join(recording.losses)
-    assert named == name.endswith("wal")
+    is_named = "the last 21474836480 bytes of the write-ahead log hold no whole commit" in "".join(recording.losses)
+    assert is_named == name.endswith("wal")

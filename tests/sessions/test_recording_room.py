@@ -3,7 +3,7 @@ import shutil
 from collections import namedtuple
 
 import pytest
-from recordings import PLAN, begun, readings
+from recordings import PLAN, new_writer, readings
 
 from sessions.recording import RecordingError
 from sessions.recording.storage import MARGIN, check_room, need, release_reserve, take_reserve
@@ -19,7 +19,7 @@ def test_the_room_a_session_needs_is_its_rate_times_its_time_twice():
 
 
 def test_the_room_foreseen_for_a_reading_is_what_a_recording_takes(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     for i in range(50):
         writer.readings(readings(7000 * i, 7000))
         writer.commit()
@@ -29,12 +29,12 @@ def test_the_room_foreseen_for_a_reading_is_what_a_recording_takes(tmp_path):
 
 
 def test_a_disk_with_too_little_room_is_refused_with_the_arithmetic(tmp_path, monkeypatch):
-    wanted = need(PLAN, 7000.0)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, wanted.size - 1))
+    required = need(PLAN, 7000.0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, required.size - 1))
     with pytest.raises(RecordingError, match=r"6 min at 7000 readings a second of 88 bytes, kept twice, .*: 548 MB"):
-        check_room(tmp_path / "not" / "there" / "yet", wanted)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, wanted.size))
-    check_room(tmp_path / "not" / "there" / "yet", wanted)
+        check_room(tmp_path / "not" / "there" / "yet", required)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, required.size))
+    check_room(tmp_path / "not" / "there" / "yet", required)
 
 
 def test_a_reserve_takes_real_room_and_gives_it_back(tmp_path):

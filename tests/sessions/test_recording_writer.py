@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from recordings import PLAN, begun, ended, plainly_read, readings, rows
+from recordings import PLAN, new_writer, read_plainly, readings, record_session, rows
 from stand_ins import CALIBRATION, INFO, SimulatedClock
 
 from drivers.readings import ReadingBlock
@@ -46,7 +46,7 @@ def bits(block):
 def test_readings_come_back_to_the_last_bit_however_they_were_cut(blocks, commits):
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room) / "s"
-        writer = begun(folder)
+        writer = new_writer(folder)
         for i, block in enumerate(blocks):
             writer.readings(block)
             if i in commits:
@@ -67,25 +67,25 @@ JSON = st.recursive(
 
 
 @given(
-    told=st.lists(
+    events=st.lists(
         st.tuples(st.text(min_size=1), st.none() | st.integers(1, 99), st.dictionaries(st.text(), JSON, max_size=3)),
         max_size=4,
     )
 )
 @settings(max_examples=25, deadline=None)
-def test_events_come_back_as_they_were_told(told):
+def test_events_come_back_as_they_were_told(events):
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room) / "s"
-        writer = begun(folder)
-        logged = tuple(writer.event(kind, trial, data) for kind, trial, data in told)
+        writer = new_writer(folder)
+        written_events = tuple(writer.event(kind, trial, data) for kind, trial, data in events)
         writer.close()
         recording = Recording.open(folder)
-    assert recording.events == logged
-    assert [(event.kind, event.trial, event.data) for event in recording.events] == told
+    assert recording.events == written_events
+    assert [(event.kind, event.trial, event.data) for event in recording.events] == events
 
 
 def test_the_head_comes_back_with_origins_settings_and_umlauts(tmp_path):
-    recording = Recording.open(ended(tmp_path / "s"))
+    recording = Recording.open(record_session(tmp_path / "s"))
     assert recording.plan == PLAN
     assert recording.info.settings == INFO.settings
     assert recording.info.calibration.matrix.tolist() == CALIBRATION.matrix.tolist()
@@ -94,24 +94,24 @@ def test_the_head_comes_back_with_origins_settings_and_umlauts(tmp_path):
 
 def test_a_rate_or_range_that_nobody_knows_is_null_in_the_file_and_nan_when_read(tmp_path):
     unknown = replace(REAL, rate=math.nan, calibration=replace(CALIBRATION, rated=np.full(6, math.nan)))
-    folder = ended(tmp_path / "s", info=unknown)
+    folder = record_session(tmp_path / "s", info=unknown)
     assert '"rate":null' in rows(folder, "SELECT value FROM head WHERE name='transducer'")[0][0]
     assert math.isnan(Recording.open(folder).info.rate)
     assert np.isnan(Recording.open(folder).info.calibration.rated).all()
 
 
 def test_provenance_holds_versions_clock_and_marked_settings_and_no_name_of_person_or_computer():
-    told = provenance(
+    head = provenance(
         SimulatedClock(), [Setting("height", 20.0, "mm", "measured"), Setting("filter", "none", "", "default")]
     )
-    assert told["settings"] == {
+    assert head["settings"] == {
         "height": {"value": 20.0, "unit": "mm", "origin": "measured"},
         "filter": {"value": "none", "unit": "", "origin": "default"},
     }
-    assert {"daq-app", "python", "numpy", "scipy", "h5py", "sqlite"} <= set(told["software"])
-    assert told["clock"]["factor"] == 1.0
-    assert platform.node() not in told["machine"].values()
-    assert getpass.getuser() not in told["machine"].values()
+    assert {"daq-app", "python", "numpy", "scipy", "h5py", "sqlite"} <= set(head["software"])
+    assert head["clock"]["factor"] == 1.0
+    assert platform.node() not in head["machine"].values()
+    assert getpass.getuser() not in head["machine"].values()
 
 
 def test_the_users_home_is_no_part_of_an_address_and_another_folder_that_begins_alike_stays(monkeypatch):
@@ -127,16 +127,16 @@ def test_the_users_home_is_no_part_of_an_address_and_another_folder_that_begins_
 
 
 def test_someone_without_this_program_reads_every_number(tmp_path):
-    folder = ended(tmp_path / "s", blocks=2)
+    folder = record_session(tmp_path / "s", blocks=2)
     expected = [
         (i, i * 35 + 2**33, i % 3, i / 200.0, 100 * (i // 100 + 1), i, 2 * i, 3 * i, 4 * i, 5 * i, 6 * i)
         for i in range(200)
     ]
-    assert plainly_read(folder) == expected
+    assert read_plainly(folder) == expected
 
 
 def test_every_check_sum_is_the_one_the_format_page_tells(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     for *columns, crc in rows(folder, "SELECT sequence, counter, status, time, received_ns, raw, crc32 FROM blocks"):
         assert zlib.crc32(b"".join(columns)) == crc
     for number, time_ns, kind, trial, before, data, crc in rows(folder, "SELECT * FROM events"):
@@ -147,30 +147,30 @@ def test_every_check_sum_is_the_one_the_format_page_tells(tmp_path):
 
 
 def test_a_block_tells_the_range_of_its_numbers(tmp_path):
-    folder = ended(tmp_path / "s")
-    told = rows(
+    folder = record_session(tmp_path / "s")
+    ranges = rows(
         folder,
         "SELECT number, readings, sequence_first, sequence_last, counter_first, counter_last, "
         "received_first_ns, received_last_ns FROM blocks",
     )
-    assert told[1] == (2, 100, 100, 199, 100 * 35 + 2**33, 199 * 35 + 2**33, 200, 200)
+    assert ranges[1] == (2, 100, 100, 199, 100 * 35 + 2**33, 199 * 35 + 2**33, 200, 200)
 
 
 def test_the_file_names_its_format_and_version(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     assert rows(folder, "PRAGMA user_version") == [(3,)]
     assert (folder / "session.sqlite").read_bytes()[68:72] == b"DAQF"
 
 
 def test_an_ended_recording_is_one_plain_file(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     assert [path.name for path in folder.iterdir()] == ["session.sqlite"]
     assert rows(folder, "PRAGMA journal_mode") == [("delete",)]
 
 
 def test_what_was_simulated_is_said_in_the_first_row_and_nothing_is_said_of_what_was_not(tmp_path):
     def head(name, **options):
-        return rows(ended(tmp_path / name, **options), "SELECT value FROM head ORDER BY number LIMIT 1")[0][0]
+        return rows(record_session(tmp_path / name, **options), "SELECT value FROM head ORDER BY number LIMIT 1")[0][0]
 
     assert head("both", subject_simulated=True).startswith("SIMULATED: the transducer and the subject ")
     assert head("device").startswith("SIMULATED: the transducer of ")
@@ -184,7 +184,7 @@ def test_what_was_simulated_is_said_in_the_first_row_and_nothing_is_said_of_what
 
 
 def test_the_store_writes_ahead_and_waits_for_the_disk(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     assert writer._connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
     assert writer._connection.execute("PRAGMA synchronous").fetchone() == (2,)  # FULL
     writer.close()
@@ -193,7 +193,7 @@ def test_the_store_writes_ahead_and_waits_for_the_disk(tmp_path):
 def test_the_names_of_new_folders_are_safe_before_anything_is_recorded_in_them(tmp_path, monkeypatch):
     places = []
     monkeypatch.setattr(writer_module, "sync_folder", places.append)
-    begun(tmp_path / "study" / "visit" / "s").close()
+    new_writer(tmp_path / "study" / "visit" / "s").close()
     assert set(places) == {
         tmp_path,
         tmp_path / "study",
@@ -204,7 +204,7 @@ def test_the_names_of_new_folders_are_safe_before_anything_is_recorded_in_them(t
 
 def test_readings_are_committed_once_a_second_of_the_session_clock(tmp_path):
     clock = SimulatedClock()
-    writer = begun(tmp_path / "s", clock=clock)
+    writer = new_writer(tmp_path / "s", clock=clock)
     safe = []
     for i in range(500):  # 5 s at 100 blocks a second
         clock.sleep(0.01)
@@ -216,7 +216,7 @@ def test_readings_are_committed_once_a_second_of_the_session_clock(tmp_path):
 
 
 def test_an_event_is_safe_at_once_together_with_the_readings_before_it(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.readings(readings(0, 7))
     assert writer.acknowledged.readings == 0
     event = writer.event("scored", 1, {"score": 10.0})
@@ -230,7 +230,7 @@ def test_an_event_is_safe_at_once_together_with_the_readings_before_it(tmp_path)
 
 
 def test_very_many_readings_at_once_are_cut_into_blocks(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.readings(readings(0, 150_000))
     writer.close()
     assert rows(tmp_path / "s", "SELECT readings FROM blocks") == [(65536,), (65536,), (18928,)]
@@ -241,18 +241,18 @@ def test_very_many_readings_at_once_are_cut_into_blocks(tmp_path):
 
 
 def test_nothing_is_ever_written_over(tmp_path):
-    folder = ended(tmp_path / "s")
+    folder = record_session(tmp_path / "s")
     before = (folder / "session.sqlite").read_bytes()
     with pytest.raises(RecordingError, match="is not empty"):
-        begun(folder)
+        new_writer(folder)
     assert (folder / "session.sqlite").read_bytes() == before
     (tmp_path / "file").write_text("a file")
     with pytest.raises(RecordingError, match="cannot hold a recording"):
-        begun(tmp_path / "file")
+        new_writer(tmp_path / "file")
 
 
 def test_an_event_that_json_or_utf_8_cannot_hold_is_refused_before_it_spoils_anything(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.readings(readings(0, 10))
     for data, why in (({"score": math.nan}, "JSON"), ({"text": "\udcff"}, "surrogates")):
         with pytest.raises(ValueError, match=why):
@@ -264,7 +264,7 @@ def test_an_event_that_json_or_utf_8_cannot_hold_is_refused_before_it_spoils_any
 
 
 def test_a_closed_recording_takes_no_more_and_closing_again_does_no_harm(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.close()
     writer.close()
     with pytest.raises(RecordingError, match="it was closed"):
@@ -272,7 +272,7 @@ def test_a_closed_recording_takes_no_more_and_closing_again_does_no_harm(tmp_pat
 
 
 def test_a_failing_write_is_told_with_what_is_safe_and_nothing_safe_is_lost(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.readings(readings(0, 10))
     writer.event("started")
 

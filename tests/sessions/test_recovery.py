@@ -13,21 +13,21 @@ DEPTHS = (1.0, 2.0)
 
 def strokes(seed, likeness):
     """Return two quantities of 12 people on four surfaces at two depths, correlated by `likeness`, and a bystander."""
-    one, other, bystander = np.random.default_rng(seed).standard_normal((3, 12, 8))
-    return {"sed": one, "shear": likeness * one + np.sqrt(1.0 - likeness**2) * other, "mu": bystander}
+    first, second, bystander = np.random.default_rng(seed).standard_normal((3, 12, 8))
+    return {"sed": first, "shear": likeness * first + np.sqrt(1.0 - likeness**2) * second, "mu": bystander}
 
 
-@pytest.mark.parametrize("planted", ["sed", "shear", "mu"])
-def test_a_planted_quantity_that_scores_follow_closely_is_preferred_in_every_study(planted):
+@pytest.mark.parametrize("quantity", ["sed", "shear", "mu"])
+def test_a_planted_quantity_that_scores_follow_closely_is_preferred_in_every_study(quantity):
     close = PlantedEffects(70.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
-    found = recovery(strokes(1, 0.5), 10, DEPTHS, planted, close, 8, np.random.default_rng(2))
-    assert (found.preferred, found.family, found.twins, found.surfaces) == (1.0, 1.0, (), 4)
+    result = recovery(strokes(1, 0.5), 10, DEPTHS, quantity, close, 8, np.random.default_rng(2))
+    assert (result.preferred, result.family, result.twins, result.surfaces) == (1.0, 1.0, (), 4)
 
 
 def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often():
     nothing = PlantedEffects(0.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
-    found = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, 45, np.random.default_rng(2))
-    assert found.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # 45 studies: three standard errors
+    result = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, 45, np.random.default_rng(2))
+    assert result.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # 45 studies: three standard errors
 
 
 def test_a_twin_is_what_goes_with_the_planted_quantity_in_either_sense():
@@ -43,9 +43,9 @@ def test_the_verb_simulates_studies_at_the_depths_asked_for(capsys, monkeypatch)
     monkeypatch.setattr("daq_app.cli.verbs.study.RIVAL_STUDIES", 2)
     easy = ["study", "--power", "effect=80", "noise=1", "slope_sd=0", "--studies", "20", "--depths", "1.25", "1.75"]
     assert run([*easy, "--quantity", "shear_along_skin", "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)["recovery"]
-    assert (told["people"], told["surfaces"], told["depths"]) == (4, 3, [1.25, 1.75])
-    assert (told["planted"], told["preferred"]) == ("shear_along_skin", 1.0)
+    (document,) = json.loads(capsys.readouterr().out)["recovery"]
+    assert (document["people"], document["surfaces"], document["depths"]) == (4, 3, [1.25, 1.75])
+    assert (document["planted"], document["preferred"]) == ("shear_along_skin", 1.0)
     assert run(easy) == 0
     assert "4 × 3 × 2" in capsys.readouterr().out
     assert run([*easy, "9"]) == 2

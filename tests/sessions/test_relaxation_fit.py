@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_fingers import PUBLISHED, SPREAD, law, power_law, power_law_model, presses, published
+from finger_presses import PUBLISHED, SPREAD, law, power_law, power_law_model, presses, published
 
 from sessions.prediction.finger_fit import LoadingCurve, fit
 from sessions.prediction.press_model import FitError
@@ -25,7 +25,7 @@ def elastic(model):
     return fit(model, presses(CALM, 1e-4, np.random.default_rng(1), count=2))
 
 
-def held(elastic, press, part, tau, rng, rise=0.5, hold=3.0, size=1.0):
+def hold_curve(elastic, press, part, tau, rng, rise=0.5, hold=3.0, size=1.0):
     """Return a press that goes down evenly and stands, its force by a fine sum over all that went before.
 
     N(t) = e(t) - g integral of (1 - exp(-(t - s) / tau)) de(s), by the trapezoidal rule in 4000 steps.
@@ -44,61 +44,61 @@ def held(elastic, press, part, tau, rng, rise=0.5, hold=3.0, size=1.0):
 @pytest.mark.parametrize(("part", "tau"), [(0.4, 0.8), (0.2, 0.3)])
 def test_a_planted_part_and_time_come_back_within_their_intervals(model, elastic, part, tau):
     rng = np.random.default_rng(2)
-    found = relaxation(model, elastic, [held(elastic, one, part, tau, rng, size=1.3) for one in (0, 1)])
-    assert found.part.low <= part <= found.part.high
-    assert found.time.low <= tau <= found.time.high
-    assert found.part.value == pytest.approx(part, abs=0.02)
-    assert found.time.value == pytest.approx(tau, rel=0.1)
-    assert found.at_once == pytest.approx(1.3, rel=0.02)
-    assert f"{100 * (1 - found.part.value):.0f} % of the stiffness at once" in found.sentence
+    estimate = relaxation(model, elastic, [hold_curve(elastic, press, part, tau, rng, size=1.3) for press in (0, 1)])
+    assert estimate.part.low <= part <= estimate.part.high
+    assert estimate.time.low <= tau <= estimate.time.high
+    assert estimate.part.value == pytest.approx(part, abs=0.02)
+    assert estimate.time.value == pytest.approx(tau, rel=0.1)
+    assert estimate.at_once == pytest.approx(1.3, rel=0.02)
+    assert f"{100 * (1 - estimate.part.value):.0f} % of the stiffness at once" in estimate.sentence
 
 
 @pytest.mark.slow
 def test_a_finger_that_relaxes_on_its_way_down_is_as_stiff_as_at_once_and_not_bent_by_it(model, elastic):
     """Its force over depth is bent by what relaxes: fitted as if elastic, layers miss their intervals."""
     rng = np.random.default_rng(6)
-    holds = [held(elastic, one, 0.4, 0.6, rng, rise=1.0) for one in (0, 1)]
-    way = [np.flatnonzero(one.time <= 1.0) for one in holds]
-    nothing = [np.full(len(one), np.nan) for one in way]
+    holds = [hold_curve(elastic, item, 0.4, 0.6, rng, rise=1.0) for item in (0, 1)]
+    way = [np.flatnonzero(item.time <= 1.0) for item in holds]
+    nothing = [np.full(len(item), np.nan) for item in way]
     down = [
-        LoadingCurve.of(one.displacement[at], one.force[at], none)
-        for one, at, none in zip(holds, way, nothing, strict=True)
+        LoadingCurve.of(item.displacement[at], item.force[at], none)
+        for item, at, none in zip(holds, way, nothing, strict=True)
     ]
     naive = fit(model, down)
-    found, rate = relaxing_fit(model, down, holds)
+    layers_fit, rate = relaxing_fit(model, down, holds)
     assert rate.part.value == pytest.approx(0.4, abs=0.02)
     assert rate.time.value == pytest.approx(0.6, rel=0.1)
-    for one, true in zip(found.layers, PUBLISHED, strict=True):
-        assert one.stiffness.low <= true <= one.stiffness.high
-    assert found.overall.value == pytest.approx(1.0, rel=0.03)
+    for item, true in zip(layers_fit.layers, PUBLISHED, strict=True):
+        assert item.stiffness.low <= true <= item.stiffness.high
+    assert layers_fit.overall.value == pytest.approx(1.0, rel=0.03)
     layers = zip(naive.layers, PUBLISHED, strict=True)
-    assert not all(one.stiffness.low <= true <= one.stiffness.high for one, true in layers)
+    assert not all(item.stiffness.low <= true <= item.stiffness.high for item, true in layers)
     assert holds[0].fall > 0.05
 
 
 def test_a_finger_that_does_not_relax_is_not_said_to(model, elastic):
-    found = relaxation(model, elastic, [held(elastic, one, 0.0, 1.0, np.random.default_rng(3)) for one in (0, 1)])
-    assert found.part.low <= 0.01
-    assert "do not show" in found.sentence
+    estimate = relaxation(model, elastic, [hold_curve(elastic, p, 0.0, 1.0, np.random.default_rng(3)) for p in (0, 1)])
+    assert estimate.part.low <= 0.01
+    assert "do not show" in estimate.sentence
 
 
 def test_a_hold_that_is_much_shorter_than_the_time_bounds_neither_and_says_so(model, elastic):
-    found = relaxation(
-        model, elastic, [held(elastic, one, 0.5, 20.0, np.random.default_rng(4), hold=1.0) for one in (0, 1)]
+    estimate = relaxation(
+        model, elastic, [hold_curve(elastic, press, 0.5, 20.0, np.random.default_rng(4), hold=1.0) for press in (0, 1)]
     )
-    assert found.time.high is None or found.part.high is None
-    assert "hold longer" in found.sentence
+    assert estimate.time.high is None or estimate.part.high is None
+    assert "hold longer" in estimate.sentence
 
 
 def test_the_scene_is_as_stiff_at_once_and_relaxes_alike_in_all_layers(model, elastic):
-    found = relaxation(
-        model, elastic, [held(elastic, one, 0.4, 0.8, np.random.default_rng(5), size=1.2) for one in (0, 1)]
+    estimate = relaxation(
+        model, elastic, [hold_curve(elastic, press, 0.4, 0.8, np.random.default_rng(5), size=1.2) for press in (0, 1)]
     )
-    scene = found.relaxing(published())
-    assert pytest.approx(0.034 * found.at_once) == scene.materials.fat.E
+    scene = estimate.relaxing(published())
+    assert pytest.approx(0.034 * estimate.at_once) == scene.materials.fat.E
     for name in ("epidermis", "dermis", "fat"):
         (term,) = scene.materials.of(name).prony
-        assert (term.g, term.tau) == (found.part.value, found.time.value)
+        assert (term.g, term.tau) == (estimate.part.value, estimate.time.value)
     assert scene.materials.bone == published().materials.bone
 
 
@@ -113,10 +113,10 @@ def test_the_solver_s_own_finger_that_relaxes_presses_as_the_formula_says():
     part, tau = 0.4, 0.5
     still = published()
     term = (Relaxation(part, tau),)
-    made = {name: replace(still.materials.of(name), prony=term) for name in ("epidermis", "dermis", "fat")}
+    layers = {name: replace(still.materials.of(name), prony=term) for name in ("epidermis", "dermis", "fat")}
     scene = replace(
         still,
-        materials=replace(still.materials, **made),
+        materials=replace(still.materials, **layers),
         friction=Friction(0.0),
         loading=Loading(1.2, "+x"),
         solve=Solve(course="history", evidence="quick"),

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recordings import PLAN, begun, readings
+from recordings import PLAN, new_writer, readings
+from simulated_session import Session, resume
 from stand_ins import SimulatedClock
-from told_session import Session, resume
 
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
@@ -60,32 +60,32 @@ def test_a_session_whose_file_is_taken_away_ends_at_once_and_is_whole_in_the_fol
     folder = tmp_path / "recordings" / "s"
     safe = []
 
-    def taken_away(_):
+    def mishap_at_stroke(_):
         if len(strokes) == 2:
             mishap(folder)
         strokes.append(1)
 
     strokes = []
-    session = Session(folder, instead={AskStroke: taken_away})
+    session = Session(folder, instead={AskStroke: mishap_at_stroke})
     session.writer.safe = safe.extend
     recording = session.run()
-    ended = session.end
-    rescued = folder.with_name("s-rescued")
-    assert ended.cause == "disk"
-    assert "session.sqlite was removed, renamed or replaced; all that was measured is safe in" in ended.reason
-    assert str(rescued) in ended.reason
-    assert recording.folder == rescued
-    assert recording.end["reason"] == ended.reason
+    end = session.end
+    rescue_folder = folder.with_name("s-rescued")
+    assert end.cause == "disk"
+    assert "session.sqlite was removed, renamed or replaced; all that was measured is safe in" in end.reason
+    assert str(rescue_folder) in end.reason
+    assert recording.folder == rescue_folder
+    assert recording.end["reason"] == end.reason
     assert list(recording.events) == safe
-    assert recording.readings().sequence.tolist() == list(range(ended.readings))
+    assert recording.readings().sequence.tolist() == list(range(end.readings))
     assert recording.losses == ()
 
 
 def test_a_rescued_session_is_resumed_at_the_same_trial_and_sealed(tmp_path):
-    def taken_away(_):
+    def mishap_at_stroke(_):
         shutil.rmtree(tmp_path / "s", ignore_errors=True)
 
-    session = Session(tmp_path / "s", instead={AskStroke: taken_away})
+    session = Session(tmp_path / "s", instead={AskStroke: mishap_at_stroke})
     session.run()
     end, recording = resume(tmp_path / "s-rescued")
     assert end.complete
@@ -97,7 +97,7 @@ def test_a_rescued_session_is_resumed_at_the_same_trial_and_sealed(tmp_path):
 @pytest.mark.parametrize("mishap", MISHAPS)
 def test_what_waited_in_memory_is_rescued_with_what_was_committed(tmp_path, mishap):
     folder = tmp_path / "recordings" / "s"
-    writer = begun(folder)
+    writer = new_writer(folder)
     writer.readings(readings(0, 100))
     writer.event("started")
     writer.readings(readings(100, 50))
@@ -111,7 +111,7 @@ def test_what_waited_in_memory_is_rescued_with_what_was_committed(tmp_path, mish
 
 
 def test_a_second_mishap_is_survived_like_the_first(tmp_path):
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     for number, folder in enumerate(("s", "s-rescued", "s-rescued-rescued")):
         writer.event("note", data={"text": folder})
         assert writer.folder.name == folder
@@ -124,7 +124,7 @@ def test_a_second_mishap_is_survived_like_the_first(tmp_path):
 
 def test_a_resumed_session_is_looked_after_too(tmp_path):
     clock = SimulatedClock()
-    writer = begun(tmp_path / "s", clock=clock)
+    writer = new_writer(tmp_path / "s", clock=clock)
     writer.readings(readings(0, 10))
     writer.close()
     writer = SessionWriter.open(tmp_path / "s", clock)
@@ -140,7 +140,7 @@ def test_a_resumed_session_is_looked_after_too(tmp_path):
 def test_what_a_disk_took_no_more_of_is_rescued_elsewhere_when_its_folder_is_gone(tmp_path, monkeypatch):
     import sqlite3
 
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.readings(readings(0, 10))
     write_waiting = writer._write_waiting
 
@@ -158,7 +158,7 @@ def test_what_a_disk_took_no_more_of_is_rescued_elsewhere_when_its_folder_is_gon
 
 def test_a_session_beside_which_nothing_can_be_written_is_rescued_in_the_users_home(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
-    writer = begun(tmp_path / "disk" / "s")
+    writer = new_writer(tmp_path / "disk" / "s")
     writer.event("started")
     shutil.rmtree(tmp_path / "disk")
     (tmp_path / "disk").write_text("no folder any more")
@@ -172,7 +172,7 @@ def test_a_session_that_can_be_written_nowhere_is_never_called_safe(tmp_path, mo
     from sessions.recording import recovery
 
     safe = []
-    writer = begun(tmp_path / "s")
+    writer = new_writer(tmp_path / "s")
     writer.safe = safe.extend
     writer.event("started")
     full = OSError(28, "No space left on device")

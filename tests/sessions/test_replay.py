@@ -4,8 +4,8 @@ from dataclasses import replace as replace_fields
 
 import pytest
 from recordings import change, rows
+from simulated_session import once, resume
 from stand_ins import INFO, Hands, SimulatedClock, StandIn
-from told_session import once, resume
 
 from drivers.transducer import LinkLost, SetupError
 from sessions.exchange.import_csv import import_csv
@@ -38,7 +38,7 @@ from sessions.strokes import analyse
 PAPER = protocol("sensotact-friction")
 
 
-def recorded(
+def record_session(
     folder,
     *,
     forces=True,
@@ -52,13 +52,15 @@ def recorded(
 ):
     """Record a session in simulated time, `most` trials a block; `stop` is asked with the number of readings sent."""
     clock = SimulatedClock()
-    planned = plan(protocol, "S01", 3, forces=forces, phases=phases)
-    planned = replace_fields(planned, blocks=tuple(replace_fields(b, trials=b.trials[:most]) for b in planned.blocks))
+    session_plan = plan(protocol, "S01", 3, forces=forces, phases=phases)
+    session_plan = replace_fields(
+        session_plan, blocks=tuple(replace_fields(b, trials=b.trials[:most]) for b in session_plan.blocks)
+    )
     info = INFO if forces else None
-    writer = SessionWriter.create(folder, planned, info, provenance(clock), subject_simulated=True, clock=clock)
+    writer = SessionWriter.create(folder, session_plan, info, provenance(clock), subject_simulated=True, clock=clock)
     device = StandIn(clock, **transducer) if forces else None
     run_session(
-        planned,
+        session_plan,
         writer,
         hands(clock, device, instead),
         device,
@@ -67,30 +69,30 @@ def recorded(
     return Recording.open(folder)
 
 
-def replayed(recording, tmp_path, speed=None):
+def replay_session(recording, tmp_path, speed=None):
     return replay(recording, tmp_path / "replayed", speed, lambda *_: None)
 
 
-def differences(recording, again):
-    return [*different_readings(recording, again), *different_events(recording, again)]
+def differences(recording, replica):
+    return [*different_readings(recording, replica), *different_events(recording, replica)]
 
 
-def identical(recording, tmp_path):
-    again = replayed(recording, tmp_path)
-    assert differences(recording, again) == []
-    assert json.dumps(analyse(again).to_dict()) == json.dumps(analyse(recording).to_dict())
-    return again
+def replay_identical(recording, tmp_path):
+    replica = replay_session(recording, tmp_path)
+    assert differences(recording, replica) == []
+    assert json.dumps(analyse(replica).to_dict()) == json.dumps(analyse(recording).to_dict())
+    return replica
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("replay") / "whole", most=5)
+    return record_session(tmp_path_factory.mktemp("replay") / "whole", most=5)
 
 
 def test_a_whole_session_comes_out_identical_to_the_last_bit(whole, tmp_path):
-    again = identical(whole, tmp_path)
-    assert len(again.events) > 90
-    assert again.simulated_sentence == whole.simulated_sentence
+    replica = replay_identical(whole, tmp_path)
+    assert len(replica.events) > 90
+    assert replica.simulated_sentence == whole.simulated_sentence
 
 
 @pytest.mark.parametrize(
@@ -123,7 +125,7 @@ def test_a_whole_session_comes_out_identical_to_the_last_bit(whole, tmp_path):
     ],
 )
 def test_whatever_people_did_or_were_refused_comes_out_identical(instead, tmp_path):
-    identical(recorded(tmp_path / "session", instead=instead), tmp_path)
+    replay_identical(record_session(tmp_path / "session", instead=instead), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -139,21 +141,21 @@ def test_every_built_in_protocol_is_carried_to_its_end_with_its_rests_and_comes_
     name, phases, forces, outcomes, tmp_path
 ):
     assert name in protocol_names()
-    session = recorded(tmp_path / "session", protocol=protocol(name), phases=phases, forces=forces, most=99)
+    session = record_session(tmp_path / "session", protocol=protocol(name), phases=phases, forces=forces, most=99)
     assert session.end["complete"]
     assert {record.outcome for record in session.trials} == outcomes
     kinds = [event.kind for event in session.events]
     timed = protocol(name).rests.duration is not None
     assert kinds.count("rest_over") == (kinds.count("rest_asked") if timed else 0)
     assert ("rest_asked" in kinds) == ("main" in phases and name != "sensotact-friction")
-    identical(session, tmp_path)
+    replay_identical(session, tmp_path)
 
 
 def test_a_rest_that_ends_by_the_clock_comes_out_at_the_same_reading(tmp_path):
     often = replace_fields(PAPER, rests=Rests(after_trials=2, duration=1.5))
-    session = recorded(tmp_path / "session", protocol=often, most=99)
+    session = record_session(tmp_path / "session", protocol=often, most=99)
     assert [event.kind for event in session.events].count("rest_over") == 4
-    identical(session, tmp_path)
+    replay_identical(session, tmp_path)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -182,16 +184,16 @@ def test_a_session_in_which_people_do_anything_at_any_moment_comes_out_identical
                 )
             return acts
 
-    lost = {chance.randrange(4000) for _ in range(40)}
-    recording = recorded(tmp_path / "session", hands=Restless, lost=lost, stop=lambda sent: sent > 4000)
+    missing = {chance.randrange(4000) for _ in range(40)}
+    recording = record_session(tmp_path / "session", hands=Restless, lost=missing, stop=lambda sent: sent > 4000)
     assert any(event.kind == "refused" for event in recording.events)
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 def test_lost_readings_are_told_of_at_the_same_moments(tmp_path):
-    recording = recorded(tmp_path / "session", lost=range(100, 1500, 7))
+    recording = record_session(tmp_path / "session", lost=range(100, 1500, 7))
     assert sum(event.kind == "losses" for event in recording.events) > 3
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_path):
@@ -203,21 +205,21 @@ def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_pa
                     self.transducer.touches.append((at, at + 100_000_000, 1.0))
             super().show(command)
 
-    recording = recorded(tmp_path / "session", hands=Leaning)
+    recording = record_session(tmp_path / "session", hands=Leaning)
     assert sum(event.kind == "told" for event in recording.events) > 1
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 def test_a_session_that_lost_its_transducer_ends_so_again(tmp_path):
-    recording = recorded(tmp_path / "session", link_lost_after=1234)
+    recording = record_session(tmp_path / "session", link_lost_after=1234)
     assert recording.events[-1].data["cause"] == "device"
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 def test_a_session_that_was_stopped_ends_so_again(tmp_path):
-    recording = recorded(tmp_path / "session", stop=lambda sent: sent > 777)
+    recording = record_session(tmp_path / "session", stop=lambda sent: sent > 777)
     assert recording.events[-1].data["cause"] == "stopped"
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 def test_a_session_that_our_own_error_ended_ends_so_again(tmp_path):
@@ -228,38 +230,32 @@ def test_a_session_that_our_own_error_ended_ends_so_again(tmp_path):
             return super().poll()
 
     with pytest.raises(ZeroDivisionError):
-        recorded(tmp_path / "session", hands=Broken)
+        record_session(tmp_path / "session", hands=Broken)
     recording = Recording.open(tmp_path / "session")
     assert recording.events[-1].data["reason"] == "ZeroDivisionError: an error: of ours"
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 @pytest.mark.parametrize("last", [1, 4, 6, 7, 8, 9, 11, 13, 40])
 def test_a_session_cut_short_anywhere_is_replayed_to_where_it_was_cut(last, tmp_path):
-    recorded(tmp_path / "session")
-    change(tmp_path / "session", "DELETE FROM events WHERE number > ?", (last,))
-    # A crash keeps the blocks committed with or soon after the last event.
-    total, blocks = 0, rows(tmp_path / "session", "SELECT number, readings FROM blocks ORDER BY number")
-    keep = rows(tmp_path / "session", f"SELECT readings FROM events WHERE number = {last}")[0][0]
-    for number, count in blocks:
-        if total >= keep:
-            change(tmp_path / "session", "DELETE FROM blocks WHERE number > ?", (number - 1,))
-            break
-        total += count
+    record_session(tmp_path / "session")
+    cut(tmp_path / "session", last)
     recording = Recording.open(tmp_path / "session")
     assert "cut short" in recording.losses[-1]
-    again = identical(recording, tmp_path)
-    assert again.losses == recording.losses
+    replica = replay_identical(recording, tmp_path)
+    assert replica.losses == recording.losses
 
 
 def test_a_sealed_session_replays_as_the_live_one(tmp_path):
-    recording = recorded(tmp_path / "session")
+    recording = record_session(tmp_path / "session")
     seal(recording.folder)
-    identical(Recording.open(recording.folder), tmp_path)
+    replay_identical(Recording.open(recording.folder), tmp_path)
 
 
 def test_a_visit_that_only_scored_comes_out_identical(tmp_path):
-    identical(recorded(tmp_path / "session", forces=False, instead={AskStroke: once(Redo("again"))}), tmp_path)
+    replay_identical(
+        record_session(tmp_path / "session", forces=False, instead={AskStroke: once(Redo("again"))}), tmp_path
+    )
 
 
 def test_an_imported_recording_comes_out_identical(tmp_path):
@@ -268,12 +264,12 @@ def test_an_imported_recording_comes_out_identical(tmp_path):
     lines = [f"{i / 200},{0.5 * n},0,{-n},0,0,0" for i, n in enumerate(force)]
     file.write_text("\n".join(["t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm", *lines]))
     imported = import_csv(file, tmp_path / "imported")
-    again = identical(Recording.open(imported.folder), tmp_path)
-    assert len(again.readings()) == 500
+    replica = replay_identical(Recording.open(imported.folder), tmp_path)
+    assert len(replica.readings()) == 500
 
 
 def test_an_onset_that_was_stored_otherwise_is_named_with_both_values(tmp_path):
-    recording = recorded(tmp_path / "session")
+    recording = record_session(tmp_path / "session")
     onset = next(event for event in recording.events if event.kind == "contact_onset")
     data = json.dumps({**onset.data, "time": onset.data["time"] + 0.5})
     change(
@@ -281,22 +277,22 @@ def test_an_onset_that_was_stored_otherwise_is_named_with_both_values(tmp_path):
         "UPDATE events SET data = ?, crc32 = ? WHERE number = ?",
         (data, event_crc(onset, data), onset.number),
     )
-    changed = Recording.open(recording.folder)
-    (found,) = differences(changed, replayed(changed, tmp_path))
-    assert found.startswith(f"event {onset.number} (contact_onset in trial 1).data.time was stored as")
-    assert str(onset.data["time"]) in found
+    altered = Recording.open(recording.folder)
+    (difference,) = differences(altered, replay_session(altered, tmp_path))
+    assert difference.startswith(f"event {onset.number} (contact_onset in trial 1).data.time was stored as")
+    assert str(onset.data["time"]) in difference
 
 
 def test_an_onset_that_the_readings_do_not_show_comes_no_more(tmp_path):
-    recording = recorded(tmp_path / "session", most=99)
+    recording = record_session(tmp_path / "session", most=99)
     change(recording.folder, "DELETE FROM blocks WHERE number > 3")
-    torn = Recording.open(recording.folder)
-    found = differences(torn, replayed(torn, tmp_path))
-    assert any("(contact_onset in trial 10) came no more" in sentence for sentence in found)
+    damaged = Recording.open(recording.folder)
+    difference = differences(damaged, replay_session(damaged, tmp_path))
+    assert any("(contact_onset in trial 10) came no more" in sentence for sentence in difference)
 
 
 def test_at_a_chosen_speed_the_outcome_is_the_same(whole, tmp_path):
-    assert differences(whole, replayed(whole, tmp_path, speed=200.0)) == []
+    assert differences(whole, replay_session(whole, tmp_path, speed=200.0)) == []
 
 
 def cut(folder, last):
@@ -314,30 +310,30 @@ def cut(folder, last):
 @pytest.mark.parametrize("lasts", [(9,), (20, 31), (24, 26, 60)])
 def test_a_session_that_was_cut_short_and_resumed_comes_out_identical(lasts, tmp_path):
     folder = tmp_path / "session"
-    recorded(folder)
+    record_session(folder)
     for last in lasts:
         cut(folder, last)
         resume(folder, seed=last)
     recording = Recording.open(folder)
     assert recording.end["complete"]
     assert [event.kind for event in recording.events].count("resumed") == len(lasts)
-    again = identical(recording, tmp_path)
-    assert len(again.readings()) == len(recording.readings()) > 2000
+    replica = replay_identical(recording, tmp_path)
+    assert len(replica.readings()) == len(recording.readings()) > 2000
 
 
 def test_a_session_whose_transducer_was_lost_and_that_was_resumed_comes_out_identical(tmp_path):
     folder = tmp_path / "session"
-    recorded(folder, link_lost_after=1100)
+    record_session(folder, link_lost_after=1100)
     resume(folder, link_lost_after=700)
     resume(folder)
     recording = Recording.open(folder)
     assert [event.data["cause"] for event in recording.events if event.kind == "ended"] == ["device"] * 2 + ["finished"]
-    identical(recording, tmp_path)
+    replay_identical(recording, tmp_path)
 
 
 def test_a_resumed_session_that_was_altered_is_found(tmp_path):
     folder = tmp_path / "session"
-    recorded(folder)
+    record_session(folder)
     cut(folder, 20)
     resume(folder)
     (number,) = rows(folder, "SELECT max(number) FROM events WHERE kind = 'contact_onset'")[0]
@@ -346,8 +342,8 @@ def test_a_resumed_session_that_was_altered_is_found(tmp_path):
     change(folder, "DELETE FROM events WHERE number = ?", (number,))
     change(folder, "INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(other))
     recording = Recording.open(folder)
-    (found,) = differences(recording, replayed(recording, tmp_path))
-    assert "time was stored as" in found
+    (difference,) = differences(recording, replay_session(recording, tmp_path))
+    assert "time was stored as" in difference
 
 
 # ---- the transducer of a recording, for anybody
@@ -357,26 +353,26 @@ def test_a_replaying_transducer_gives_each_reading_as_long_after_the_start_as_it
     clock = SimulatedClock(5_000_000_000_000)
     transducer = ReplayTransducer(whole, clock, "replay:whole")
     transducer.start()
-    began = clock.ns
+    start_ns = clock.ns
     expected = whole.readings()
-    found = []
+    blocks = []
     while transducer.health.received < len(expected):
         block = transducer.read(0.02)
         assert not len(block) or block.received_ns[-1] <= clock.ns
-        found.append(block)
+        blocks.append(block)
     with pytest.raises(LinkLost, match="ends here"):
         transducer.read(0.02)
     for name in ("sequence", "counter", "status", "time", "raw"):
-        columns = [getattr(block, name).tobytes() for block in found]
+        columns = [getattr(block, name).tobytes() for block in blocks]
         assert b"".join(columns) == getattr(expected, name).tobytes()
-    received = [instant - began for block in found for instant in block.received_ns.tolist()]
+    received = [instant - start_ns for block in blocks for instant in block.received_ns.tolist()]
     assert received == (expected.received_ns - expected.received_ns[0]).tolist()
     assert transducer.health.received == len(expected)
     assert transducer.info.simulated
 
 
 def test_a_recording_without_readings_is_no_transducer(tmp_path):
-    recording = recorded(tmp_path / "session", forces=False)
+    recording = record_session(tmp_path / "session", forces=False)
     with pytest.raises(SetupError, match="holds no readings"):
         ReplayTransducer(recording, SimulatedClock(), "replay:x")
 
@@ -384,16 +380,16 @@ def test_a_recording_without_readings_is_no_transducer(tmp_path):
 def test_a_replayed_transducer_records_a_session_of_its_own(whole, tmp_path):
     clock = SimulatedClock(9_000_000_000_000)
     device = ReplayTransducer(whole, clock, "replay:whole")
-    planned = plan(PAPER, "S02", 4)
-    writer = SessionWriter.create(tmp_path / "new", planned, device.info, provenance(clock), clock=clock)
+    session_plan = plan(PAPER, "S02", 4)
+    writer = SessionWriter.create(tmp_path / "new", session_plan, device.info, provenance(clock), clock=clock)
 
     class Asking(Hands):
         def stroke(self, now, newtons=2.0):
             """Leave the stroking to the recording."""
 
-    end = run_session(planned, writer, Asking(clock, device), device)
-    again = Recording.open(tmp_path / "new")
+    end = run_session(session_plan, writer, Asking(clock, device), device)
+    replica = Recording.open(tmp_path / "new")
     raw = whole.readings().raw
     assert end.readings > 0.9 * len(raw)
-    assert again.readings().raw.tobytes() == raw[: end.readings].tobytes()
-    assert any(event.kind == "contact_onset" for event in again.events)
+    assert replica.readings().raw.tobytes() == raw[: end.readings].tobytes()
+    assert any(event.kind == "contact_onset" for event in replica.events)

@@ -27,9 +27,9 @@ from sessions.strokes.analysis import analyse
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     """A session on the simulated bench, its third trial stroked twice; recording, analysis, what was planted."""
-    folder, planted = record(tmp_path_factory.mktemp("bench") / "P01", discard=3)
+    folder, strokes = record(tmp_path_factory.mktemp("bench") / "P01", discard=3)
     recording = Recording.open(folder)
-    truth = [GroundTruth(trial, p.mu, p.tau_max, p.speed, p.direction) for trial, p in planted]
+    truth = [GroundTruth(trial, p.mu, p.tau_max, p.speed, p.direction) for trial, p in strokes]
     return recording, analyse(recording), truth
 
 
@@ -40,13 +40,13 @@ def report(session):
 
 
 @pytest.fixture(scope="module")
-def predicted(session):
+def prediction_and_report(session):
     recording, analysis, truth = session
     prediction = predict(analysis, recording.plan)
     return prediction, findings(recording, analysis, prediction, planted=truth)
 
 
-def foreign(folder, *, press=2.0):
+def record_foreign(folder, *, press=2.0):
     """Record two strokes without a plan, as wrenches in N and N mm."""
     time = np.arange(0, 8, 0.005)
     normal = press * (((time > 2) & (time < 4)) | ((time > 5) & (time < 7)))
@@ -73,10 +73,10 @@ def visit(subject, value, *, simulated=False):
 
 def test_every_planted_stroke_comes_back_within_two_per_cent(report):
     assert [s.trial for s in report.strokes] == [p.trial for p in report.planted]
-    for stroke, planted in zip(report.strokes, report.planted, strict=True):
-        assert stroke.mu_dynamic == pytest.approx(planted.mu, rel=0.02)
-        assert stroke.tau_max == pytest.approx(planted.tau_max, rel=0.03)
-        assert stroke.direction == planted.direction
+    for stroke, truth in zip(report.strokes, report.planted, strict=True):
+        assert stroke.mu_dynamic == pytest.approx(truth.mu, rel=0.02)
+        assert stroke.tau_max == pytest.approx(truth.tau_max, rel=0.03)
+        assert stroke.direction == truth.direction
 
 
 def test_the_course_of_a_stroke_starts_at_its_onset(report):
@@ -93,31 +93,31 @@ def test_a_discarded_take_is_named_among_what_was_excluded(report):
 def test_scores_of_other_visits_are_joined_by_subject(session):
     recording, analysis, _ = session
     own = score_table(recording)
-    others = [visit("P02", 40.0), visit("P03", 60.0), visit("P01", 0.0), own]
-    made = findings(recording, analysis, scores=others)
-    (mean,) = [m for m in made.experiments[0].scores if m.index == 50]
-    given_here = next(s.score for s in own.scores if (s.descriptor, s.index) == ("stickiness", 50))
+    visits = [visit("P02", 40.0), visit("P03", 60.0), visit("P01", 0.0), own]
+    report = findings(recording, analysis, scores=visits)
+    (mean,) = [m for m in report.experiments[0].scores if m.index == 50]
+    own_score = next(s.score for s in own.scores if (s.descriptor, s.index) == ("stickiness", 50))
     assert mean.n == 3
-    assert mean.mean == pytest.approx((given_here / 2 + 40 + 60) / 3)
-    assert list(made.experiments[0].answers) == ["P01", "P02", "P03"]
+    assert mean.mean == pytest.approx((own_score / 2 + 40 + 60) / 3)
+    assert list(report.experiments[0].answers) == ["P01", "P02", "P03"]
 
 
-def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(session, predicted):
+def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(session, prediction_and_report):
     recording, analysis, _ = session
     own = score_table(recording)
-    alone = findings(recording, analysis, predicted[0], scores=[own]).experiments[0]
-    assert (alone.own_relation, alone.own_scores) == (None, {})  # the mean is the own one
-    more = findings(recording, analysis, predicted[0], scores=[own, visit("P02", 40.0)])
-    here = more.experiments[0]
-    given = {s.index: s.score for s in own.scores if s.descriptor == "stickiness"}
-    seds = {p.index: p.sed for p in more.predictions if p.experiment == here.name}
-    both = [(given[index], seds[index]) for index in given]
-    assert here.own_scores == given
-    assert here.own_relation.pearson == pytest.approx(np.corrcoef(np.transpose(both))[0, 1])
-    rows = [row[0].text for row in relation_table(more).groups[0].rows]
+    own_alone = findings(recording, analysis, prediction_and_report[0], scores=[own]).experiments[0]
+    assert (own_alone.own_relation, own_alone.own_scores) == (None, {})  # the mean is the own one
+    report = findings(recording, analysis, prediction_and_report[0], scores=[own, visit("P02", 40.0)])
+    experiment = report.experiments[0]
+    own_by_index = {s.index: s.score for s in own.scores if s.descriptor == "stickiness"}
+    seds = {p.index: p.sed for p in report.predictions if p.experiment == experiment.name}
+    pairs = [(own_by_index[index], seds[index]) for index in own_by_index]
+    assert experiment.own_scores == own_by_index
+    assert experiment.own_relation.pearson == pytest.approx(np.corrcoef(np.transpose(pairs))[0, 1])
+    rows = [row[0].text for row in relation_table(report).groups[0].rows]
     assert rows == ["mean score", "own score", "index"]
-    panel = relation_panel(here, [p for p in more.predictions if p.experiment == here.name])
-    assert {row[0]: row[panel.header.index("own score")] for row in panel.rows} == given
+    panel = relation_panel(experiment, [p for p in report.predictions if p.experiment == experiment.name])
+    assert {row[0]: row[panel.header.index("own score")] for row in panel.rows} == own_by_index
 
 
 def test_a_simulated_session_says_so_in_its_first_line(report):
@@ -126,7 +126,7 @@ def test_a_simulated_session_says_so_in_its_first_line(report):
 
 
 def test_one_simulated_visit_among_the_scores_makes_the_report_simulated(tmp_path):
-    recording = foreign(tmp_path / "real")
+    recording = record_foreign(tmp_path / "real")
     real = findings(recording, analyse(recording), scores=[visit("P02", 40.0)])
     mixed = findings(recording, analyse(recording), scores=[visit("P02", 40.0), visit("P03", 50.0, simulated=True)])
     assert (real.simulated, real.head) == (False, "")
@@ -135,11 +135,11 @@ def test_one_simulated_visit_among_the_scores_makes_the_report_simulated(tmp_pat
 
 
 def test_a_recording_without_a_plan_gives_a_report_of_its_strokes(tmp_path):
-    recording = foreign(tmp_path / "wipes")
-    made = findings(recording, analyse(recording))
-    assert [s.number for s in made.strokes] == [1, 2]
-    assert made.experiments == ()
-    text = page(made)
+    recording = record_foreign(tmp_path / "wipes")
+    report = findings(recording, analyse(recording))
+    assert [s.number for s in report.strokes] == [1, 2]
+    assert report.experiments == ()
+    text = page(report)
     assert "Forces and friction" in text
     assert "SIMULATED" not in text
 
@@ -147,11 +147,11 @@ def test_a_recording_without_a_plan_gives_a_report_of_its_strokes(tmp_path):
 def test_a_visit_for_scores_only_gives_a_report_of_its_scores(tmp_path):
     folder, _ = record(tmp_path / "P04", subject="P04", forces=False)
     recording = Recording.open(folder)
-    made = findings(recording, analyse(recording))
-    assert made.course is None
-    assert made.strokes == ()
-    assert sum(len(e.scores) for e in made.experiments) == 10
-    assert "none: a visit for scores only" in page(made)
+    report = findings(recording, analyse(recording))
+    assert report.course is None
+    assert report.strokes == ()
+    assert sum(len(e.scores) for e in report.experiments) == 10
+    assert "none: a visit for scores only" in page(report)
 
 
 def test_a_value_that_nobody_set_is_marked(report):
@@ -161,17 +161,17 @@ def test_a_value_that_nobody_set_is_marked(report):
 
 
 def test_a_number_withheld_carries_the_sentence_of_its_flaw(tmp_path):
-    recording = foreign(tmp_path / "light", press=0.2)
-    made = findings(recording, analyse(recording))
-    told = {fact.name: fact.value for fact in made.flaws}
-    assert made.strokes
-    for stroke in made.strokes:
+    recording = record_foreign(tmp_path / "light", press=0.2)
+    report = findings(recording, analyse(recording))
+    sentences = {fact.name: fact.value for fact in report.flaws}
+    assert report.strokes
+    for stroke in report.strokes:
         assert stroke.mu_dynamic is None
-        assert stroke.reasons["mu_dynamic"] == told["too little force"]
+        assert stroke.reasons["mu_dynamic"] == sentences["too little force"]
 
 
-def test_predictions_enter_with_their_forces_times_the_width_beside_the_measured_ones(predicted):
-    prediction, report = predicted
+def test_predictions_enter_with_their_forces_times_the_width_beside_the_measured_ones(prediction_and_report):
+    prediction, report = prediction_and_report
     assert report.width == 15.0
     for row, source in zip(report.predictions, prediction.trials, strict=True):
         assert (row.trial, row.sed, row.matching_depth) == (source.trial, source.sed, source.matching_depth)
@@ -180,8 +180,8 @@ def test_predictions_enter_with_their_forces_times_the_width_beside_the_measured
         assert row.measured_normal == stroke.normal_force
 
 
-def test_the_published_finding_comes_out_of_its_own_numbers(predicted):
-    _, report = predicted
+def test_the_published_finding_comes_out_of_its_own_numbers(prediction_and_report):
+    _, report = prediction_and_report
     sticky, slippery = report.experiments
     assert sticky.index_relation.pearson >= 0.95
     assert slippery.index_relation.pearson <= -0.85
@@ -198,18 +198,18 @@ def test_another_quantity_than_the_sed_is_held_against_scores_in_figure_table_an
     sticky, slippery = report.experiments
     assert sticky.index_relation.pearson >= 0.95
     assert slippery.index_relation.pearson <= -0.8
-    given = {row.trial: row.prediction.responses["shear_along_skin"].value for row in prediction.trials}
-    shown = shown_response("shear_along_skin")
-    assert [shown.of(one)[0] for one in report.predictions] == [given[one.trial] for one in report.predictions]
+    shear = {row.trial: row.prediction.responses["shear_along_skin"].value for row in prediction.trials}
+    response = shown_response("shear_along_skin")
+    assert [response.of(p)[0] for p in report.predictions] == [shear[p.trial] for p in report.predictions]
     assert any("shear along the skin predicted" in sentence for sentence in summary(report))
     assert "shear along the skin" in relation_table(report).caption
     assert any("--quantity shear_along_skin" in line for line in report.commands)
-    panel = relation_panel(sticky, [one for one in report.predictions if one.experiment == sticky.name])
-    assert panel is None or "shear along the skin [-]" in panel.header
+    panel = relation_panel(sticky, [p for p in report.predictions if p.experiment == sticky.name])
+    assert "shear along the skin [-]" in panel.header
 
 
-def test_the_finger_of_each_experiment_lies_on_the_surface_and_is_pressed_where_it_touches(predicted):
-    _, report = predicted
+def test_the_finger_of_each_experiment_lies_on_the_surface_and_is_pressed_where_it_touches(prediction_and_report):
+    _, report = prediction_and_report
     assert [(f.experiment, f.index) for f in report.fields] == [("stickiness", 100), ("slipperiness", 100)]
     for field in report.fields:
         touching = [i for i, state in enumerate(field.skin.state) if state != "open"]
@@ -220,13 +220,13 @@ def test_the_finger_of_each_experiment_lies_on_the_surface_and_is_pressed_where_
         assert (way * field.skin.traction[touching] >= 0).all()
 
 
-def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
-    _, report = predicted
-    left_out = {fact.name: fact for fact in report.left_out}
-    assert {"finite strain", "viscosity", "bone compliance", "inertia"} <= set(left_out)
-    assert "% of the SED" in left_out["viscosity"].value
-    warned = [fact.value for fact in report.left_out if fact.name == "warning"]
-    assert len({re.sub(r"[\d.]+", "#", sentence) for sentence in warned}) == len(warned)
+def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(prediction_and_report):
+    _, report = prediction_and_report
+    omissions = {fact.name: fact for fact in report.left_out}
+    assert {"finite strain", "viscosity", "bone compliance", "inertia"} <= set(omissions)
+    assert "% of the SED" in omissions["viscosity"].value
+    warnings = [fact.value for fact in report.left_out if fact.name == "warning"]
+    assert len({re.sub(r"[\d.]+", "#", sentence) for sentence in warnings}) == len(warnings)
     (checks,) = [fact.value for fact in report.modelled if fact.name == "audits"]
     assert "smallest volume ratio: 0." in checks
     assert "det F" not in checks
@@ -234,30 +234,30 @@ def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
 
 
 def test_a_trial_without_friction_keeps_its_row_with_a_dash_and_the_reason(tmp_path):
-    recording = foreign(tmp_path / "light", press=0.2)
+    recording = record_foreign(tmp_path / "light", press=0.2)
     analysis = analyse(recording)
-    made = findings(
+    report = findings(
         recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0, course="steady"))
     )
-    assert [p.sed for p in made.predictions] == [None, None]
-    for row in made.predictions:
+    assert [p.sed for p in report.predictions] == [None, None]
+    for row in report.predictions:
         assert "too_little_force" in row.reasons["sed"]
         assert row.reasons["error_estimate"] == row.reasons["sed"]
-    assert "The stroke gives no coefficient of friction" in page(made)
+    assert "The stroke gives no coefficient of friction" in page(report)
 
 
 def test_strokes_without_a_plan_are_predicted_at_the_depth_given_for_them(tmp_path):
-    recording = foreign(tmp_path / "wipes")
+    recording = record_foreign(tmp_path / "wipes")
     analysis = analyse(recording)
-    made = findings(
+    report = findings(
         recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0, course="steady"))
     )
-    assert [p.stroke for p in made.predictions] == [1, 2]
-    assert "Predicted responses" in page(made)
+    assert [p.stroke for p in report.predictions] == [1, 2]
+    assert "Predicted responses" in page(report)
 
 
 def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing(tmp_path):
-    foreign(tmp_path / "whole")
+    record_foreign(tmp_path / "whole")
     recording = Recording.open(tmp_path / "whole")
     assert not np.isnan(course(recording).normal).any()
     before, after = 500, 700  # 1 s is missing in the middle of the first stroke
@@ -269,15 +269,15 @@ def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing
             block = recording.readings()
             return ReadingBlock.concatenate([block.between(0, before), block.between(after, len(block))])
 
-    made = course(Cut())
-    (missing,) = np.flatnonzero(np.isnan(made.normal))
-    assert np.flatnonzero(np.isnan(made.tangential)) == [missing]
-    ends = made.time[missing - 1], made.time[missing + 1]
+    forces = course(Cut())
+    (missing,) = np.flatnonzero(np.isnan(forces.normal))
+    assert np.flatnonzero(np.isnan(forces.tangential)) == [missing]
+    ends = forces.time[missing - 1], forces.time[missing + 1]
     assert ends == pytest.approx([(before - 1) * 0.005, after * 0.005], abs=1e-9)
 
 
 def test_a_short_pull_sideways_is_in_the_picture_of_the_whole_recording_though_the_normal_force_stays(tmp_path):
-    foreign(tmp_path / "whole")
+    record_foreign(tmp_path / "whole")
     recording = Recording.open(tmp_path / "whole")
 
     class Pulled:
@@ -295,7 +295,7 @@ def test_a_short_pull_sideways_is_in_the_picture_of_the_whole_recording_though_t
 
 
 def test_one_stroke_without_friction_is_one_stroke_and_several_are_strokes(tmp_path):
-    recording = foreign(tmp_path / "light", press=0.2)
+    recording = record_foreign(tmp_path / "light", press=0.2)
     excluded = findings(recording, analyse(recording)).excluded
     assert any(sentence.startswith("No dynamic friction is given for strokes 1, 2:") for sentence in excluded)
 
@@ -303,7 +303,7 @@ def test_one_stroke_without_friction_is_one_stroke_and_several_are_strokes(tmp_p
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))
 def test_thinning_keeps_both_ends_and_the_greatest_and_least_force(values):
     array = np.array(values)
-    kept = _extremes(array)
-    assert (kept[0], kept[-1]) == (0, len(values) - 1)
-    assert (array[kept].min(), array[kept].max()) == (array.min(), array.max())
-    assert math.isfinite(array[kept].sum())
+    indices = _extremes(array)
+    assert (indices[0], indices[-1]) == (0, len(values) - 1)
+    assert (array[indices].min(), array[indices].max()) == (array.min(), array.max())
+    assert math.isfinite(array[indices].sum())

@@ -33,13 +33,16 @@ def report():
 
 def under_force(report):
     """Return the sentence on the measured force."""
-    (sentence,) = [one for one in doubts(report) if "measured normal force" in one]
+    (sentence,) = [doubt for doubt in doubts(report) if "measured normal force" in doubt]
     return sentence
 
 
-def with_doubt(one, variant):
+def with_doubt(prediction, variant):
     return replace(
-        one, alternatives=tuple(replace(a, doubt=DOUBT if a.variant == variant else a.doubt) for a in one.alternatives)
+        prediction,
+        alternatives=tuple(
+            replace(a, doubt=DOUBT if a.variant == variant else a.doubt) for a in prediction.alternatives
+        ),
     )
 
 
@@ -49,7 +52,7 @@ def with_doubt(one, variant):
      ("no estimate", "may differ.")],
 )  # fmt: skip
 def test_a_strain_that_was_not_tried_is_said_with_the_size_of_what_it_would_change(report, size, end):
-    untried = tuple(replace(one, alternatives=()) for one in report.predictions)
+    untried = tuple(replace(prediction, alternatives=()) for prediction in report.predictions)
     first, *_ = doubts(replace(report, predictions=untried, left_out=(Fact("finite strain", size, ""),)))
     assert first == f"At finite strain, which was not tried here, the sign of r {end}"
 
@@ -61,28 +64,28 @@ def test_a_stimulus_stroked_twice_is_one_point_of_a_correlation_and_not_two(repo
 
 
 def test_paths_that_all_agree_are_not_said_to_differ(report):
-    alike = [replace(one, r=0.9) for one in report.experiments[0].paths]
+    alike = [replace(path, r=0.9) for path in report.experiments[0].paths]
     assert paths_sentence("stickiness", alike).endswith("all agree within 0.005.")
-    turned = [
-        replace(one, r=-one.r, within=None) if n else replace(one, within=None, usual=True)
-        for n, one in enumerate(alike)
+    paths = [
+        replace(path, r=-path.r, within=None) if n else replace(path, within=None, usual=True)
+        for n, path in enumerate(alike)
     ]
-    said = paths_sentence("stickiness", turned)
-    assert f", {len(alike) - 1} with another sign than the usual path; 2 of these differ" in said
+    sentence = paths_sentence("stickiness", paths)
+    assert f", {len(alike) - 1} with another sign than the usual path; 2 of these differ" in sentence
 
 
 def test_a_correlation_over_states_that_no_finger_can_be_in_says_how_many_there_are(report):
     assert "no finger" not in under_force(report)
-    doubted = tuple(with_doubt(p, FORCE) if p.trial in (7, 8, 9) else p for p in report.predictions)
+    predictions = tuple(with_doubt(p, FORCE) if p.trial in (7, 8, 9) else p for p in report.predictions)
     assert re.search(
         r"slipperiness r = .*n = 5 stimuli \(3 of 5 trials in a state that no finger can be in\)",
-        under_force(replace(report, predictions=doubted)),
+        under_force(replace(report, predictions=predictions)),
     )
 
 
 def test_the_summary_counts_predictions_in_doubt(report):
-    one, *others = report.predictions
-    words = " ".join(summary(replace(report, predictions=(replace(one, doubt=DOUBT), *others))))
+    first, *rest = report.predictions
+    words = " ".join(summary(replace(report, predictions=(replace(first, doubt=DOUBT), *rest))))
     assert "1 trial is in a state that no finger can be in" in words
 
 
@@ -103,27 +106,27 @@ def test_two_blocks_of_one_descriptor_are_one_kind_of_judgement_of_the_same_stim
 def test_the_question_is_of_the_quantity_that_is_held_against_scores(report):
     assert "strain-energy density (SED) that a finger model" in question(report)
     assert "Does the pressure that a finger model" in question(replace(report, response="pressure"))
-    made = study()
-    assert "strain-energy density (SED) that a finger model" in study_prose.question(made)
-    assert "Does the pressure that a finger model" in study_prose.question(replace(made, response="pressure"))
+    findings = study()
+    assert "strain-energy density (SED) that a finger model" in study_prose.question(findings)
+    assert "Does the pressure that a finger model" in study_prose.question(replace(findings, response="pressure"))
 
 
 def test_where_nobody_gave_a_score_no_word_is_of_scores_or_of_r(report):
-    chosen = tuple(
+    experiments = tuple(
         replace(e, scale_ends=("", ""), scores=(), score_relation=None, answers={}) for e in report.experiments
     )
-    compared = replace(report, experiments=chosen)
-    assert doubts(compared) == ()
+    choice_report = replace(report, experiments=experiments)
+    assert doubts(choice_report) == ()
     words = "People judge the stickiness and slipperiness of surfaces they stroke. With what µ do they stroke them"
-    assert question(compared) == (
+    assert question(choice_report) == (
         f"{words}, and what strain-energy density (SED) does a finger model predict at a receptor?"
     )
-    assert question(replace(compared, predictions=())) == f"{words}?"
-    text = page(compared, ())
+    assert question(replace(choice_report, predictions=())) == f"{words}?"
+    text = page(choice_report, ())
     assert ">Prediction against index<" in text
     assert "to scores" not in text
-    made = study()
-    unscored = replace(made, descriptors=tuple(replace(one, scores=()) for one in made.descriptors))
+    findings = study()
+    unscored = replace(findings, descriptors=tuple(replace(d, scores=()) for d in findings.descriptors))
     assert "score" not in study_prose.question(unscored)
 
 
@@ -170,8 +173,8 @@ def test_the_error_bars_of_prediction_against_score_hold_what_the_uncertainty_of
     seds = np.array([row[3] for row in TABLES["stickiness"].values()])
     assert [row[low] for row in panel.rows] == pytest.approx(0.995 * seds)  # as the example's intervals are
     assert [row[high] for row in panel.rows] == pytest.approx(1.005 * seds)
-    doubted = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own])
-    assert {row[low] for row in doubted.rows} == {None}
+    doubtful = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own])
+    assert {row[low] for row in doubtful.rows} == {None}
 
 
 def test_a_difference_of_correlations_that_rounds_to_zero_has_no_minus_sign():
@@ -180,24 +183,24 @@ def test_a_difference_of_correlations_that_rounds_to_zero_has_no_minus_sign():
 
 
 def test_one_session_of_a_study_is_no_each():
-    made = study()
-    one = replace(made, visits=made.visits[:1])
-    assert study_prose.seal_sentence(one) == made.visits[0].sealed
-    assert study_prose.seal_sentence(made).startswith("In each of 10 sessions: The predictions")
+    findings = study()
+    single_visit = replace(findings, visits=findings.visits[:1])
+    assert study_prose.seal_sentence(single_visit) == findings.visits[0].sealed
+    assert study_prose.seal_sentence(findings).startswith("In each of 10 sessions: The predictions")
 
 
 def test_the_table_of_rivals_names_the_weights_of_mixed_models_only_where_there_are_some(report):
-    of_session = session_tables(report)["rivals"][0]
-    of_study = study_tables(study())["rivals"][0]
-    for table, weighed in ((of_session, False), (of_study, True)):
-        assert ("AIC weight" in [column.name for column in table.columns]) == weighed
-        assert ("AIC" in table.caption + " ".join(words for _, words in table.notes)) == weighed
+    session_table = session_tables(report)["rivals"][0]
+    study_table = study_tables(study())["rivals"][0]
+    for table, has_weights in ((session_table, False), (study_table, True)):
+        assert ("AIC weight" in [column.name for column in table.columns]) == has_weights
+        assert ("AIC" in table.caption + " ".join(words for _, words in table.notes)) == has_weights
         assert {len(row) for group in table.groups for row in group.rows} == {len(table.columns)}
 
 
 def test_a_warning_of_several_trials_is_shown_with_its_greatest_numbers():
-    said = ("Strains reach 54 % there.", "Strains reach 186 % there.", "Strains reach 99 % there.")
-    trials = [SimpleNamespace(prediction=SimpleNamespace(model={}, warnings=(one,))) for one in said]
+    warnings = ("Strains reach 54 % there.", "Strains reach 186 % there.", "Strains reach 99 % there.")
+    trials = [SimpleNamespace(prediction=SimpleNamespace(model={}, warnings=(warning,))) for warning in warnings]
     assert omissions(SimpleNamespace(trials=trials)) == (
-        Fact("warning", said[1], "the greatest numbers of 3 trials with this warning"),
+        Fact("warning", warnings[1], "the greatest numbers of 3 trials with this warning"),
     )

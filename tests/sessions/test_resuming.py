@@ -8,10 +8,10 @@ from functools import partial
 import msgspec
 import pytest
 from hypothesis import given, settings
-from killed_process import forked, kill, lines_of, reported, whole_session
+from killed_process import fork, kill, lines_of, read_reports, whole_session
 from recordings import change
+from simulated_session import Session, resume
 from stand_ins import INFO, SimulatedClock
-from told_session import Session, resume
 from walks import FORCES, steps, walks
 
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter
@@ -30,7 +30,7 @@ from sessions.run.states import Ended
 from sessions.run.steps import Abort, Refuse
 
 
-def logged(walk):
+def log_of(walk):
     """The log of a walk, as the runner writes it."""
     plan, events = walk
     lines = [("started", None, {})]
@@ -46,29 +46,29 @@ def logged(walk):
 
 def kept_takes(lines):
     """Trial and take of what counts, from the lines about takes alone."""
-    kept = {}
+    takes = {}
     for kind, trial, data in lines:
         if kind == "take_kept":
-            kept[trial] = data["take"]
-        if kind == "take_discarded" and kept.get(trial) == data["take"]:
-            del kept[trial]
-    return kept
+            takes[trial] = data["take"]
+        if kind == "take_discarded" and takes.get(trial) == data["take"]:
+            del takes[trial]
+    return takes
 
 
 def open_takes(lines):
-    found = set()
+    takes = set()
     for kind, trial, data in lines:
         if kind == "take_started":
-            found.add((trial, data["take"]))
+            takes.add((trial, data["take"]))
         if kind in ("take_kept", "take_discarded"):
-            found.discard((trial, data["take"]))
-    return found
+            takes.discard((trial, data["take"]))
+    return takes
 
 
 @given(walk=walks())
 @settings(max_examples=60, deadline=None)
 def test_any_beginning_of_a_log_gives_a_state_that_can_be_ended_with_kept_trials_kept_and_no_take_open(walk):
-    plan, events = logged(walk)
+    plan, events = log_of(walk)
     for length in range(len(events) + 1):
         lines = [(event.kind, event.trial, event.data) for event in events[:length]]
         at = resumption(plan, events[:length])
@@ -82,8 +82,8 @@ def test_any_beginning_of_a_log_gives_a_state_that_can_be_ended_with_kept_trials
         # two that are compared.
         alone = {second.compared_with for second in plan.trials if second.number not in kept_before}
         for trial, take in kept_before.items():
-            asked = trial in alone or events[length - 1].kind == "redo"
-            assert kept_takes(after).get(trial) == take or (trial in taken_back and asked)
+            may_be_discarded = trial in alone or events[length - 1].kind == "redo"
+            assert kept_takes(after).get(trial) == take or (trial in taken_back and may_be_discarded)
         again = [*events[:length], *(LoggedEvent(0, 0, *line[:2], 0, line[2]) for line in at.owed)]
         assert resumption(plan, again).state == at.state
         assert resumption(plan, again).owed == ()
@@ -106,32 +106,32 @@ def test_a_killed_session_goes_on_at_the_same_trial_and_nothing_acknowledged_is_
     resumed_at = set()
     for run in range(kills):
         folder = tmp_path / str(run)
-        process, reading = forked(partial(whole_session, folder))
+        process, reading = fork(partial(whole_session, folder))
         # Lines, not seconds: how busy the machine is decides nothing.
         first = lines_of(reading, chance.randrange(1, 120))
         kill(process)
-        told = [line for line in (*first, *reported(reading)) if len(line) == 2]
-        safe = told[-1] if told else [0, 0]
+        reports = [line for line in (*first, *read_reports(reading)) if len(line) == 2]
+        safe = reports[-1] if reports else [0, 0]
         before = Recording.open(folder)
         if before.end is not None:
             continue
         readings = before.readings()
         assert (len(readings), len(before.events)) >= tuple(safe)
-        kept = {record.trial.number: record for record in before.trials if record.take is not None}
+        kept_records = {record.trial.number: record for record in before.trials if record.take is not None}
         end, after = resume(folder)
-        resumed_at.add(len(kept))
+        resumed_at.add(len(kept_records))
         assert end.complete
         assert after.events[: len(before.events)] == before.events
         assert after.readings().raw[: len(readings)].tobytes() == readings.raw.tobytes()
         assert [record.score for record in after.trials] == [t.stimulus.index for t in after.plan.trials]
         assert after.plan == before.plan
-        for number, record in kept.items():
+        for number, record in kept_records.items():
             assert after.trial(number) == record
         discarded = [take.discarded for record in after.trials for take in record.other_takes]
         assert set(discarded) <= {"the recording was cut short in the middle of it"}
-        together = after.readings()
-        assert (together.sequence[1:] - together.sequence[:-1] == 1).all()
-        assert (together.time[1:] > together.time[:-1]).all()
+        joint = after.readings()
+        assert (joint.sequence[1:] - joint.sequence[:-1] == 1).all()
+        assert (joint.time[1:] > joint.time[:-1]).all()
         assert after.losses == () or all("write-ahead log" in sentence for sentence in after.losses)
         seal(folder)
         assert problems(folder) == after.losses

@@ -39,13 +39,13 @@ def test_steigers_z_is_what_the_package_cocor_prints(first, second, mutual, n, z
 
 
 def test_the_interval_of_a_difference_is_that_of_zous_worked_example():
-    found = contrast(0.396, 0.179, 0.088, 66)
-    assert (found.low, found.high) == pytest.approx((-0.093, 0.517), abs=5e-4)
+    difference = contrast(0.396, 0.179, 0.088, 66)
+    assert (difference.low, difference.high) == pytest.approx((-0.093, 0.517), abs=5e-4)
 
 
 def test_correlations_that_are_hardly_less_than_one_have_a_difference_with_an_interval():
-    found = contrast(0.9999999871286794, 0.999999999202874, 0.999999983262, 4)  # of three columns alike to 1e-4
-    assert found.low <= found.difference <= found.high
+    difference = contrast(0.9999999871286794, 0.999999999202874, 0.999999983262, 4)  # of three columns alike to 1e-4
+    assert difference.low <= difference.difference <= difference.high
 
 
 def test_a_rival_with_the_other_sign_is_turned_round_before_it_is_compared():
@@ -56,12 +56,12 @@ def test_steigers_test_at_the_number_of_cases_needed_has_eighty_per_cent_power()
     first, second, mutual = 0.75, 0.6, 0.5
     n = required_cases(first, second, mutual)
     draw = np.random.default_rng(5)
-    among = np.array([[1.0, first, second], [first, 1.0, mutual], [second, mutual, 1.0]])
-    told = 0
-    for cases in draw.multivariate_normal(np.zeros(3), among, size=(2000, n)):
+    r = np.array([[1.0, first, second], [first, 1.0, mutual], [second, mutual, 1.0]])
+    detections = 0
+    for cases in draw.multivariate_normal(np.zeros(3), r, size=(2000, n)):
         (_, a, b), (_, _, c), _ = np.corrcoef(cases.T)
-        told += abs(steiger_z(a, b, c, n)) > 1.959964
-    assert told / 2000 == pytest.approx(0.8, abs=0.03)  # three standard errors of 2000 draws
+        detections += abs(steiger_z(a, b, c, n)) > 1.959964
+    assert detections / 2000 == pytest.approx(0.8, abs=0.03)  # three standard errors of 2000 draws
 
 
 def test_equal_correlations_are_told_apart_by_no_number_of_cases():
@@ -70,9 +70,9 @@ def test_equal_correlations_are_told_apart_by_no_number_of_cases():
 
 def test_a_partial_correlation_is_that_of_what_the_third_variable_leaves():
     x, y, z = np.random.default_rng(2).normal(size=(3, 12))
-    left = [v - np.polyval(np.polyfit(z, v, 1), z) for v in (x, y)]
-    among = np.corrcoef([x, y, z])
-    assert partial_correlation(among[0, 1], among[0, 2], among[1, 2]) == pytest.approx(np.corrcoef(left)[0, 1])
+    residuals = [v - np.polyval(np.polyfit(z, v, 1), z) for v in (x, y)]
+    r = np.corrcoef([x, y, z])
+    assert partial_correlation(r[0, 1], r[0, 2], r[1, 2]) == pytest.approx(np.corrcoef(residuals)[0, 1])
     assert math.isnan(partial_correlation(0.9, 1.0, 0.9))
 
 
@@ -88,13 +88,13 @@ def test_the_left_out_error_is_that_of_lines_fitted_without_each_point():
     [("stickiness", 0.974, 0.954), ("slipperiness", -0.860, -0.979)],
 )
 def test_friction_follows_the_published_indices_as_closely_as_the_sed_does(descriptor, mu, tau_max):
-    found = {rival.name: rival for rival in published(descriptor)}
-    assert found[MODEL_MU].r == pytest.approx(mu, abs=5e-4)
-    assert found["τ max"].r == pytest.approx(tau_max, abs=5e-4)
-    assert found[MODEL_MU].same_order
-    assert found["τ max"].same_order is (descriptor == "stickiness")
-    assert found[MODEL_MU].contrast.low < 0.0 < found[MODEL_MU].contrast.high
-    assert found[MODEL_MU].needed > 5
+    rivals = {rival.name: rival for rival in published(descriptor)}
+    assert rivals[MODEL_MU].r == pytest.approx(mu, abs=5e-4)
+    assert rivals["τ max"].r == pytest.approx(tau_max, abs=5e-4)
+    assert rivals[MODEL_MU].same_order
+    assert rivals["τ max"].same_order is (descriptor == "stickiness")
+    assert rivals[MODEL_MU].contrast.low < 0.0 < rivals[MODEL_MU].contrast.high
+    assert rivals[MODEL_MU].needed > 5
 
 
 def published(descriptor):
@@ -107,10 +107,10 @@ def published(descriptor):
 
 @pytest.mark.parametrize(("radius", "sticky", "slippery"), [(5.0, 1, -1), (7.0, -1, 1)])
 def test_a_tip_of_seven_millimetres_turns_the_published_signs_round(radius, sticky, slippery):
-    ten = [replace(one, finger=Finger(tip_radius=radius)) for one in published_scenes()]
+    ten = [replace(scene, finger=Finger(tip_radius=radius)) for scene in published_scenes()]
     seds = [answer.sed_ending for answer in solve_many(ten)]
     series = zip(TABLES.values(), (seds[:5], seds[5:]), strict=True)
-    signs = [np.sign(np.corrcoef(list(rows), told)[0, 1]) for rows, told in series]
+    signs = [np.sign(np.corrcoef(list(rows), values)[0, 1]) for rows, values in series]
     assert signs == [sticky, slippery]
 
 
@@ -120,19 +120,19 @@ def test_scores_that_no_subject_varies_are_compared_with_nothing_and_the_reason_
         for subject, level in (("a", 20.1), ("b", 50.3), ("c", 80.7))
         for index, mu in zip((0, 20, 50, 80, 100), (0.28, 0.44, 0.48, 0.64, 0.67), strict=True)
     ]
-    found = rivals_within(trials)
-    assert all(one.r is None and one.contrast is None and one.partial is None for one in found)
-    (said,) = rivals_sentences("stickiness", found)
-    assert said == "Of stickiness, the SED is compared with no rival: one of them does not vary within subjects."
+    difference = rivals_within(trials)
+    assert all(name.r is None and name.contrast is None and name.partial is None for name in difference)
+    (sentence,) = rivals_sentences("stickiness", difference)
+    assert sentence == "Of stickiness, the SED is compared with no rival: one of them does not vary within subjects."
 
 
 def test_what_has_no_number_has_a_reason_instead():
     series = {MODEL: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}, "µ static": {0: 1.0}, MODEL_MU: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}}
-    found = {rival.name: rival for rival in rivals_of_means({0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0}, series)}
-    assert found["µ static"].r is None
-    assert set(found["µ static"].reasons) == {"r", "contrast", "partial", "left_out_error"}
-    assert "µ determines it" in found[MODEL].reasons["partial"]
-    assert found[MODEL_MU].contrast is None  # the two are one variable
+    rivals = {rival.name: rival for rival in rivals_of_means({0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0}, series)}
+    assert rivals["µ static"].r is None
+    assert set(rivals["µ static"].reasons) == {"r", "contrast", "partial", "left_out_error"}
+    assert "µ determines it" in rivals[MODEL].reasons["partial"]
+    assert rivals[MODEL_MU].contrast is None  # the two are one variable
     assert rivals_of_means({0: 1.0}, {MODEL_MU: {0: 1.0}}) == ()
 
 
@@ -153,35 +153,36 @@ def people(draw, judge, subjects=10):
 
 def test_the_quantity_that_people_judge_by_is_told_from_its_rivals():
     draw = np.random.default_rng(7)
-    by_mu = {one.name: one for one in rivals_within(people(draw, lambda mu, _: 120.0 * (mu - 0.5)))}
-    by_sed = {one.name: one for one in rivals_within(people(draw, lambda _, sed: 4e4 * (sed - 0.0086)))}
+    by_mu = {rival.name: rival for rival in rivals_within(people(draw, lambda mu, _: 120.0 * (mu - 0.5)))}
+    by_sed = {rival.name: rival for rival in rivals_within(people(draw, lambda _, sed: 4e4 * (sed - 0.0086)))}
     assert by_mu[MODEL_MU].contrast.high < 0.0 < by_sed[MODEL_MU].contrast.low
     assert by_mu[MODEL].partial_low < 0.0 < by_mu[MODEL].partial_high
     assert by_sed[MODEL].partial_low > 0.5
     assert by_mu[MODEL_MU].weight > 0.95
     assert by_sed[MODEL].weight > 0.95
     assert by_mu[MODEL_MU].left_out_error < by_mu[MODEL].left_out_error
-    assert sum(one.weight for one in by_mu.values()) == pytest.approx(1.0)
+    assert sum(rival.weight for rival in by_mu.values()) == pytest.approx(1.0)
 
 
 def test_numbers_within_subjects_are_those_of_trials_without_each_subjects_mean():
     trials = people(np.random.default_rng(8), lambda mu, _: 90.0 * mu, subjects=4)
-    found = {one.name: one for one in rivals_within(trials)}
+    rivals = {rival.name: rival for rival in rivals_within(trials)}
     who = [trial.subject for trial in trials]
     columns = {name: np.array([trial.values[name] for trial in trials]) for name in (MODEL, MODEL_MU)}
     columns["score"] = np.array([trial.score for trial in trials])
-    left = {
+    centred = {
         name: (v.reshape(4, 5) - v.reshape(4, 5).mean(axis=1, keepdims=True)).ravel() for name, v in columns.items()
     }
     expected = repeated_correlation(who, columns[MODEL], columns["score"])
-    assert (found[MODEL].r, found[MODEL].low) == (expected.r, expected.people[0])
-    steps = [abs(np.corrcoef(left["score"], left[name])[0, 1]) for name in (MODEL, MODEL_MU)]
-    assert found[MODEL_MU].contrast.difference == pytest.approx(steps[0] - steps[1])
-    rest = [
-        left[name] - left[MODEL_MU] * (left[name] @ left[MODEL_MU]) / (left[MODEL_MU] @ left[MODEL_MU])
+    assert (rivals[MODEL].r, rivals[MODEL].low) == (expected.r, expected.people[0])
+    steps = [abs(np.corrcoef(centred["score"], centred[name])[0, 1]) for name in (MODEL, MODEL_MU)]
+    assert rivals[MODEL_MU].contrast.difference == pytest.approx(steps[0] - steps[1])
+    leftover = [
+        centred[name]
+        - centred[MODEL_MU] * (centred[name] @ centred[MODEL_MU]) / (centred[MODEL_MU] @ centred[MODEL_MU])
         for name in (MODEL, "score")
     ]
-    assert found[MODEL].partial == pytest.approx(np.corrcoef(rest)[0, 1])
+    assert rivals[MODEL].partial == pytest.approx(np.corrcoef(leftover)[0, 1])
 
 
 def test_intervals_over_four_subjects_hold_the_differences_of_very_many():
@@ -196,9 +197,9 @@ def test_intervals_over_four_subjects_hold_the_differences_of_very_many():
         return level + slope * model + 8.0 * draw.standard_normal((people, 5)), model, rival, mu
 
     scores, *values = (column - column.mean(axis=1, keepdims=True) for column in cases(200_000))
-    among = np.corrcoef([column.ravel() for column in (scores, *values)])
-    partial = (among[0, 1] - among[0, 3] * among[1, 3]) / math.sqrt((1 - among[0, 3] ** 2) * (1 - among[1, 3] ** 2))
-    held = []
+    r = np.corrcoef([column.ravel() for column in (scores, *values)])
+    partial = (r[0, 1] - r[0, 3] * r[1, 3]) / math.sqrt((1 - r[0, 3] ** 2) * (1 - r[1, 3] ** 2))
+    coverage = []
     for _ in range(100):
         score, *columns = cases(4)
         trials = [
@@ -208,11 +209,11 @@ def test_intervals_over_four_subjects_hold_the_differences_of_very_many():
             for i in range(4)
             for j in range(5)
         ]
-        found = {one.name: one for one in rivals_within(trials)}
-        step, given_mu = found["N"].contrast, found[MODEL]
-        holds = step.low <= among[0, 1] - among[0, 2] <= step.high
-        held.append((holds, given_mu.partial_low <= partial <= given_mu.partial_high))
-    assert (np.mean(held, axis=0) >= 0.90).all()  # two standard errors of 100 below 95 %
+        rivals = {name.name: name for name in rivals_within(trials)}
+        step, partial_model = rivals["N"].contrast, rivals[MODEL]
+        holds = step.low <= r[0, 1] - r[0, 2] <= step.high
+        coverage.append((holds, partial_model.partial_low <= partial <= partial_model.partial_high))
+    assert (np.mean(coverage, axis=0) >= 0.90).all()  # two standard errors of 100 below 95 %
 
 
 def test_a_quantity_that_trials_lack_gets_no_weight_and_the_others_keep_theirs():
@@ -221,12 +222,12 @@ def test_a_quantity_that_trials_lack_gets_no_weight_and_the_others_keep_theirs()
         RivalTrial(t.subject, t.index, t.score, {k: v for k, v in t.values.items() if k != "N" or t.index})
         for t in trials
     ]
-    whole = {one.name: one for one in rivals_within([t for t in trials if t.values])}
-    found = {one.name: one for one in rivals_within(some)}
-    assert found["N"].weight is None
-    assert "10 of 50 trials" in found["N"].reasons["weight"]
-    ratio = found[MODEL].weight / found[MODEL_MU].weight
-    assert ratio == pytest.approx(whole[MODEL].weight / whole[MODEL_MU].weight)
+    complete = {rival.name: rival for rival in rivals_within([t for t in trials if t.values])}
+    rivals = {rival.name: rival for rival in rivals_within(some)}
+    assert rivals["N"].weight is None
+    assert "10 of 50 trials" in rivals["N"].reasons["weight"]
+    ratio = rivals[MODEL].weight / rivals[MODEL_MU].weight
+    assert ratio == pytest.approx(complete[MODEL].weight / complete[MODEL_MU].weight)
 
 
 def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
@@ -241,7 +242,7 @@ def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
         return -2.0 * stats.multivariate_normal.logpdf(y, at[0] + at[1] * x, covariance)
 
     least = optimize.minimize(dense, np.zeros(5), method="Nelder-Mead", options={"maxiter": 4000, "xatol": 1e-6})
-    assert crossed_deviance([str(one) for one in who], what, y, x) == pytest.approx(least.fun, abs=1e-5)
+    assert crossed_deviance([str(name) for name in who], what, y, x) == pytest.approx(least.fun, abs=1e-5)
 
 
 def test_round_off_in_the_scores_leaves_the_crossed_deviance_as_it_is():
@@ -251,11 +252,11 @@ def test_round_off_in_the_scores_leaves_the_crossed_deviance_as_it_is():
     for _ in range(10):
         x = draw.normal(size=5)[what] + 0.05 * draw.normal(size=40)
         y = 20.0 * draw.normal(size=4)[who] + 2.0 * draw.normal(size=5)[what] + 30.0 * x + 5.0 * draw.normal(size=40)
-        moved = [
-            crossed_deviance([str(one) for one in who], what, y * (1.0 + 1e-14 * draw.normal(size=40)), x)
+        deviances = [
+            crossed_deviance([str(name) for name in who], what, y * (1.0 + 1e-14 * draw.normal(size=40)), x)
             for _ in range(4)
         ]
-        assert max(moved) - min(moved) < 1e-10
+        assert max(deviances) - min(deviances) < 1e-10
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -275,13 +276,13 @@ def test_no_spreads_of_a_grid_are_likelier_than_the_crossed_deviance(seed):
     def dense(level, surface):
         v = np.eye(40) + level**2 * (who[:, None] == who) + surface**2 * (what[:, None] == what)
         inverse = np.linalg.inv(v)
-        left = y - columns @ np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ y)
-        return np.linalg.slogdet(v)[1] + 40 * (1.0 + np.log(2.0 * np.pi * (left @ inverse @ left) / 40))
+        residuals = y - columns @ np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ y)
+        return np.linalg.slogdet(v)[1] + 40 * (1.0 + np.log(2.0 * np.pi * (residuals @ inverse @ residuals) / 40))
 
     grid = np.geomspace(0.02, 20.0, 25)
     least = min(dense(level, surface) for level in (0.0, *grid) for surface in (0.0, *grid))
-    found = crossed_deviance([str(one) for one in who], what, y, x)
-    assert least - 0.5 < found <= least + 1e-9
+    deviance = crossed_deviance([str(name) for name in who], what, y, x)
+    assert least - 0.5 < deviance <= least + 1e-9
 
 
 def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
@@ -289,7 +290,7 @@ def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
     who, what = np.repeat(np.arange(10), 5), np.tile(np.arange(5), 10)
     x = draw.normal(size=50)
     y = np.array([16.0, 31.0, 38.0, 100.0, 105.2])[what] + 8.0 * draw.normal(size=10)[who] + 2.0 * draw.normal(size=50)
-    assert math.isfinite(crossed_deviance([str(one) for one in who], what, y, x))
+    assert math.isfinite(crossed_deviance([str(name) for name in who], what, y, x))
 
 
 def test_weights_are_those_of_the_published_rule():
@@ -298,17 +299,17 @@ def test_weights_are_those_of_the_published_rule():
 
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
     report = example()
-    shown = next(one for one in tables(report)["rivals"] if one.name == "table-rivals")
-    assert [row[0].text for row in shown.groups[0].rows] == [MODEL, MODEL_MU, "µ static", "τ max", "speed"]
-    assert len(shown.caption.split()) <= 60
-    drawn = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
-    assert "τ max +0.95" in drawn
+    rivals_table = next(table for table in tables(report)["rivals"] if table.name == "table-rivals")
+    assert [row[0].text for row in rivals_table.groups[0].rows] == [MODEL, MODEL_MU, "µ static", "τ max", "speed"]
+    assert len(rivals_table.caption.split()) <= 60
+    picture_text = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
+    assert "τ max +0.95" in picture_text
     in_data = asdict(report)["experiments"][0]["rivals"][1]["contrast"]
     assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
-    said = " ".join(distinctions(report))
-    assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
+    sentences = " ".join(distinctions(report))
+    assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in sentences
     needed = required_cases(*correlations_of(report.experiments[0]))
-    assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in said
+    assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in sentences
 
 
 def correlations_of(experiment):
@@ -321,13 +322,13 @@ def correlations_of(experiment):
 
 
 def test_a_study_shows_rivals_of_means_and_within_subjects_on_its_page_and_as_csv():
-    found = study()
-    page = study_page(found, "x")
+    findings = study()
+    page = study_page(findings, "x")
     assert 'id="table-rivals"' in page
     assert "stickiness, within subjects" in page
-    rows = rivals_csv(found).splitlines()
+    rows = rivals_csv(findings).splitlines()
     assert rows[0].startswith("SIMULATED,descriptor,kind,name,n,r,low,high")
-    assert sum(",within," in row for row in rows) == len(found.descriptors[0].rivals)
+    assert sum(",within," in row for row in rows) == len(findings.descriptors[0].rivals)
 
 
 def test_a_sentence_names_those_rivals_whose_p_allows_for_all_of_them():
@@ -336,8 +337,8 @@ def test_a_sentence_names_those_rivals_whose_p_allows_for_all_of_them():
     rivals = [
         Rival(name, 50, 0.5, 0.1, 0.8, Contrast(50, step, None, None, None, p)) for name, (step, p) in steps.items()
     ]
-    (said,) = rivals_sentences("roughness", [Rival(MODEL, 50, 0.9, 0.8, 0.95), *rivals])
-    assert said == (
+    (sentence,) = rivals_sentences("roughness", [Rival(MODEL, 50, 0.9, 0.8, 0.95), *rivals])
+    assert sentence == (
         "On roughness, the scores follow N less closely than the SED (p < 0.05 by Holm over 3 rivals); they tell no "
         "difference between the SED and T and speed."
     )
@@ -346,14 +347,14 @@ def test_a_sentence_names_those_rivals_whose_p_allows_for_all_of_them():
 def test_the_jackknife_of_a_mean_is_the_t_test_of_its_values():
     values = np.random.default_rng(6).normal(1.0, 1.0, 7)
     test = stats.ttest_1samp(values, 0.0)
-    found = jackknife(values.mean(), np.array([np.delete(values, n).mean() for n in range(7)]))
-    assert found == pytest.approx((*test.confidence_interval(0.95), test.pvalue))
+    difference = jackknife(values.mean(), np.array([np.delete(values, n).mean() for n in range(7)]))
+    assert difference == pytest.approx((*test.confidence_interval(0.95), test.pvalue))
 
 
 def test_equal_rivals_are_said_to_be_told_apart_by_no_number_of_surfaces():
     score = {0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0, 4: 6.0}
     same = {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0, 4: 5.0}
     twice = {index: 2.0 * value for index, value in same.items()}
-    said = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, MODEL_MU: twice}))
-    assert said[0].startswith("Roughness: µ of the model orders these 5 surfaces as the SED does")
-    assert said[0].endswith("no number of surfaces would.")
+    sentences = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, MODEL_MU: twice}))
+    assert sentences[0].startswith("Roughness: µ of the model orders these 5 surfaces as the SED does")
+    assert sentences[0].endswith("no number of surfaces would.")

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
+from simulated_session import Session, once
 from stand_ins import RATE, Hands
-from told_session import Session, once
 
 from sessions.recording.log import health_of
 from sessions.run.runner import RunnerSettings, run_session
@@ -47,9 +47,9 @@ def test_every_reading_from_start_to_end_is_recorded_and_accounted_for(whole):
     session, recording = whole
     block = recording.readings()
     assert block.sequence.tolist() == list(range(session.transducer.sent))
-    ended = recording.events[-1]
-    assert (ended.kind, ended.readings, ended.data["readings"]) == ("ended", len(block), len(block))
-    assert ended.data["health"]["received"] == len(block)
+    end = recording.events[-1]
+    assert (end.kind, end.readings, end.data["readings"]) == ("ended", len(block), len(block))
+    assert end.data["health"]["received"] == len(block)
 
 
 def test_a_take_holds_its_unloaded_stretch_its_stroke_and_what_follows_up_to_the_score(whole):
@@ -58,10 +58,10 @@ def test_a_take_holds_its_unloaded_stretch_its_stroke_and_what_follows_up_to_the
         assert record.start_ns + 500_000_000 <= begin
         assert end < record.stop_ns
         block = recording.readings(record.trial.number)
-        pressed = block.raw[:, 2] < -1e6
-        assert pressed.sum() == pytest.approx(0.6 * RATE, abs=1)
-        assert not pressed[: int(0.5 * RATE)].any()
-        assert not pressed[-5:].any()
+        touching = block.raw[:, 2] < -1e6
+        assert touching.sum() == pytest.approx(0.6 * RATE, abs=1)
+        assert not touching[: int(0.5 * RATE)].any()
+        assert not touching[-5:].any()
 
 
 def test_the_events_of_a_trial_come_in_their_order(whole):
@@ -108,9 +108,9 @@ def test_onset_and_lift_are_seen_at_the_readings_where_they_were_planted(whole):
 
 def test_the_settings_in_force_are_logged_and_marked_as_default_or_set(tmp_path):
     recording = Session(tmp_path / "s").run(settings=RunnerSettings(zero_duration=0.4))
-    told = recording.events[0].data["settings"]
-    assert told["zero_duration"] == {"value": 0.4, "origin": "set"}
-    assert told["tick"]["origin"] == "default"
+    settings = recording.events[0].data["settings"]
+    assert settings["zero_duration"] == {"value": 0.4, "origin": "set"}
+    assert settings["tick"]["origin"] == "default"
 
 
 def test_the_same_plan_and_the_same_happenings_give_the_same_log(tmp_path, whole):
@@ -122,13 +122,13 @@ def test_nothing_is_shown_before_it_is_safe(tmp_path):
     session = Session(tmp_path / "s")
     show = session.hands.show
 
-    def watched(command):
+    def show_checked(command):
         if not isinstance(command, MeasureZero):
             assert session.writer.acknowledged.readings == session.writer._readings
             assert session.writer.acknowledged.events == session.writer._event_count
         show(command)
 
-    session.hands.show = watched
+    session.hands.show = show_checked
     assert session.run().events[-1].kind == "ended"
 
 
@@ -139,11 +139,11 @@ def test_a_visit_for_scores_only_asks_the_disk_every_second_while_nobody_does_an
     session = Session(tmp_path / "s", forces=False, instead={AskMount: lambda _: []})
     ages = []
 
-    def told(status):
+    def note_age(status):
         ages.append((session.clock.now_ns() - status.safe.time_ns) * 1e-9)
 
-    begun = session.clock.now_ns()
-    session.run(progress=told, stop=lambda: ("aborted", "") if session.clock.now_ns() - begun > 20e9 else None)
+    start_ns = session.clock.now_ns()
+    session.run(progress=note_age, stop=lambda: ("aborted", "") if session.clock.now_ns() - start_ns > 20e9 else None)
     assert len(ages) > 15
     assert max(ages) < 1.5  # the lamp says NOT RECORDING after 3 s
 
@@ -230,21 +230,21 @@ def test_an_event_that_is_not_meant_is_refused_shown_and_logged(tmp_path):
 
     session.hands.poll = poll
     recording = session.run()
-    wanted = session.plan.trials[0].stimulus.code
+    code = session.plan.trials[0].stimulus.code
     assert [event.data["sentence"] for event in recording.events if event.kind == "refused"] == [
-        f"trial 1 needs the stimulus {wanted}, not A00",
-        f"trial 1 needs the stimulus {wanted}, not X",
+        f"trial 1 needs the stimulus {code}, not A00",
+        f"trial 1 needs the stimulus {code}, not X",
     ]
     assert sum(isinstance(command, Refuse) for command in session.hands.shown) == 2
 
 
 def test_a_further_stroke_before_the_score_is_recorded_and_flagged(tmp_path):
     session = Session(tmp_path / "s")
-    left = [True]
+    untouched = [True]
 
     def answer_late(_):
-        if left:
-            left.pop()
+        if untouched:
+            untouched.pop()
             now = session.clock.ns
             session.hands.stroke(now)
             session.hands.events.append((now + 1_500_000_000, Scored(50.0)))
@@ -281,10 +281,10 @@ def test_no_zero_is_taken_while_something_touches_and_somebody_is_told(tmp_path)
 def test_lost_readings_and_a_rate_not_as_set_are_logged_and_named_as_flaws(tmp_path):
     words = "readings come at 100 Hz, not at 200 Hz"
     recording = Session(tmp_path / "s", lost=range(300, 307), rate_words=words).run()
-    told = [event.data for event in recording.events if event.kind == "losses"]
-    assert sum(data["lost"] for data in told) == 7
-    assert [data["rate_words"] for data in told if data["off_rate"]] == [words]
-    assert words in next(data["sentence"] for data in told if data["off_rate"])
+    losses = [event.data for event in recording.events if event.kind == "losses"]
+    assert sum(data["lost"] for data in losses) == 7
+    assert [data["rate_words"] for data in losses if data["off_rate"]] == [words]
+    assert words in next(data["sentence"] for data in losses if data["off_rate"])
     assert recording.flaws == (
         "7 readings never arrived",
         "how often the device's rate was found to be another than set, or than before: 1",
@@ -303,13 +303,13 @@ def test_losses_are_reported_at_most_once_a_second(tmp_path):
 
 
 def test_progress_tells_what_the_recording_has_acknowledged(tmp_path):
-    told = []
+    reports = []
     session = Session(tmp_path / "s")
-    session.run(progress=told.append)
-    assert {status.state for status in told} >= {"mounting", "taring", "ready", "stroking", "scoring"}
-    assert all(status.safe.readings <= status.readings for status in told)
+    session.run(progress=reports.append)
+    assert {status.state for status in reports} >= {"mounting", "taring", "ready", "stroking", "scoring"}
+    assert all(status.safe.readings <= status.readings for status in reports)
     # A commit a second: never more than one second and one look are not yet safe.
-    assert max(status.readings - status.safe.readings for status in told) <= 1.1 * RATE
+    assert max(status.readings - status.safe.readings for status in reports) <= 1.1 * RATE
 
 
 def test_a_clock_that_jumps_ahead_while_the_computer_slept_costs_nothing_and_the_session_goes_on(tmp_path):

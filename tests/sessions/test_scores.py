@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from recordings import begun
+from recordings import new_writer
 
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import Recording
@@ -74,65 +74,65 @@ def test_subjects_who_all_answer_alike_tell_no_interval():
 
 @pytest.mark.parametrize(("r", "low", "high"), [(0.95, 0.42, 0.997), (0.97, 0.61, 0.998)])
 def test_the_interval_of_r_from_five_points_is_as_wide_as_fisher_says(r, low, high):
-    found = relation(*points_with_r(r), labels=(0, 20, 50, 80, 100))
-    assert found.pearson == pytest.approx(r)
-    assert (round(found.low, 2), round(found.high, 3)) == (low, high)
+    correlation = relation(*points_with_r(r), labels=(0, 20, 50, 80, 100))
+    assert correlation.pearson == pytest.approx(r)
+    assert (round(correlation.low, 2), round(correlation.high, 3)) == (low, high)
 
 
 def test_a_perfect_order_of_five_has_the_exact_p_of_two_in_120():
-    found = relation([1, 2, 3, 4, 5], [1, 2, 4, 8, 16], labels=(0, 20, 50, 80, 100))
-    assert found.spearman == pytest.approx(1)
-    assert found.spearman_p == pytest.approx(2 / 120)
+    correlation = relation([1, 2, 3, 4, 5], [1, 2, 4, 8, 16], labels=(0, 20, 50, 80, 100))
+    assert correlation.spearman == pytest.approx(1)
+    assert correlation.spearman_p == pytest.approx(2 / 120)
 
 
 def test_means_that_are_equal_but_for_round_off_share_their_rank():
-    found = relation([1, 2, 3, 4], [np.mean([0.1, 0.2, 0.3]), np.mean([0.3, 0.2, 0.1]), 1, 2], labels=(1, 2, 3, 4))
-    assert found.spearman == pytest.approx(math.sqrt(0.9))  # ranks 1.5 1.5 3 4: 4.5 / sqrt(5 * 4.5)
+    result = relation([1, 2, 3, 4], [np.mean([0.1, 0.2, 0.3]), np.mean([0.3, 0.2, 0.1]), 1, 2], labels=(1, 2, 3, 4))
+    assert result.spearman == pytest.approx(math.sqrt(0.9))  # ranks 1.5 1.5 3 4: 4.5 / sqrt(5 * 4.5)
 
 
 def test_the_published_slipperiness_friction_is_out_of_order_at_55_only():
     index, mu = (0, 20, 55, 75, 100), (0.62, 0.55, 0.44, 0.52, 0.24)  # the published Table 2
-    found = relation(index, mu, labels=index)
+    correlation = relation(index, mu, labels=index)
     # One neighbouring pair is exchanged: rho = -(1 - 6 * 2 / (5 * 24)) = -0.9.
-    assert found.spearman == pytest.approx(-0.9)
-    assert dict(found.without)[55] < found.pearson < 0
+    assert correlation.spearman == pytest.approx(-0.9)
+    assert dict(correlation.without)[55] < correlation.pearson < 0
 
 
 def test_the_interval_of_rho_is_bonett_and_wrights():
     x = list(range(10))
     y = [1, 0, 2, 4, 3, 5, 6, 9, 7, 8]  # sum of d^2: 1 + 1 + 1 + 1 + 4 + 1 + 1 = 10, rho = 1 - 60 / 990
-    found = relation(x, y, labels=x)
+    correlation = relation(x, y, labels=x)
     rho = 1 - 60 / 990
     half = 1.959964 * ((1 + rho * rho / 2) / 7) ** 0.5
-    assert found.spearman == pytest.approx(rho)
+    assert correlation.spearman == pytest.approx(rho)
     expected = [math.tanh(math.atanh(rho) + side * half) for side in (-1, 1)]
-    assert [found.spearman_low, found.spearman_high] == pytest.approx(expected, rel=1e-6)
+    assert [correlation.spearman_low, correlation.spearman_high] == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_line_is_the_least_squares_line():
-    found = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
-    assert (found.slope, found.intercept) == (pytest.approx(2), pytest.approx(1))
+    correlation = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
+    assert (correlation.slope, correlation.intercept) == (pytest.approx(2), pytest.approx(1))
 
 
 def test_a_perfect_r_has_no_interval_and_says_so():
-    found = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
-    assert found.low is None
-    assert "perfect" in found.reason
+    correlation = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
+    assert correlation.low is None
+    assert "perfect" in correlation.reason
 
 
 @pytest.mark.parametrize(
     ("x", "y", "why"), [([1, 2], [3, 4], "too few"), ([], [], "too few"), ([1, 2, 3], [4, 4, 4], "vary")]
 )
 def test_without_a_correlation_there_is_a_reason_and_no_number(x, y, why):
-    found = relation(x, y, labels=tuple(range(len(x))))
-    assert (found.pearson, found.spearman, found.slope) == (None, None, None)
-    assert why in found.reason
+    correlation = relation(x, y, labels=tuple(range(len(x))))
+    assert (correlation.pearson, correlation.spearman, correlation.slope) == (None, None, None)
+    assert why in correlation.reason
 
 
 def test_three_points_have_an_r_but_no_interval():
-    found = relation([1, 2, 3], [1, 3, 2], labels=(1, 2, 3))
-    assert found.pearson == pytest.approx(0.5)
-    assert (found.low, found.high) == (None, None)
+    correlation = relation([1, 2, 3], [1, 3, 2], labels=(1, 2, 3))
+    assert correlation.pearson == pytest.approx(0.5)
+    assert (correlation.low, correlation.high) == (None, None)
 
 
 def test_a_subject_whose_scores_fall_with_the_index_is_named():
@@ -163,24 +163,24 @@ def test_the_order_of_the_sessions_does_not_matter(answers):
 
 
 @pytest.mark.parametrize(
-    ("answers", "said"),
+    ("answers", "sentence"),
     [
         (["number", "number"], "1 numbers on a scale of the subject's own"),
         (["none", "choice"], "1 choices of one of two"),
     ],
 )
-def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_with_them(tmp_path, answers, said):
+def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_with_them(tmp_path, answers, sentence):
     trials = tuple(
         Trial(n, "b", Stimulus("d", n, f"K{n}"), 1, 1, answer=answer, compared_with=1 if answer == "choice" else None)
         for n, answer in enumerate(answers, 1)
     )
     plan = SessionPlan("made", "S01", 0, "none", (Block("b", "Stroke.", 1, 2.0, ("", ""), trials),), False, Frame())
-    writer = begun(tmp_path / "s", info=None, plan=plan)
+    writer = new_writer(tmp_path / "s", info=None, plan=plan)
     for n, answer in enumerate(answers, 1):
         writer.event("take_started", n, {"take": 1})
         if n == 2:
-            given = ("number_given", {"number": 7.5}) if answer == "number" else ("chosen", {"choice": "first"})
-            writer.event(given[0], n, given[1])
+            event = ("number_given", {"number": 7.5}) if answer == "number" else ("chosen", {"choice": "first"})
+            writer.event(event[0], n, event[1])
         writer.event("take_kept", n, {"take": 1})
     writer.event("ended", data={"reason": "done"})
     writer.close()
@@ -188,12 +188,12 @@ def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_wit
     assert [record.outcome for record in recording.trials] in (["not answered", "numbered"], ["presented", "chosen"])
     table = score_table(recording)
     assert table.scores == ()
-    assert said in table.left_out
+    assert sentence in table.left_out
     assert mean_scores([table]) == ()
 
 
 @pytest.mark.parametrize(
-    ("answers", "said"),
+    ("answers", "sentence"),
     [
         ({0: 2.0, 20: 30.0, 50: 55.0}, "the grading holds"),
         ({0: 2.0, 20: 60.0, 50: 55.0}, "does not hold: 50 was judged no higher than 20"),
@@ -201,12 +201,12 @@ def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_wit
         ({0: 5.0}, "too few answers"),
     ],
 )
-def test_a_pre_evaluation_says_whether_the_makers_grading_holds_and_counts_nowhere_else(tmp_path, answers, said):
+def test_a_pre_evaluation_says_whether_the_makers_grading_holds_and_counts_nowhere_else(tmp_path, answers, sentence):
     trials = tuple(
         Trial(n, "b", Stimulus("d", index, f"K{n}"), 1, 1, "pre-evaluation") for n, index in enumerate(answers, 1)
     )
     plan = SessionPlan("made", "S01", 0, "none", (Block("b", "Stroke.", 1, 2.0, ("", ""), trials),), False, Frame())
-    writer = begun(tmp_path / "s", info=None, plan=plan)
+    writer = new_writer(tmp_path / "s", info=None, plan=plan)
     for n, score in enumerate(answers.values(), 1):
         writer.event("take_started", n, {"take": 1})
         writer.event("scored", n, {"score": score})
@@ -214,5 +214,5 @@ def test_a_pre_evaluation_says_whether_the_makers_grading_holds_and_counts_nowhe
     writer.event("ended", data={"reason": "done"})
     writer.close()
     recording = Recording.open(tmp_path / "s")
-    assert said in grading(recording.trials)["d"]
+    assert sentence in grading(recording.trials)["d"]
     assert score_table(recording).scores == ()

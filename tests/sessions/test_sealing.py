@@ -29,45 +29,49 @@ def session(request, tmp_path):
     member = enrol(folder, "P01", Body())
     study = open_study(folder)
     place = study.place(member, study_key(folder))
-    planned = plan(study.protocol, "P01", study.session_seed(member.slot), place=place, forces=False)
+    session_plan = plan(study.protocol, "P01", study.session_seed(member.slot), place=place, forces=False)
     clock = SimulatedClock()
-    writer = SessionWriter.create(folder / "P01", planned, None, provenance(clock), subject_simulated=True, clock=clock)
+    writer = SessionWriter.create(
+        folder / "P01", session_plan, None, provenance(clock), subject_simulated=True, clock=clock
+    )
     hands = Hands(clock, None, {AskScore: lambda _: [Scored(50.0)]})
-    run_session(planned, writer, hands, None)
+    run_session(session_plan, writer, hands, None)
     seal(folder / "P01")
     return folder / "P01"
 
 
-def said(session, **changed):
-    return sealed_sentence(Recording.open(session), [{**ROW, **changed}])
+def sentence_of(session, **changes):
+    return sealed_sentence(Recording.open(session), [{**ROW, **changes}])
 
 
 def test_without_a_seal_the_report_says_so(session):
-    assert "had not been sealed" in said(session)
+    assert "had not been sealed" in sentence_of(session)
 
 
 def test_a_prediction_sealed_while_the_key_was_closed_is_shown_to_be(session):
     sha256 = seal_prediction(Recording.open(session), PREDICTION)
     assert sha256 == digest([ROW])
-    assert "while the key of the stimuli was sealed, as it still is; the predictions shown are those" in said(session)
+    assert "while the key of the stimuli was sealed, as it still is; the predictions shown are those" in sentence_of(
+        session
+    )
     assert run(["unblind", str(session.parent), "--by", "E01"]) == 0
-    assert "while the key of the stimuli was sealed; it was opened on" in said(session)
-    assert sha256[:16] in said(session)
+    assert "while the key of the stimuli was sealed; it was opened on" in sentence_of(session)
+    assert sha256[:16] in sentence_of(session)
 
 
 def test_a_seal_made_after_the_key_was_opened_does_not_pass_for_an_earlier_one(session):
     assert run(["unblind", str(session.parent), "--by", "E01"]) == 0
     seal_prediction(Recording.open(session), PREDICTION)
-    assert "when nothing hid which score" in said(session)
+    assert "when nothing hid which score" in sentence_of(session)
     forged = {**json.loads((session / SEAL).read_bytes()), "blinded": True}
     store_derived(session, SEAL, forged)
-    assert "the record of unblinding does not hold this seal" in said(session)
+    assert "the record of unblinding does not hold this seal" in sentence_of(session)
 
 
 def test_other_numbers_than_the_sealed_ones_are_told(session):
     seal_prediction(Recording.open(session), PREDICTION)
-    assert "shown are those" in said(session, sed=0.0085 * (1 + 1e-15))
-    assert "others, made since" in said(session, sed=0.0086)
+    assert "shown are those" in sentence_of(session, sed=0.0085 * (1 + 1e-15))
+    assert "others, made since" in sentence_of(session, sed=0.0086)
 
 
 def test_a_seal_that_was_changed_is_found_and_none_replaces_another(session):
@@ -77,13 +81,13 @@ def test_a_seal_that_was_changed_is_found_and_none_replaces_another(session):
     document = json.loads((session / SEAL).read_bytes())
     document["numbers"][0]["sed"] = 0.01
     store_derived(session, SEAL, document)
-    assert "was changed" in said(session)
+    assert "was changed" in sentence_of(session)
 
 
 @pytest.mark.parametrize("session", [False], indirect=True)
 def test_without_blinding_a_seal_says_that_nothing_hid_the_scores(session):
     seal_prediction(Recording.open(session), PREDICTION)
-    assert "when nothing hid which score" in said(session)
+    assert "when nothing hid which score" in sentence_of(session)
 
 
 def test_a_damaged_seal_is_told_and_stops_no_report(session):
@@ -91,4 +95,4 @@ def test_a_damaged_seal_is_told_and_stops_no_report(session):
     whole = (session / SEAL).read_bytes()
     for damaged in (whole[:-20], whole.replace(b'"numbers"', b'"numberz"')):
         (session / SEAL).write_bytes(damaged)
-        assert "is damaged and proves nothing" in said(session)
+        assert "is damaged and proves nothing" in sentence_of(session)

@@ -15,21 +15,21 @@ SED = NAMES.index("sed")
 
 
 def signs(finger, name="sed", **kwargs):
-    found = series_slopes(finger, **kwargs)
-    return [round(float(found[series][0].with_index[NAMES.index(name)]), 2) for series in SERIES]
+    slopes = series_slopes(finger, **kwargs)
+    return [round(float(slopes[series][0].with_index[NAMES.index(name)]), 2) for series in SERIES]
 
 
 def test_correlations_and_changes_are_those_of_full_solves():
-    found = series_slopes(PUBLISHED)
+    slopes = series_slopes(PUBLISHED)
     for series, surfaces in SERIES.items():
-        scenes = [replace(scene(one), solve=Solve(tolerance=0.003, evidence="quick")) for one in surfaces]
+        scenes = [replace(scene(surface), solve=Solve(tolerance=0.003, evidence="quick")) for surface in surfaces]
         sed = [answer.sed_ending for answer in solve_many(scenes)]
-        mu, index = [one.mu for one in surfaces], [one.index for one in surfaces]
-        mine = found[series][0]
-        assert mine.surfaces == 5
-        assert mine.with_index[SED] == pytest.approx(np.corrcoef(index, sed)[0, 1], abs=0.02)
+        mu, index = [surface.mu for surface in surfaces], [surface.index for surface in surfaces]
+        series_slope = slopes[series][0]
+        assert series_slope.surfaces == 5
+        assert series_slope.with_index[SED] == pytest.approx(np.corrcoef(index, sed)[0, 1], abs=0.02)
         change = np.polyfit(mu, sed, 1)[0] * np.ptp(mu) / np.mean(sed)
-        assert mine.change[SED] == pytest.approx(change, abs=0.01)
+        assert series_slope.change[SED] == pytest.approx(change, abs=0.01)
 
 
 def test_signs_are_those_that_a_referee_found_with_other_meshes():
@@ -42,10 +42,10 @@ def test_signs_are_those_that_a_referee_found_with_other_meshes():
 
 
 def test_at_finite_strain_four_sticky_surfaces_have_no_slide_so_that_there_is_no_slope():
-    found = series_slopes(replace(PUBLISHED, solve=Solve("finite")))
-    assert found["stickiness"][0].surfaces == 1
-    assert np.isnan(found["stickiness"][0].with_index).all()
-    assert found["slipperiness"][0].with_index[SED] > 0.7
+    slopes = series_slopes(replace(PUBLISHED, solve=Solve("finite")))
+    assert slopes["stickiness"][0].surfaces == 1
+    assert np.isnan(slopes["stickiness"][0].with_index).all()
+    assert slopes["slipperiness"][0].with_index[SED] > 0.7
 
 
 def test_under_one_force_the_sed_falls_with_stickiness():

@@ -4,7 +4,7 @@ import os
 import signal
 
 import pytest
-from told_session import Session, once
+from simulated_session import Session, once
 
 from drivers.transducer import SetupError
 from sessions.recording import Recording, RecordingError
@@ -50,10 +50,10 @@ def test_ctrl_c_and_termination_in_any_state_end_the_session_and_keep_all_of_it(
 
 def test_a_stop_request_is_answered_within_a_fifth_of_a_second_of_session_time(tmp_path):
     session = Session(tmp_path / "s")
-    asked = session.clock.ns + 3_123_000_000
-    recording = session.run(stop=lambda: ("stopped", "stopped by the user") if session.clock.ns >= asked else None)
+    stop_ns = session.clock.ns + 3_123_000_000
+    recording = session.run(stop=lambda: ("stopped", "stopped by the user") if session.clock.ns >= stop_ns else None)
     assert_ended(recording, "stopped by the user", "stopped")
-    assert recording.events[-1].time_ns - asked < 200_000_000
+    assert recording.events[-1].time_ns - stop_ns < 200_000_000
 
 
 def test_ctrl_c_while_a_device_does_not_answer_is_heard_at_once(tmp_path):

@@ -7,7 +7,7 @@ from typing import get_args
 import h5py
 import pytest
 from recordings import rows
-from told_session import Session
+from simulated_session import Session
 
 from drivers.transducer import COUNTS
 from sessions.plan.plan import Rests, Visibility
@@ -30,7 +30,7 @@ NAMED = set(re.findall(r"`([\w./-]+)`", PAGE))
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def session_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("format") / "s"
     Session(folder).run()
     seal(folder)
@@ -38,32 +38,32 @@ def recorded(tmp_path_factory):
 
 
 @pytest.mark.parametrize("table", ["head", "blocks", "events"])
-def test_every_column_of_the_live_file_is_told(recorded, table):
+def test_every_column_of_the_live_file_is_told(session_folder, table):
     assert f"## Table `{table}`" in PAGE
-    columns = {name for _, name, *_ in rows(recorded, f"PRAGMA table_info({table})")}
+    columns = {name for _, name, *_ in rows(session_folder, f"PRAGMA table_info({table})")}
     assert columns <= NAMED
 
 
-def test_the_live_file_has_no_other_table(recorded):
-    assert {name for (name,) in rows(recorded, "SELECT name FROM sqlite_master WHERE type='table'")} == {
+def test_the_live_file_has_no_other_table(session_folder):
+    assert {name for (name,) in rows(session_folder, "SELECT name FROM sqlite_master WHERE type='table'")} == {
         "head",
         "blocks",
         "events",
     }
 
 
-def test_every_data_set_of_the_copy_is_told(recorded):
-    found = []
-    with h5py.File(recorded / "session.h5") as copy:
-        copy.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+def test_every_data_set_of_the_copy_is_told(session_folder):
+    data_sets = []
+    with h5py.File(session_folder / "session.h5") as copy:
+        copy.visititems(lambda name, item: data_sets.append(name) if isinstance(item, h5py.Dataset) else None)
         assert set(copy.attrs) <= NAMED
-    assert set(found) <= NAMED
+    assert set(data_sets) <= NAMED
 
 
-def test_every_kind_of_event_is_told(recorded):
-    met = {kind for (kind,) in rows(recorded, "SELECT kind FROM events")}
+def test_every_kind_of_event_is_told(session_folder):
+    kinds = {kind for (kind,) in rows(session_folder, "SELECT kind FROM events")}
     possible = {event_log._kind(kind) for kind in get_args(Event)}
-    assert met | possible | set(COUNTS) <= NAMED
+    assert kinds | possible | set(COUNTS) <= NAMED
 
 
 def test_every_key_of_a_protocol_is_told():

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, fields, is_dataclass
 
-from made_strokes import SETTINGS, analysed, block, felt, stroke, times
+from closed_form import SETTINGS, analyse, block, noisy, slide, times
 
 from daq_app.batch.derived import settings_of
 from sessions.strokes.settings import AnalysisSettings
@@ -16,14 +16,14 @@ def test_each_setting_has_a_name_of_its_own_among_all_groups():
 
 
 def test_a_setting_is_stored_in_its_group_and_still_under_its_name_alone():
-    stored = analysed(block(times(), felt(stroke(times())))).to_dict()["settings"]
-    assert stored["filter"]["cut_off"] == stored["cut_off"] == 20.0
-    assert stored["signal"]["wild_widest"] == 2
-    assert stored["steady"]["steady_held"] == stored["steady_held"] == 0.95
+    settings = analyse(block(times(), noisy(slide(times())))).to_dict()["settings"]
+    assert settings["filter"]["cut_off"] == settings["cut_off"] == 20.0
+    assert settings["signal"]["wild_widest"] == 2
+    assert settings["steady"]["steady_held"] == settings["steady_held"] == 0.95
 
 
 def test_an_analysis_that_was_stored_without_groups_is_made_again_with_what_was_asked_for():
-    before = {"cut_off": 20.0, "steady_rule": "widened", "gain_error": 0.003, "bootstrap_seed": 7}
-    before["area"] = {"law": "hertz", "exponent": 2 / 3, "force": 1.0}
-    again = settings_of({"settings": before})
-    assert (again.area.law, again.gain_error, again.bootstrap_seed) == ("hertz", 0.003, 7)
+    old_settings = {"cut_off": 20.0, "steady_rule": "widened", "gain_error": 0.003, "bootstrap_seed": 7}
+    old_settings["area"] = {"law": "hertz", "exponent": 2 / 3, "force": 1.0}
+    restored = settings_of({"settings": old_settings})
+    assert (restored.area.law, restored.gain_error, restored.bootstrap_seed) == ("hertz", 0.003, 7)

@@ -16,70 +16,70 @@ TRIALS = (2, 4)  # stickiness 20 and 80: with and without a settled slide at fin
 SMALL = [("computed", "depth"), ("as-printed", "depth"), ("computed", "force"), ("computed", "other way")]
 
 
-def given(trials=TRIALS):
+def inputs(trials=TRIALS):
     surfaces = {number: STICKINESS[number - 1] for number in trials}
     friction = [parameters(n, s.mu, s.printed_bound * 1e-2, 1, s.speed) for n, s in surfaces.items()]
-    friction = [replace(one, stroke=at) for at, one in enumerate(friction)]
+    friction = [replace(row, stroke=at) for at, row in enumerate(friction)]
     block = replace(PLAN.blocks[0], trials=tuple(PLAN.blocks[0].trials[n - 1] for n in trials))
     return analysis(friction, [stroke(n) for n in trials]), replace(PLAN, blocks=(block,))
 
 
 @pytest.fixture(scope="module")
-def alone():
-    return predict(*given(), PredictionOptions(course="steady", variants="small"))
+def plain():
+    return predict(*inputs(), PredictionOptions(course="steady", variants="small"))
 
 
 @pytest.fixture(scope="module")
-def beside(alone):
-    return with_alternatives(alone)
+def variants(plain):
+    return with_alternatives(plain)
 
 
-def of(row, reading, driven, kinematics="small"):
-    return next(one for one in row.alternatives if one.variant == Variant(kinematics, reading, driven))
+def pick(row, reading, driven, kinematics="small"):
+    return next(a for a in row.alternatives if a.variant == Variant(kinematics, reading, driven))
 
 
-def test_every_trial_is_told_along_the_same_named_ways(beside):
-    for row in beside.trials:
-        assert [(one.variant.tau_reading, one.variant.driven) for one in row.alternatives] == SMALL
-        assert all(one.sed > 0 and one.error_estimate < 0.01 and one.reason == "" for one in row.alternatives)
+def test_every_trial_is_told_along_the_same_named_ways(variants):
+    for row in variants.trials:
+        assert [(a.variant.tau_reading, a.variant.driven) for a in row.alternatives] == SMALL
+        assert all(a.sed > 0 and a.error_estimate < 0.01 and a.reason == "" for a in row.alternatives)
 
 
-def test_what_was_predicted_anyway_is_not_solved_again(beside):
-    for row in beside.trials:
-        assert of(row, "computed", "depth").sed == row.sed
-        assert of(row, "computed", "other way").sed == row.opposite_sed
+def test_what_was_predicted_anyway_is_not_solved_again(variants):
+    for row in variants.trials:
+        assert pick(row, "computed", "depth").sed == row.sed
+        assert pick(row, "computed", "other way").sed == row.opposite_sed
 
 
-def test_the_reading_as_printed_is_that_of_a_scene_with_a_hundredth_of_the_bound(beside):
-    for row, number in zip(beside.trials, TRIALS, strict=True):
+def test_the_reading_as_printed_is_that_of_a_scene_with_a_hundredth_of_the_bound(variants):
+    for row, number in zip(variants.trials, TRIALS, strict=True):
         bound = STICKINESS[number - 1].printed_bound * 1e-4
         scene = Scene(friction=Friction(row.mu, bound), loading=Loading(2.0), solve=Solve("small", "steady"))
-        found = of(row, "as-printed", "depth")
-        assert found.tau_max == pytest.approx(bound)
-        alone = solve(scene)
-        assert found.sed == pytest.approx(alone.sed_ending, rel=found.error_estimate + alone.error_estimate)
+        variant = pick(row, "as-printed", "depth")
+        assert variant.tau_max == pytest.approx(bound)
+        solution = solve(scene)
+        assert variant.sed == pytest.approx(solution.sed_ending, rel=variant.error_estimate + solution.error_estimate)
 
 
-def test_pressed_with_the_force_measured_the_model_has_that_force_at_the_depth_that_matches(alone, beside):
-    for row, before in zip(beside.trials, alone.trials, strict=True):
-        found = of(row, "computed", "force")
-        assert found.normal_force == pytest.approx(MEASURED, rel=1e-6)
-        assert found.indentation == pytest.approx(before.matching_depth, rel=5e-3)
-        assert row.matching_depth == found.indentation  # one question, one answer
-        assert found.tangential_force <= row.mu * MEASURED * (1 + 1e-9)
+def test_pressed_with_the_force_measured_the_model_has_that_force_at_the_depth_that_matches(plain, variants):
+    for row, before in zip(variants.trials, plain.trials, strict=True):
+        variant = pick(row, "computed", "force")
+        assert variant.normal_force == pytest.approx(MEASURED, rel=1e-6)
+        assert variant.indentation == pytest.approx(before.matching_depth, rel=5e-3)
+        assert row.matching_depth == variant.indentation  # one question, one answer
+        assert variant.tangential_force <= row.mu * MEASURED * (1 + 1e-9)
 
 
-def test_the_other_way_is_the_same_depth_slid_back(beside):
-    for row in beside.trials:
-        found = of(row, "computed", "other way")
-        assert found.indentation == row.indentation
+def test_the_other_way_is_the_same_depth_slid_back(variants):
+    for row in variants.trials:
+        variant = pick(row, "computed", "other way")
+        assert variant.indentation == row.indentation
         friction, back = Friction(row.mu, row.tau_max), Loading(2.0, "-x")
-        there = solve(Scene(friction=friction, loading=back))
-        assert found.sed == pytest.approx(there.sed_ending, rel=found.error_estimate + there.error_estimate)
+        solution = solve(Scene(friction=friction, loading=back))
+        assert variant.sed == pytest.approx(solution.sed_ending, rel=variant.error_estimate + solution.error_estimate)
 
 
-def test_it_is_plain_data_for_files_and_reports(beside):
-    rows = json.loads(json.dumps(beside.to_dict()))["trials"]
+def test_it_is_plain_data_for_files_and_reports(variants):
+    rows = json.loads(json.dumps(variants.to_dict()))["trials"]
     assert rows[0]["alternatives"][1]["variant"] == {
         "kinematics": "small",
         "tau_reading": "as-printed",
@@ -88,43 +88,43 @@ def test_it_is_plain_data_for_files_and_reports(beside):
 
 
 def test_a_trial_without_friction_or_force_says_why_in_each_variant():
-    found, plan = given((2,))
-    without = replace(found, strokes=(stroke(2, normal_force=None),))
+    friction_analysis, plan = inputs((2,))
+    without = replace(friction_analysis, strokes=(stroke(2, normal_force=None),))
     options = PredictionOptions(course="steady", variants="small")
     (row,) = with_alternatives(predict(without, plan, options)).trials
-    assert of(row, "computed", "force").reason == "The stroke gives no steady normal force."
-    (row,) = with_alternatives(predict(replace(found, friction=(), strokes=()), plan, options)).trials
-    assert {one.reason for one in row.alternatives} == {"No stroke was found in this trial."}
+    assert pick(row, "computed", "force").reason == "The stroke gives no steady normal force."
+    (row,) = with_alternatives(predict(replace(friction_analysis, friction=(), strokes=()), plan, options)).trials
+    assert {alternative.reason for alternative in row.alternatives} == {"No stroke was found in this trial."}
 
 
 def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its_place(monkeypatch):
-    asked = []
+    kinematics = []
 
     def none(scenes, _progress):
-        asked.extend(scene.solve.kinematics for scene in scenes)
+        kinematics.extend(scene.solve.kinematics for scene in scenes)
         return tuple("There is none." for _ in scenes)
 
     monkeypatch.setattr(uncertainty, "predict_scenes", none)
-    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", variants="both"))).trials
-    assert asked == ["small"] * 2 + ["finite"] * 4
-    assert of(row, "computed", "depth", "finite").sed is None
-    assert of(row, "computed", "depth", "finite").reason == "There is none."
-    assert of(row, "computed", "depth").sed == row.sed
+    (row,) = with_alternatives(predict(*inputs((4,)), PredictionOptions(course="steady", variants="both"))).trials
+    assert kinematics == ["small"] * 2 + ["finite"] * 4
+    assert pick(row, "computed", "depth", "finite").sed is None
+    assert pick(row, "computed", "depth", "finite").reason == "There is none."
+    assert pick(row, "computed", "depth").sed == row.sed
 
 
 @pytest.mark.slow
 def test_at_finite_strain_a_sticky_surface_has_no_settled_slide_at_its_depth_and_says_so():
-    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", variants="both"))).trials
-    found = of(row, "computed", "depth", "finite")
-    assert found.sed is None
-    assert "settled sliding up to mu" in found.reason
-    assert of(row, "as-printed", "depth", "finite").sed > 0
+    (row,) = with_alternatives(predict(*inputs((4,)), PredictionOptions(course="steady", variants="both"))).trials
+    variant = pick(row, "computed", "depth", "finite")
+    assert variant.sed is None
+    assert "settled sliding up to mu" in variant.reason
+    assert pick(row, "as-printed", "depth", "finite").sed > 0
 
 
-def test_a_finger_pressed_until_its_tissue_turns_inside_out_is_doubted_and_no_other(beside):
-    assert all(one.doubt == "" for row in beside.trials for one in row.alternatives)
-    deep = with_alternatives(predict(*given(), PredictionOptions(course="steady", variants="small", indentation=3.0)))
-    doubts = [of(row, "computed", "depth").doubt for row in deep.trials]
-    assert all("turned inside out" in told for told in doubts)
+def test_a_finger_pressed_until_its_tissue_turns_inside_out_is_doubted_and_no_other(variants):
+    assert all(alternative.doubt == "" for row in variants.trials for alternative in row.alternatives)
+    deep = with_alternatives(predict(*inputs(), PredictionOptions(course="steady", variants="small", indentation=3.0)))
+    doubts = [pick(row, "computed", "depth").doubt for row in deep.trials]
+    assert all("turned inside out" in doubt for doubt in doubts)
     assert all(row.prediction.audits["smallest_det_F"] < 0 for row in deep.trials)
-    assert all(told in row.prediction.warnings for told, row in zip(doubts, deep.trials, strict=True))
+    assert all(doubt in row.prediction.warnings for doubt, row in zip(doubts, deep.trials, strict=True))

@@ -27,15 +27,15 @@ def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(n, cut_off,
 
 def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included():
     values = np.maximum(np.round(np.random.default_rng(2).normal(size=200).cumsum(), 0), 0.0)
-    places, found = signal.find_peaks(values, prominence=0.0)
-    assert [one.tolist() for one in signals.peaks(values)] == [places.tolist(), found["prominences"].tolist()]
+    places, properties = signal.find_peaks(values, prominence=0.0)
+    assert [peak.tolist() for peak in signals.peaks(values)] == [places.tolist(), properties["prominences"].tolist()]
 
 
 def test_a_session_is_analysed_without_waiting_for_the_whole_of_scipys_signals():
     use = "import sys, numpy as np; from sessions.strokes.forces import low_pass, peaks; "
     use += "low_pass(np.ones((20, 1)), 20.0, 200.0, 3); peaks(np.ones(3)); "
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", use + "print('scipy.signal' in sys.modules, 'scipy.stats' in sys.modules)"],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert done.stdout.split() == ["False", "False"]
+    assert process.stdout.split() == ["False", "False"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_strokes import N, T, analysed, block, felt, stroke, trapezium, wrench
+from closed_form import N, T, analyse, block, noisy, slide, trapezium, wrench
 
 from sessions.strokes.settings import ClimbSettings
 from sessions.strokes.stick import Climb, ClimbReadings
@@ -10,7 +10,7 @@ from sessions.strokes.stick import Climb, ClimbReadings
 
 def climbing(ratio, slip):
     """Return the stroke whose T/N climbs by `ratio` (n,) until the `slip` [s], the finger moving from there on."""
-    return analysed(block(T, felt(wrench(T, N, ratio, 25.0 * np.maximum(T - slip, 0.0))))).strokes[0]
+    return analyse(block(T, noisy(wrench(T, N, ratio, 25.0 * np.maximum(T - slip, 0.0))))).strokes[0]
 
 
 @pytest.mark.parametrize("climb", [0.15, 0.3, 0.6])
@@ -22,8 +22,8 @@ def test_break_away_is_where_the_ratio_stops_climbing(climb):
 @pytest.mark.parametrize("rest", [0.1, 0.5, 1.0])
 def test_a_finger_that_rests_before_it_is_moved_breaks_away_no_earlier(rest):
     slip = 1.1 + rest + 0.25
-    found = climbing(0.5 * np.clip((T - slip) / 0.25 + 1.0, 0.0, 1.0), slip)
-    assert found.break_away == pytest.approx(slip, abs=0.005)
+    stroke = climbing(0.5 * np.clip((T - slip) / 0.25 + 1.0, 0.0, 1.0), slip)
+    assert stroke.break_away == pytest.approx(slip, abs=0.005)
 
 
 def test_a_rest_of_three_readings_is_told_from_the_climb():
@@ -35,71 +35,71 @@ def test_a_rest_of_three_readings_is_told_from_the_climb():
 
 @pytest.mark.parametrize("bend", [1.5, 2.0, 3.0])
 def test_a_climb_that_bends_as_edges_of_contact_slip_first_ends_where_all_of_it_slips(bend):
-    done = np.clip((T - 1.0) / 0.4, 0.0, 1.0)
-    found = climbing(0.5 * (1.0 - (1.0 - done) ** bend), 1.4)
-    assert found.break_away == pytest.approx(1.4, abs=0.01)
+    progress = np.clip((T - 1.0) / 0.4, 0.0, 1.0)
+    stroke = climbing(0.5 * (1.0 - (1.0 - progress) ** bend), 1.4)
+    assert stroke.break_away == pytest.approx(1.4, abs=0.01)
 
 
 @pytest.mark.parametrize("fall", [0.0, 0.08])
 def test_the_slopes_of_a_climb_are_those_of_differences(fall):
-    told = np.array([1.1, 1.42, 1.7, fall, 0.05, 0.4, 0.1 if fall else 0.0])
+    parameters = np.array([1.1, 1.42, 1.7, fall, 0.05, 0.4, 0.1 if fall else 0.0])
     times = np.linspace(1.0, 2.0, 37)
-    slopes = Climb(*told).slopes(times)
+    slopes = Climb(*parameters).slopes(times)
     for number in [0, 1, 2, 3, 4, 5, 6] if fall else [0, 1, 2, 4, 5]:
         step = 1e-6 * np.eye(7)[number]
-        change = (Climb(*(told + step)).at(times) - Climb(*(told - step)).at(times)) / 2e-6
+        change = (Climb(*(parameters + step)).at(times) - Climb(*(parameters - step)).at(times)) / 2e-6
         np.testing.assert_allclose(slopes[:, number], change, atol=1e-6)
 
 
 @pytest.mark.parametrize("peak", [0.1, 0.3])
 def test_a_static_peak_is_where_the_finger_breaks_away_but_for_what_the_filter_rounds(peak):
     above = 1.0 + peak * np.exp(-np.maximum(T - 1.4, 0.0) / 0.08)
-    found = climbing(0.5 * np.clip((T - 1.0) / 0.4, 0.0, 1.0) * above, 1.4)
-    assert found.break_away == pytest.approx(1.4, abs=0.02)
+    stroke = climbing(0.5 * np.clip((T - 1.0) / 0.4, 0.0, 1.0) * above, 1.4)
+    assert stroke.break_away == pytest.approx(1.4, abs=0.02)
 
 
 def test_no_break_away_is_told_after_the_slide_began():
-    found = climbing(0.5 * np.clip((T - 1.0) / 1.0, 0.0, 1.0), 1.4)
-    assert found.slide_onset == pytest.approx(1.4, abs=0.05)
-    assert found.break_away is None
-    assert found.reasons["break_away"] == "the contact slides before T/N stops climbing"
+    stroke = climbing(0.5 * np.clip((T - 1.0) / 1.0, 0.0, 1.0), 1.4)
+    assert stroke.slide_onset == pytest.approx(1.4, abs=0.05)
+    assert stroke.break_away is None
+    assert stroke.reasons["break_away"] == "the contact slides before T/N stops climbing"
 
 
 def test_a_ratio_that_does_not_climb_has_no_stick_phase():
-    assert analysed(block(T, felt(stroke(T)))).strokes[0].break_away is None
+    assert analyse(block(T, noisy(slide(T)))).strokes[0].break_away is None
 
 
 # ---- a finger that sticks and slips, and friction that follows the normal force
 
 
-def sawing(each, drop, mu=0.5):
-    """Return a stroke whose T/N climbs by `drop` of mu and falls back within a tenth of the period, `each` Hz."""
-    phase = each * np.maximum(T - 1.0, 0.0) % 1.0
+def sawing(frequency, drop, mu=0.5):
+    """Return a stroke whose T/N climbs by `drop` of mu and falls back within a tenth of the period, `frequency` Hz."""
+    phase = frequency * np.maximum(T - 1.0, 0.0) % 1.0
     saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
     return wrench(T, trapezium(T, 1.0, 3.0, 0.1, 2.0), mu * (1.0 - drop * (1.0 - saw)), 25.0 * (T - 2.0))
 
 
-@pytest.mark.parametrize(("each", "drop"), [(5.0, 0.2), (8.0, 0.3), (13.0, 0.15)])
-def test_of_a_finger_that_sticks_and_slips_tau_max_is_that_of_the_crests_and_no_static_peak_is_given(each, drop):
-    (one,) = (found := analysed(block(T, felt(sawing(each, drop))))).strokes
-    assert "stick_slip" in one.flaws
-    assert any(f"{each:.2g} Hz" in flaw.sentence for flaw in found.flaws)
-    assert one.tau_max == pytest.approx(0.5 * 2.0 / 100.0, rel=0.02)
-    low, high = found.intervals[0].tau_max
+@pytest.mark.parametrize(("frequency", "drop"), [(5.0, 0.2), (8.0, 0.3), (13.0, 0.15)])
+def test_of_a_finger_that_sticks_and_slips_tau_max_is_that_of_the_crests_and_no_static_peak_is_given(frequency, drop):
+    (stroke,) = (analysis := analyse(block(T, noisy(sawing(frequency, drop))))).strokes
+    assert "stick_slip" in stroke.flaws
+    assert any(f"{frequency:.2g} Hz" in flaw.sentence for flaw in analysis.flaws)
+    assert stroke.tau_max == pytest.approx(0.5 * 2.0 / 100.0, rel=0.02)
+    low, high = analysis.intervals[0].tau_max
     assert low < 0.5 * 2.0 / 100.0 < high
-    assert one.mu_static is None
+    assert stroke.mu_static is None
 
 
 @pytest.mark.parametrize("hum", [0.02, 0.1])  # N
 def test_hum_and_noise_are_no_stick_slip(hum):
-    raw = felt(stroke(T))
+    raw = noisy(slide(T))
     raw[:, :3] += hum * np.sin(2 * np.pi * 50.0 * T + 0.3)[:, None]
-    (one,) = analysed(block(T, raw)).strokes
-    assert "stick_slip" not in one.flaws
+    (stroke,) = analyse(block(T, raw)).strokes
+    assert "stick_slip" not in stroke.flaws
 
 
 def test_friction_that_falls_with_the_normal_force_is_no_static_peak():
     n = trapezium(T, 1.0, 3.0, 0.4, 3.0)
     ratio = 0.5 * (np.maximum(n, 0.1) / 3.0) ** (-1.0 / 3.0)
-    (one,) = analysed(block(T, felt(wrench(T, n, ratio, 25.0 * (T - 2.0))))).strokes
-    assert one.mu_static is None
+    (stroke,) = analyse(block(T, noisy(wrench(T, n, ratio, 25.0 * (T - 2.0))))).strokes
+    assert stroke.mu_static is None

@@ -5,25 +5,25 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from made_strokes import (
+from closed_form import (
     COUNTS,
     HEIGHT,
     PLAIN,
     SETTINGS,
     T,
-    analysed,
+    analyse,
     block,
-    felt,
     names,
-    stroke,
+    noisy,
+    slide,
     times,
     trapezium,
     trial,
     with_info,
     wrench,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from sessions.plan.plan import Frame
@@ -38,118 +38,118 @@ def steadily(**changes):
 
 
 def test_a_plain_stroke_comes_back_without_a_flaw():
-    found = analysed(block(T, felt(PLAIN)))
-    assert names(found) == set()
-    (one,) = found.strokes
-    assert one.onset == pytest.approx(1.0, abs=0.01)
-    assert one.lift == pytest.approx(3.0, abs=0.01)
-    assert one.speed == pytest.approx(25.0, rel=0.01)
-    assert one.speed_error < 0.25
-    assert one.direction == 1
-    inside = (one.steady[0] <= T) & (one.steady[1] >= T)
-    pressed = trapezium(T, 1.0, 3.0, 0.1, 2.0)[inside].mean()
-    assert one.normal_force == pytest.approx(pressed, rel=0.005)
-    assert one.tangential_force == pytest.approx(0.5 * pressed, rel=0.005)
-    assert one.steady[0] > 1.0
-    assert one.steady[1] < 3.0
-    assert one.steady[1] - one.steady[0] > 1.5
+    analysis = analyse(block(T, noisy(PLAIN)))
+    assert names(analysis) == set()
+    (stroke,) = analysis.strokes
+    assert stroke.onset == pytest.approx(1.0, abs=0.01)
+    assert stroke.lift == pytest.approx(3.0, abs=0.01)
+    assert stroke.speed == pytest.approx(25.0, rel=0.01)
+    assert stroke.speed_error < 0.25
+    assert stroke.direction == 1
+    inside = (stroke.steady[0] <= T) & (stroke.steady[1] >= T)
+    force = trapezium(T, 1.0, 3.0, 0.1, 2.0)[inside].mean()
+    assert stroke.normal_force == pytest.approx(force, rel=0.005)
+    assert stroke.tangential_force == pytest.approx(0.5 * force, rel=0.005)
+    assert stroke.steady[0] > 1.0
+    assert stroke.steady[1] < 3.0
+    assert stroke.steady[1] - stroke.steady[0] > 1.5
 
 
 def test_direction_is_minus_one_towards_the_hand():
-    assert analysed(block(T, felt(stroke(T, direction=-1)))).strokes[0].direction == -1
+    assert analyse(block(T, noisy(slide(T, direction=-1)))).strokes[0].direction == -1
 
 
 def test_the_speed_along_a_slanted_path_is_the_whole_speed():
     along = 30.0 * (T - 2.0)
     n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
     c, s = np.cos(0.4), np.sin(0.4)
-    turned = wrench(T, n, 0.5 * np.ones_like(T), along)
-    turned[:, [0, 1]] = turned[:, :2] @ np.array([[c, s], [-s, c]])
-    turned[:, [3, 4]] = turned[:, 3:5] @ np.array([[c, s], [-s, c]])
-    assert analysed(block(T, felt(turned))).strokes[0].speed == pytest.approx(30.0, rel=0.01)
+    rotated = wrench(T, n, 0.5 * np.ones_like(T), along)
+    rotated[:, [0, 1]] = rotated[:, :2] @ np.array([[c, s], [-s, c]])
+    rotated[:, [3, 4]] = rotated[:, 3:5] @ np.array([[c, s], [-s, c]])
+    assert analyse(block(T, noisy(rotated))).strokes[0].speed == pytest.approx(30.0, rel=0.01)
 
 
 @pytest.mark.parametrize("offset", [0.0, 3.0, -11.0])
 def test_an_offset_of_every_axis_changes_nothing(offset):
-    plain = analysed(block(T, felt(PLAIN))).strokes[0]
-    other = analysed(block(T, felt(PLAIN, offset=np.full(6, offset)))).strokes[0]
+    plain = analyse(block(T, noisy(PLAIN))).strokes[0]
+    other = analyse(block(T, noisy(PLAIN, offset=np.full(6, offset)))).strokes[0]
     assert other.mu_dynamic == pytest.approx(plain.mu_dynamic, abs=1e-9)
     assert other.speed == pytest.approx(plain.speed, abs=1e-6)
     assert other.onset == plain.onset
 
 
 def test_counts_become_newtons_by_the_calibration():
-    found = analysed(block(T, np.rint(felt(PLAIN) / np.diag(COUNTS.matrix))), info=with_info(calibration=COUNTS))
-    assert found.strokes[0].peak_normal == pytest.approx(2.0, rel=0.01)
-    assert names(found) == set()
+    analysis = analyse(block(T, np.rint(noisy(PLAIN) / np.diag(COUNTS.matrix))), info=with_info(calibration=COUNTS))
+    assert analysis.strokes[0].peak_normal == pytest.approx(2.0, rel=0.01)
+    assert names(analysis) == set()
 
 
 def test_two_strokes_with_a_lift_between_are_two():
     t = times(8.0)
-    both = felt(stroke(t, begin=1.0, end=3.0) + stroke(t, begin=5.0, end=7.0, direction=-1))
-    found = analysed(block(t, both))
-    assert [s.direction for s in found.strokes] == [1, -1]
-    assert names(found) == set()
-    assert "second_stroke" in names(analysed(block(t, both), of=trial()))
+    two_strokes = noisy(slide(t, begin=1.0, end=3.0) + slide(t, begin=5.0, end=7.0, direction=-1))
+    analysis = analyse(block(t, two_strokes))
+    assert [s.direction for s in analysis.strokes] == [1, -1]
+    assert names(analysis) == set()
+    assert "second_stroke" in names(analyse(block(t, two_strokes), of=trial()))
 
 
 def test_strokes_told_apart_by_a_valley_alone_say_so():
     t = times(8.0)
     dip = 3.0 - 2.8 * trapezium(t, 3.6, 4.4, 0.2)  # from 3 N down to 0.2 N and back
     n = trapezium(t, 1.0, 7.0, 0.1) * dip
-    found = analysed(block(t, felt(wrench(t, n, 0.5 * np.ones_like(t), 10.0 * (t - 4.0)))))
-    assert len(found.strokes) == 2
-    assert all("not_lifted_between" in s.flaws for s in found.strokes)
-    assert found.strokes[0].lift == pytest.approx(3.6 + 0.2 * 2.4 / 2.8, abs=0.02)  # 0.6 N, a fifth of the peak
+    analysis = analyse(block(t, noisy(wrench(t, n, 0.5 * np.ones_like(t), 10.0 * (t - 4.0)))))
+    assert len(analysis.strokes) == 2
+    assert all("not_lifted_between" in s.flaws for s in analysis.strokes)
+    assert analysis.strokes[0].lift == pytest.approx(3.6 + 0.2 * 2.4 / 2.8, abs=0.02)  # 0.6 N, a fifth of the peak
 
 
 def test_a_wandering_force_is_one_stroke():
     n = trapezium(T, 1.0, 3.0, 0.1) * (2.0 + 1.2 * np.sin(2 * np.pi * 1.5 * T))
-    found = analysed(block(T, felt(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))))
-    assert len(found.strokes) == 1
-    assert found.strokes[0].mu_dynamic == pytest.approx(0.5, rel=0.01)
+    analysis = analyse(block(T, noisy(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))))
+    assert len(analysis.strokes) == 1
+    assert analysis.strokes[0].mu_dynamic == pytest.approx(0.5, rel=0.01)
 
 
 def test_a_tap_and_a_light_touch_are_named_and_are_no_strokes():
     t = times(8.0)
     tap = wrench(t, trapezium(t, 5.0, 5.12, 0.02, 2.0), 0.1 * np.ones_like(t), np.zeros_like(t))
     brush = wrench(t, trapezium(t, 6.0, 7.0, 0.1, 0.2), 0.1 * np.ones_like(t), np.zeros_like(t))
-    found = analysed(block(t, felt(stroke(t) + tap + brush)), of=trial())
-    assert len(found.strokes) == 1
-    assert [flaw.name for flaw in found.flaws] == ["tap", "light_touch"]
+    analysis = analyse(block(t, noisy(slide(t) + tap + brush)), of=trial())
+    assert len(analysis.strokes) == 1
+    assert [flaw.name for flaw in analysis.flaws] == ["tap", "light_touch"]
 
 
 def test_a_recording_that_begins_in_contact_has_no_onset_and_its_zero_from_after():
     early = T >= 1.5
-    found = analysed(block(T[early], felt(PLAIN)[early]))
-    (one,) = found.strokes
-    assert one.onset is None
-    assert one.lift == pytest.approx(3.0, abs=0.01)
-    assert {"begins_in_contact", "zero_after_contact"} <= set(one.flaws)
-    assert one.mu_dynamic == pytest.approx(0.5, rel=0.01)
+    analysis = analyse(block(T[early], noisy(PLAIN)[early]))
+    (stroke,) = analysis.strokes
+    assert stroke.onset is None
+    assert stroke.lift == pytest.approx(3.0, abs=0.01)
+    assert {"begins_in_contact", "zero_after_contact"} <= set(stroke.flaws)
+    assert stroke.mu_dynamic == pytest.approx(0.5, rel=0.01)
 
 
 def test_a_recording_that_ends_in_contact_has_no_lift():
     late = T <= 2.5
-    (one,) = analysed(block(T[late], felt(PLAIN)[late])).strokes
-    assert one.lift is None
-    assert "ends_in_contact" in one.flaws
+    (stroke,) = analyse(block(T[late], noisy(PLAIN)[late])).strokes
+    assert stroke.lift is None
+    assert "ends_in_contact" in stroke.flaws
 
 
 def test_onset_is_the_same_live_and_offline():
     from sessions.strokes.contacts import ContactDetector
 
-    raw = felt(PLAIN)
+    raw = noisy(PLAIN)
     live = ContactDetector().feed(T, normal_force(raw, Frame("-z")))
-    (one,) = analysed(block(T, raw)).strokes
-    assert abs(one.onset - live[0].time) <= 1 / 200
-    assert abs(one.lift - live[1].time) <= 1 / 200
+    (stroke,) = analyse(block(T, raw)).strokes
+    assert abs(stroke.onset - live[0].time) <= 1 / 200
+    assert abs(stroke.lift - live[1].time) <= 1 / 200
 
 
 def test_nothing_touching_is_no_stroke_and_says_so():
-    found = analysed(block(T, felt(np.zeros((len(T), 6)))), of=trial())
-    assert found.strokes == ()
-    assert names(found, "refused") == {"no_stroke"}
+    analysis = analyse(block(T, noisy(np.zeros((len(T), 6)))), of=trial())
+    assert analysis.strokes == ()
+    assert names(analysis, "refused") == {"no_stroke"}
 
 
 # The centre of pressure and the frame
@@ -157,36 +157,36 @@ def test_nothing_touching_is_no_stroke_and_says_so():
 
 @given(x=st.floats(-40, 40), y=st.floats(-40, 40), n=st.floats(0.5, 30), mu=st.floats(0, 2), h=st.floats(-50, 50))
 def test_the_centre_of_pressure_is_where_the_force_was_put(x, y, n, mu, h):
-    one = np.ones(1)
-    put = wrench(0 * one, n * one, mu * one, x * one, across=y, height=h)
-    assert centre_of_pressure(put, h)[0] == pytest.approx([x, y], abs=1e-9)
+    ones = np.ones(1)
+    applied = wrench(0 * ones, n * ones, mu * ones, x * ones, across=y, height=h)
+    assert centre_of_pressure(applied, h)[0] == pytest.approx([x, y], abs=1e-9)
 
 
 @pytest.mark.parametrize("normal", ["+x", "-x", "+y", "-y", "+z", "-z"])
 def test_whatever_the_normal_axis_pressing_is_the_same_force_and_turns_nothing_else(normal):
     raw = np.zeros((1, 6))
     raw[0, "xyz".index(normal[1])] = 3.0 if normal[0] == "+" else -3.0
-    turned = in_face_frame(raw, Frame(normal))
-    assert turned[0].tolist() == pytest.approx([0, 0, -3.0, 0, 0, 0])
+    rotated = in_face_frame(raw, Frame(normal))
+    assert rotated[0].tolist() == pytest.approx([0, 0, -3.0, 0, 0, 0])
     assert normal_force(raw, Frame(normal))[0] == 3.0
 
 
 @given(st.sampled_from(["+x", "-x", "+y", "-y", "+z", "-z"]), st.lists(st.floats(-9, 9), min_size=6, max_size=6))
 def test_turning_into_the_face_frame_is_a_rotation(normal, values):
     raw = np.array([values])
-    turned = in_face_frame(raw, Frame(normal))[0]
+    rotated = in_face_frame(raw, Frame(normal))[0]
     force, torque = raw[0, :3], raw[0, 3:]
-    assert np.linalg.norm(turned[:3]) == pytest.approx(np.linalg.norm(force))
-    assert turned[:3] @ turned[3:] == pytest.approx(force @ torque)  # a mirror would turn its sign
-    assert turned[2] == pytest.approx(-normal_force(raw, Frame(normal))[0])
+    assert np.linalg.norm(rotated[:3]) == pytest.approx(np.linalg.norm(force))
+    assert rotated[:3] @ rotated[3:] == pytest.approx(force @ torque)  # a mirror would turn its sign
+    assert rotated[2] == pytest.approx(-normal_force(raw, Frame(normal))[0])
 
 
 def test_a_stroke_on_any_axis_has_the_same_friction():
-    raw = felt(PLAIN)
+    raw = noisy(PLAIN)
     cycled = raw[:, [2, 0, 1, 5, 3, 4]]  # the transducer mounted with its x axis out of the face
-    one = analysed(block(T, cycled), frame=Frame("-x", "set", HEIGHT, "set")).strokes[0]
-    other = analysed(block(T, raw)).strokes[0]
-    assert (one.mu_dynamic, one.speed) == pytest.approx((other.mu_dynamic, other.speed))
+    rotated = analyse(block(T, cycled), frame=Frame("-x", "set", HEIGHT, "set")).strokes[0]
+    other = analyse(block(T, raw)).strokes[0]
+    assert (rotated.mu_dynamic, rotated.speed) == pytest.approx((other.mu_dynamic, other.speed))
 
 
 def test_the_ratio_means_nothing_below_the_floor():
@@ -270,19 +270,19 @@ def test_the_middle_half_and_the_whole_slide_ask_for_no_steadiness():
 
 @cache
 def plain_stroke():
-    (one,) = analysed(block(T, felt(PLAIN))).strokes
-    return one
+    (stroke,) = analyse(block(T, noisy(PLAIN))).strokes
+    return stroke
 
 
 def interval_of_mean(ratio):
     """Return the interval of the mean of T/N (n,) at 200 readings a second, of an exact bench."""
-    one, n = np.ones(len(ratio)), len(ratio)
-    columns = (np.arange(n) / 200.0, 2 * one, 2 * one, 2 * ratio, np.outer(2 * ratio, [1, 0]), ratio)
-    curve = StrokeCurve(*columns, np.zeros((n, 2)), one, noise=(0.0, 0.0), quiet=1.0)
+    ones, n = np.ones(len(ratio)), len(ratio)
+    columns = (np.arange(n) / 200.0, 2 * ones, 2 * ones, 2 * ratio, np.outer(2 * ratio, [1, 0]), ratio)
+    curve = StrokeCurve(*columns, np.zeros((n, 2)), ones, noise=(0.0, 0.0), quiet=1.0)
     steady, mean = (0.0, float(columns[0][-1])), float(ratio.mean())
-    made = plain_stroke()
+    plain = plain_stroke()
     exact = BootstrapSettings(repeats=500, gain_error=0.0, cross_talk=0.0, tilt_error=(0.0, 0.0))
-    bare = replace(made, curve=curve, steady=steady, mu_dynamic=mean, zero_drift=None, speed=None, break_away=None)
+    bare = replace(plain, curve=curve, steady=steady, mu_dynamic=mean, zero_drift=None, speed=None, break_away=None)
     return stroke_intervals(
         replace(bare, heading=None, slide_onset=None, tau_max=None, onset=None), 0, exact
     ).mu_dynamic
@@ -294,25 +294,25 @@ def test_a_mean_of_white_noise_lies_in_its_interval_as_often_as_it_says():
     assert 0.90 <= np.mean([low <= 0.5 <= high for low, high in ends]) <= 0.98
 
 
-@pytest.mark.parametrize("alike", [0.05, 0.1, 0.2, 0.4])  # [s]
-def test_a_mean_of_a_ratio_that_wanders_lies_in_its_interval_as_often_as_it_says(alike):
-    draw, kept = np.random.default_rng(2), np.exp(-1 / (200.0 * alike))
-    steps = draw.standard_normal((400, 800)) * np.sqrt(1.0 - kept**2)
-    wandering = lfilter([1.0], [1.0, -kept], steps, axis=1)[:, 400:]
-    ends = [interval_of_mean(0.5 + 0.02 * one) for one in wandering]
+@pytest.mark.parametrize("correlation_time", [0.05, 0.1, 0.2, 0.4])  # [s]
+def test_a_mean_of_a_ratio_that_wanders_lies_in_its_interval_as_often_as_it_says(correlation_time):
+    draw, memory = np.random.default_rng(2), np.exp(-1 / (200.0 * correlation_time))
+    steps = draw.standard_normal((400, 800)) * np.sqrt(1.0 - memory**2)
+    wandering = lfilter([1.0], [1.0, -memory], steps, axis=1)[:, 400:]
+    ends = [interval_of_mean(0.5 + 0.02 * noise) for noise in wandering]
     assert 0.90 <= np.mean([low <= 0.5 <= high for low, high in ends]) <= 0.98
 
 
 def test_an_even_movement_is_all_explained_and_exact():
     t = times(1.0)
-    moved = movement(t, np.column_stack([3.0 * t, -4.0 * t]), 200.0, SETTINGS)
-    assert moved.speed == pytest.approx(5.0)
-    assert moved.along == pytest.approx((3.0, -4.0))
-    assert moved.explained == pytest.approx(1.0)
+    fit = movement(t, np.column_stack([3.0 * t, -4.0 * t]), 200.0, SETTINGS)
+    assert fit.speed == pytest.approx(5.0)
+    assert fit.along == pytest.approx((3.0, -4.0))
+    assert fit.explained == pytest.approx(1.0)
 
 
 def test_a_curve_reaches_beyond_the_stroke_and_cannot_be_written_to():
-    (one,) = analysed(block(T, felt(PLAIN))).strokes
-    assert one.curve.time[0] < one.onset < one.lift < one.curve.time[-1]
+    (stroke,) = analyse(block(T, noisy(PLAIN))).strokes
+    assert stroke.curve.time[0] < stroke.onset < stroke.lift < stroke.curve.time[-1]
     with pytest.raises(ValueError, match="read-only"):
-        one.curve.ratio[0] = 1.0
+        stroke.curve.ratio[0] = 1.0

@@ -80,12 +80,12 @@ def test_ten_subjects_take_the_ten_rows_of_the_design_in_an_order_by_chance(fold
 def test_a_row_is_given_back_when_a_subject_drops_out_and_taken_by_the_next(folder):
     for subject in ("P01", "P02", "P03"):
         enrol(folder, subject, Body())
-    given_back = plan_of(folder, "P02").order_row
+    row = plan_of(folder, "P02").order_row
     withdraw(folder, "P02", "moved away")
     with pytest.raises(StudyError, match="was withdrawn"):
         plan_of(folder, "P02")
     assert enrol(folder, "P04", Body()).slot == 1
-    assert plan_of(folder, "P04").order_row == given_back
+    assert plan_of(folder, "P04").order_row == row
     assert enrol(folder, "P05", Body()).slot == 3
     with pytest.raises(StudyError, match="was enrolled in study before"):
         enrol(folder, "P02", Body())
@@ -101,9 +101,9 @@ def test_no_two_enrolled_subjects_ever_hold_the_same_place_and_no_place_stays_em
         elif not joins and subject in members:
             gone = members.pop(subject)
             members[f"{subject} gone {len(members)}"] = Member(gone.subject, gone.slot, gone.body, "left")
-    held = [member.slot for member in members.values() if member.withdrawn is None]
-    assert len(set(held)) == len(held)
-    assert free_slot(list(members.values())) == min(set(range(len(held) + 1)) - set(held))
+    slots = [member.slot for member in members.values() if member.withdrawn is None]
+    assert len(set(slots)) == len(slots)
+    assert free_slot(list(members.values())) == min(set(range(len(slots) + 1)) - set(slots))
 
 
 def test_an_enrolment_that_was_cut_short_is_undone_and_the_study_goes_on(folder, tmp_path):
@@ -166,10 +166,10 @@ def _enrol_many(folder, first):
 
 def test_two_experimenters_who_enrol_at_once_never_reserve_the_same_row(folder):
     context = multiprocessing.get_context("fork")
-    both = [context.Process(target=_enrol_many, args=(folder, first)) for first in (0, 100)]
-    for process in both:
+    processes = [context.Process(target=_enrol_many, args=(folder, first)) for first in (0, 100)]
+    for process in processes:
         process.start()
-    for process in both:
+    for process in processes:
         process.join()
         assert process.exitcode == 0
     members = open_study(folder).members
@@ -204,7 +204,7 @@ def test_a_study_that_could_not_be_made_is_none(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("act", "named"),
+    ("act", "pattern"),
     [
         (lambda f: enrol(f, "Jane Doe", Body()), "never a name"),
         (lambda f: enrol(f, "P01", Body(contact_angle=200.0)), "between 10 and 90 degrees"),
@@ -213,9 +213,9 @@ def test_a_study_that_could_not_be_made_is_none(tmp_path, monkeypatch):
         (lambda f: enrol(f / "elsewhere", "P01", Body()), "is no study"),
     ],
 )
-def test_what_a_study_does_not_allow_is_refused_in_a_sentence_and_changes_nothing(folder, act, named):
+def test_what_a_study_does_not_allow_is_refused_in_a_sentence_and_changes_nothing(folder, act, pattern):
     before = open_study(folder)
-    with pytest.raises((StudyError, SettingsError), match=named):
+    with pytest.raises((StudyError, SettingsError), match=pattern):
         act(folder)
     assert open_study(folder) == before
 
@@ -225,15 +225,15 @@ def test_what_a_study_does_not_allow_is_refused_in_a_sentence_and_changes_nothin
 
 def scored_visit(folder, subject, *, sealed=True):
     clock = SimulatedClock()
-    planned = plan_of(folder, subject, forces=False)
+    session_plan = plan_of(folder, subject, forces=False)
     key = study_key(folder)
 
     def judge(command):
         return [Scored(float(key.of(command.trial).stimulus.index))]
 
     path = folder / f"{subject}_scores"
-    writer = SessionWriter.create(path, planned, None, provenance(clock), subject_simulated=True, clock=clock)
-    run_session(planned, writer, Hands(clock, None, {AskScore: judge}), None)
+    writer = SessionWriter.create(path, session_plan, None, provenance(clock), subject_simulated=True, clock=clock)
+    run_session(session_plan, writer, Hands(clock, None, {AskScore: judge}), None)
     if sealed:
         seal(path)
     return path
@@ -246,10 +246,10 @@ def open_key(folder, session):
 def test_a_blinded_session_names_no_index_in_any_of_its_files(blind):
     enrol(blind, "P01", Body())
     session = scored_visit(blind, "P01")
-    told = json.loads((session / "session.json").read_text())
-    assert {trial["index"] for trial in told["trials"]} == {None}
-    assert {t["stimulus"]["index"] for block in told["plan"]["blocks"] for t in block["trials"]} == {None}
-    assert told["plan"]["key_sha256"] == study_key(blind).sha256
+    document = json.loads((session / "session.json").read_text())
+    assert {trial["index"] for trial in document["trials"]} == {None}
+    assert {t["stimulus"]["index"] for block in document["plan"]["blocks"] for t in block["trials"]} == {None}
+    assert document["plan"]["key_sha256"] == study_key(blind).sha256
     # Nor does the study's folder tell it to whoever looks into its files by chance.
     assert b"stickiness" not in (blind / KEY_FILE).read_bytes()
 
@@ -291,8 +291,8 @@ def test_a_key_that_was_changed_is_found(blind):
     enrol(blind, "P01", Body())
     session = scored_visit(blind, "P01")
     key = study_key(blind)
-    (first, one), (second, other), *rest = key.stimuli.items()
-    swapped = Key(key.salt, {first: other, second: one, **dict(rest)})
+    (first, first_stimulus), (second, second_stimulus), *rest = key.stimuli.items()
+    swapped = Key(key.salt, {first: second_stimulus, second: first_stimulus, **dict(rest)})
     store_derived(session, UNBLINDING, {"by": "E01", "key": swapped.to_dict()})
     with pytest.raises(RecordingError, match="not the key that was sealed"):
         reveal(Recording.open(session))

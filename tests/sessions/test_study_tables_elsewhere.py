@@ -34,46 +34,46 @@ cat(sprintf("%d %.17g %.12g %.12g", nrow(t), t$sed_MPa[1], sqrt(ss[2] / (ss[2] +
 
 
 @pytest.fixture(scope="module")
-def found():
+def findings():
     return study()
 
 
 @pytest.fixture
-def folder(found, tmp_path):
-    (tmp_path / "trials.csv").write_text(trials_csv(found), encoding="utf-8")
-    (tmp_path / "trials-columns.csv").write_text(columns_csv(found), encoding="utf-8")
-    (tmp_path / "paths.csv").write_text(paths_csv(found), encoding="utf-8")
+def folder(findings, tmp_path):
+    (tmp_path / "trials.csv").write_text(trials_csv(findings), encoding="utf-8")
+    (tmp_path / "trials-columns.csv").write_text(columns_csv(findings), encoding="utf-8")
+    (tmp_path / "paths.csv").write_text(paths_csv(findings), encoding="utf-8")
     return tmp_path
 
 
-def test_every_field_of_a_trial_has_a_column_with_its_meaning(found):
-    heads = trials_csv(found).splitlines()[0].split(",")
-    assert heads == [row[0] for row in list(csv.reader(columns_csv(found).splitlines()))[1:]]
+def test_every_field_of_a_trial_has_a_column_with_its_meaning(findings):
+    heads = trials_csv(findings).splitlines()[0].split(",")
+    assert heads == [row[0] for row in list(csv.reader(columns_csv(findings).splitlines()))[1:]]
     assert {field.name for field in fields(TrialRow)} - {"paths", "responses"} == set(_MEANING)
     assert {"stretch_along_skin", "von_mises_mpa"} <= {head.lower() for head in heads}
 
 
 @pytest.mark.skipif(RSCRIPT is None, reason="no R to open the table in")
-def test_r_opens_the_table_and_comes_to_the_same_correlation_within_subjects(found, folder):
+def test_r_opens_the_table_and_comes_to_the_same_correlation_within_subjects(findings, folder):
     (folder / "read.R").write_text(R, encoding="utf-8")
-    done = subprocess.run([RSCRIPT, "--vanilla", "read.R"], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    rows, first, r, usual = done.stdout.split()
-    assert int(rows) == sum(len(visit.rows) for visit in found.visits)
-    assert float(first) == found.visits[0].rows[0].sed
+    process = subprocess.run([RSCRIPT, "--vanilla", "read.R"], cwd=folder, capture_output=True, text=True, check=False)
+    assert process.returncode == 0, process.stderr
+    rows, first, r, usual = process.stdout.split()
+    assert int(rows) == sum(len(visit.rows) for visit in findings.visits)
+    assert float(first) == findings.visits[0].rows[0].sed
     # The correlation within subjects is that of an analysis of covariance (Bland & Altman 1995).
-    assert float(r) == pytest.approx(found.descriptors[0].repeated.r, rel=1e-9)
+    assert float(r) == pytest.approx(findings.descriptors[0].repeated.r, rel=1e-9)
     assert float(usual) == pytest.approx(float(r), rel=1e-9)
 
 
-def test_pandas_opens_the_table_with_every_number(found, folder):
+def test_pandas_opens_the_table_with_every_number(findings, folder):
     pandas = pytest.importorskip("pandas")
     table = pandas.read_csv(folder / "trials.csv")
-    rows = [row for visit in found.visits for row in visit.rows]
+    rows = [row for visit in findings.visits for row in visit.rows]
     assert table["sed_MPa"].tolist() == pytest.approx([row.sed for row in rows], rel=1e-14)
     assert table["score"].tolist() == pytest.approx([row.score for row in rows], rel=1e-14)
     assert table.dtypes["index"] == "int64"
     assert table["sed_low_MPa"].tolist() == pytest.approx([row.sed_low for row in rows], rel=1e-14)
-    told = pandas.read_csv(folder / "trials-columns.csv", keep_default_na=False)
-    assert told["column"].tolist() == table.columns.tolist()
+    columns = pandas.read_csv(folder / "trials-columns.csv", keep_default_na=False)
+    assert columns["column"].tolist() == table.columns.tolist()
     assert table["excluded"].notna().sum() == 5  # the five trials of the one subject left out

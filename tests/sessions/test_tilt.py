@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_strokes import INFO, SETTINGS, analysed, block, felt, plan, stroke, times, trapezium, trial, wrench
+from closed_form import INFO, SETTINGS, analyse, block, noisy, plan, slide, times, trapezium, trial, wrench
 
 from sessions.recording import Recording
-from sessions.strokes.analysis import analyse, analyse_blocks
+from sessions.strokes.analysis import analyse as analyse_recording
+from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws
 from sessions.strokes.trial_analysis import tilt_of
 
@@ -25,102 +26,102 @@ def leaning(clean, lean=LEAN):
     return np.hstack([clean[:, :3] @ turn.T, clean[:, 3:] @ turn.T])
 
 
-def presses(pushed=(0.0, 0.0, 0.0)):
+def presses(pushes=(0.0, 0.0, 0.0)):
     """Three presses of 2 N, each with a push of its own sideways, as a share of N."""
     clean = np.zeros((len(T), 6))
-    for at, push in zip((1.0, 5.0, 9.0), pushed, strict=True):
+    for at, push in zip((1.0, 5.0, 9.0), pushes, strict=True):
         n = trapezium(T, at, at + 2.0, 0.1, 2.0)
         clean += wrench(T, n, push * np.ones_like(T), np.zeros_like(T))
     return clean
 
 
 def test_a_lean_that_was_planted_comes_back_within_its_interval():
-    found = analysed(block(T, felt(leaning(presses())))).tilt
-    assert len(found.presses) == 3
-    assert found.lean == pytest.approx(LEAN, abs=0.05)
-    assert found.x_interval[0] <= LEAN[0] <= found.x_interval[1]
-    assert found.y_interval[0] <= LEAN[1] <= found.y_interval[1]
-    assert found.x_interval[1] - found.x_interval[0] < 0.2
+    tilt = analyse(block(T, noisy(leaning(presses())))).tilt
+    assert len(tilt.presses) == 3
+    assert tilt.lean == pytest.approx(LEAN, abs=0.05)
+    assert tilt.x_interval[0] <= LEAN[0] <= tilt.x_interval[1]
+    assert tilt.y_interval[0] <= LEAN[1] <= tilt.y_interval[1]
+    assert tilt.x_interval[1] - tilt.x_interval[0] < 0.2
 
 
 def test_presses_that_push_sideways_differently_make_the_interval_wider_and_it_still_holds():
-    found = analysed(block(T, felt(leaning(presses((0.03, -0.02, 0.0)))))).tilt
-    assert found.x_interval[0] <= LEAN[0] <= found.x_interval[1]
-    assert found.x_interval[1] - found.x_interval[0] > 3.0
-    assert "3 presses" in found.kind
+    tilt = analyse(block(T, noisy(leaning(presses((0.03, -0.02, 0.0)))))).tilt
+    assert tilt.x_interval[0] <= LEAN[0] <= tilt.x_interval[1]
+    assert tilt.x_interval[1] - tilt.x_interval[0] > 3.0
+    assert "3 presses" in tilt.kind
 
 
 def test_the_interval_of_presses_holds_the_lean_as_often_as_it_says():
     draw = np.random.default_rng(5)
     inside = 0
-    (press, *_), _ = analysed(block(T, felt(leaning(presses())))).tilt.presses, None
+    (press, *_), _ = analyse(block(T, noisy(leaning(presses())))).tilt.presses, None
     for _ in range(400):
         leans = 2.0 + draw.standard_normal(4)
-        found = tilt_of([replace(press, lean=(float(one), 0.0)) for one in leans], SETTINGS)
-        inside += found.x_interval[0] <= 2.0 <= found.x_interval[1]
+        tilt = tilt_of([replace(press, lean=(float(lean), 0.0)) for lean in leans], SETTINGS)
+        inside += tilt.x_interval[0] <= 2.0 <= tilt.x_interval[1]
     assert 0.92 <= inside / 400 <= 0.98
 
 
 def test_one_press_tells_a_lean_and_that_the_hand_is_not_in_its_interval():
-    one = T < 4.0
-    found = analysed(block(T[one], felt(leaning(presses()))[one])).tilt
-    assert found.lean == pytest.approx(LEAN, abs=0.05)
-    assert "what the hand itself pushed sideways is not in it" in found.kind
+    first_press = T < 4.0
+    tilt = analyse(block(T[first_press], noisy(leaning(presses()))[first_press])).tilt
+    assert tilt.lean == pytest.approx(LEAN, abs=0.05)
+    assert "what the hand itself pushed sideways is not in it" in tilt.kind
 
 
 def test_a_stroke_tells_no_lean():
-    assert analysed(block(T, felt(leaning(stroke(T))))).tilt is None
+    assert analyse(block(T, noisy(leaning(slide(T))))).tilt is None
 
 
 def test_levelling_takes_the_error_of_the_lean_out_of_friction():
     """mu is off by about e (1 + mu^2) under a lean of e along the stroke; levelled it is the planted one."""
-    raw = felt(leaning(stroke(T, mu=0.5)))
-    (leant,) = analysed(block(T, raw)).strokes
+    raw = noisy(leaning(slide(T, mu=0.5)))
+    (leant,) = analyse(block(T, raw)).strokes
     assert leant.mu_dynamic - 0.5 == pytest.approx(np.radians(-LEAN[0]) * 1.25, rel=0.1)
-    (level,) = analysed(block(T, raw), settings=replace(SETTINGS, tilt=LEAN)).strokes
+    (level,) = analyse(block(T, raw), settings=replace(SETTINGS, tilt=LEAN)).strokes
     assert level.mu_dynamic == pytest.approx(0.5, rel=2e-3)
     assert level.speed == pytest.approx(25.0, rel=0.01)
 
 
 def test_a_lean_that_was_levelled_is_still_told_as_that_of_the_face():
-    found = analysed(block(T, felt(leaning(presses()))), settings=replace(SETTINGS, tilt=LEAN)).tilt
-    assert found.lean == pytest.approx(LEAN, abs=0.05)
+    tilt = analyse(block(T, noisy(leaning(presses()))), settings=replace(SETTINGS, tilt=LEAN)).tilt
+    assert tilt.lean == pytest.approx(LEAN, abs=0.05)
 
 
 def test_presses_of_practice_count_and_its_strokes_do_not():
-    one = replace(trial(), phase="practice")
-    found = analyse_blocks([(one, block(T, felt(leaning(presses()))))], plan([one]), INFO, SETTINGS)
-    assert [press.trial for press in found.presses] == [1, 1, 1]
+    practice = replace(trial(), phase="practice")
+    analysis = analyse_blocks([(practice, block(T, noisy(leaning(presses()))))], plan([practice]), INFO, SETTINGS)
+    assert [press.trial for press in analysis.presses] == [1, 1, 1]
 
 
-def width(found):
-    low, high = found.strokes[-1].mu_dynamic_interval
+def width(analysis):
+    low, high = analysis.strokes[-1].mu_dynamic_interval
     return high - low
 
 
 def test_three_presses_narrow_the_interval_of_mu_and_a_lean_that_nobody_levelled_moves_it_over_the_true_mu():
-    clean = [leaning(stroke(T, mu=0.5)), leaning(presses())]
-    parts = [(trial(number=number), block(T, felt(one))) for number, one in zip((1, 2), clean, strict=True)]
-    pressed = analyse_blocks(parts, plan([of for of, _ in parts]), INFO, SETTINGS)
+    clean = [leaning(slide(T, mu=0.5)), leaning(presses())]
+    parts = [(trial(number=number), block(T, noisy(raw))) for number, raw in zip((1, 2), clean, strict=True)]
+    analysis = analyse_blocks(parts, plan([of for of, _ in parts]), INFO, SETTINGS)
     alone = analyse_blocks(parts[:1], plan([parts[0][0]]), INFO, SETTINGS)
-    (low, high), told = pressed.strokes[0].mu_dynamic_interval, pressed.strokes[0].mu_dynamic
-    assert low <= told < 0.5 < high  # told is off by 2 degrees: 0.044
-    assert width(alone) > 1.2 * (high - max(low, told))
+    (low, high), mu = analysis.strokes[0].mu_dynamic_interval, analysis.strokes[0].mu_dynamic
+    assert low <= mu < 0.5 < high  # told is off by 2 degrees: 0.044
+    assert width(alone) > 1.2 * (high - max(low, mu))
 
 
 def test_a_recording_without_presses_names_the_lean_it_assumes_and_is_not_flawed_by_it():
-    kept = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
-    found = analyse(Recording.open(kept))
-    assert [flaw.grade for flaw in found.flaws if flaw.name == "tilt_assumed"] == ["note"]
-    assert "1°" in found.to_dict()["interval"]
+    folder = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
+    analysis = analyse_recording(Recording.open(folder))
+    assert [flaw.grade for flaw in analysis.flaws if flaw.name == "tilt_assumed"] == ["note"]
+    assert "1°" in analysis.to_dict()["interval"]
 
 
 def test_cross_talk_that_presses_show_is_not_drawn_a_second_time():
     """A press shows lean and cross-talk from N together: with an exact lean, nothing of the two is left in the drag."""
     draws = SystematicDraws(4000, 3, (0.01, 0.01), (1.0, 1.0), (0.0, 0.0), presses=3)
-    of_normal, of_drag = draws.shares(np.array([1.0, 0.0]))
-    assert of_normal == pytest.approx(np.radians(1.0), abs=1e-12)
-    assert of_drag.std() == pytest.approx(0.01 * np.sqrt(2.0), rel=0.05)  # its own cross-talk, and the lean's
+    normal, drag = draws.shares(np.array([1.0, 0.0]))
+    assert normal == pytest.approx(np.radians(1.0), abs=1e-12)
+    assert drag.std() == pytest.approx(0.01 * np.sqrt(2.0), rel=0.05)  # its own cross-talk, and the lean's
 
 
 def test_a_lean_from_three_presses_is_drawn_from_students_law():

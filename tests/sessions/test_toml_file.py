@@ -79,9 +79,9 @@ def test_whole_numbers_stand_for_numbers_and_defaults_for_what_is_left_out():
     ],
 )
 def test_a_wrong_value_gives_one_sentence_with_its_key_its_value_and_what_is_allowed(change, sentence):
-    with pytest.raises(SettingsError) as caught:
+    with pytest.raises(SettingsError) as refusal:
         from_table({**GOOD, **change}, Outer, "here")
-    assert str(caught.value) == sentence
+    assert str(refusal.value) == sentence
 
 
 VALUES = st.recursive(
@@ -94,10 +94,10 @@ VALUES = st.recursive(
 @given(table=st.dictionaries(st.sampled_from(["count", "inner", "kind", "note", "limit", "many", "odd"]), VALUES))
 def test_any_table_gives_the_dataclass_or_one_sentence(table):
     try:
-        made = from_table(table, Outer, "here")
+        outcome = from_table(table, Outer, "here")
     except SettingsError as error:
-        made = error
-    assert isinstance(made, Outer) or str(made).startswith("here: ")
+        outcome = error
+    assert isinstance(outcome, Outer) or str(outcome).startswith("here: ")
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -158,7 +158,7 @@ SCENE = "[finger]\ntip_radius = 5.0\n\n[friction]\nmu = 0.67\n\n[loading]\ninden
 
 
 @pytest.mark.parametrize(
-    ("was", "written", "named"),
+    ("old", "new", "sentence"),
     [
         ("mu = 0.67", "mu = -1", "line 5: friction.mu = -1.0 is not allowed: "),
         ("mu = 0.67", 'mu = "a lot"', 'line 5: friction.mu = "a lot" is not allowed: it must be a number'),
@@ -171,12 +171,12 @@ SCENE = "[finger]\ntip_radius = 5.0\n\n[friction]\nmu = 0.67\n\n[loading]\ninden
         ("indentation = 2.0", "indentation = 15", "line 8: loading.indentation = 15.0 is not allowed: "),
     ],
 )
-def test_a_wrong_scene_file_is_refused_with_its_line(tmp_path, was, written, named):
+def test_a_wrong_scene_file_is_refused_with_its_line(tmp_path, old, new, sentence):
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE.replace(was, written))
-    with pytest.raises(SettingsError) as caught:
+    path.write_text(SCENE.replace(old, new))
+    with pytest.raises(SettingsError) as refusal:
         load_toml(path, Scene)
-    assert str(caught.value).startswith(f"{path}, {named}")
+    assert str(refusal.value).startswith(f"{path}, {sentence}")
 
 
 def test_a_right_scene_file_gives_the_scene(tmp_path):
@@ -189,10 +189,10 @@ def test_a_right_scene_file_gives_the_scene(tmp_path):
 def test_the_scene_file_that_the_contract_shows_is_read_as_it_stands(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(re.search(r"```toml\n(title.*?)```", CONTRACT.read_text(encoding="utf-8"), re.DOTALL)[1])
-    read = load_toml(path, Scene)
-    assert read.finger == published(STICKINESS[4]).finger
-    assert (read.friction, read.loading.indentation) == (published(STICKINESS[4]).friction, 2.0)
-    assert read.solve.tolerance == 0.01
+    scene = load_toml(path, Scene)
+    assert scene.finger == published(STICKINESS[4]).finger
+    assert (scene.friction, scene.loading.indentation) == (published(STICKINESS[4]).friction, 2.0)
+    assert scene.solve.tolerance == 0.01
 
 
 @given(

@@ -19,7 +19,7 @@ from solver.response.nearby import By
 LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)
 
 
-def drawn_by(analysis, settings):
+def with_bootstrap(analysis, settings):
     """Return the strokes of an analysis with other settings of the bootstrap."""
     return SimpleNamespace(strokes=analysis.strokes, bootstrap=settings)
 
@@ -27,8 +27,8 @@ def drawn_by(analysis, settings):
 @pytest.fixture(scope="module")
 def analysis():
     visit = planted_truth.visit(1)
-    kept = [visit.parts[4], visit.parts[0]]  # sticky and hardly so
-    return replace(visit, parts=kept, planted=[visit.planted[4], visit.planted[0]]).analysed()
+    parts = [visit.parts[4], visit.parts[0]]  # sticky and hardly so
+    return replace(visit, parts=parts, strokes=[visit.strokes[4], visit.strokes[0]]).analyse()
 
 
 @pytest.fixture(scope="module")
@@ -41,46 +41,46 @@ def prediction(analysis):
 
 @pytest.fixture(scope="module")
 def intervals(analysis, prediction):
-    return [row.interval for row in with_intervals(drawn_by(analysis, LEVEL), prediction).trials]
+    return [row.interval for row in with_intervals(with_bootstrap(analysis, LEVEL), prediction).trials]
 
 
 @pytest.fixture(scope="module")
-def beside(analysis, prediction):
+def with_variants(analysis, prediction):
     """Return the sticky trial with its variants, and the options."""
     options = replace(prediction.options, variants="small", variant_intervals=True)
     alone = replace(prediction, trials=prediction.trials[:1], options=options)
     return with_alternatives(with_intervals(analysis, alone), analysis=analysis)
 
 
-def solved(scenes):
+def seds_of(scenes):
     """Return the SEDs of scenes, each solved from nothing: the other route."""
-    return [one.sed_ending for one in settled_predictions(scenes)]
+    return [prediction.sed_ending for prediction in settled_predictions(scenes)]
 
 
 def test_draws_are_those_of_the_intervals_of_friction(analysis):
     mu, tau_max, normal = friction_draws(analysis.strokes[0], 0, "maximum")
-    found = stroke_intervals(analysis.strokes[0], 0)
-    assert np.quantile(mu, [0.025, 0.975]).tolist() == list(found.mu_max)
-    assert np.quantile(tau_max, [0.025, 0.975]).tolist() == list(found.tau_max)
-    assert np.quantile(normal, [0.025, 0.975]).tolist() == list(found.normal_force)
+    intervals = stroke_intervals(analysis.strokes[0], 0)
+    assert np.quantile(mu, [0.025, 0.975]).tolist() == list(intervals.mu_max)
+    assert np.quantile(tau_max, [0.025, 0.975]).tolist() == list(intervals.tau_max)
+    assert np.quantile(normal, [0.025, 0.975]).tolist() == list(intervals.normal_force)
     assert np.corrcoef(mu, tau_max)[0, 1] > 0.5  # one error of calibration moves both
 
 
 def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, intervals):
-    row, found = prediction.trials[0], intervals[0]
-    assert found.method == "derivatives"
+    row, interval = prediction.trials[0], intervals[0]
+    assert interval.method == "derivatives"
     mu, tau_max, _ = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     scene = row.prediction.scene
-    drawn = settled_predictions(
+    solutions = settled_predictions(
         [with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu[:24], tau_max[:24], strict=True)]
     )
-    low, high = np.quantile([one.sed_ending for one in drawn], [0.025, 0.975])
-    carried = found.by_mu * (mu[:24] - row.mu) + found.by_tau_max * (tau_max[:24] - row.tau_max)
-    assert np.quantile(row.sed + carried, [0.025, 0.975]) == pytest.approx([low, high], abs=0.05 * (high - low))
-    assert found.low < row.sed < found.high
+    low, high = np.quantile([solution.sed_ending for solution in solutions], [0.025, 0.975])
+    offsets = interval.by_mu * (mu[:24] - row.mu) + interval.by_tau_max * (tau_max[:24] - row.tau_max)
+    assert np.quantile(row.sed + offsets, [0.025, 0.975]) == pytest.approx([low, high], abs=0.05 * (high - low))
+    assert interval.low < row.sed < interval.high
     for name, value in (("normal_force", row.normal_force), ("tangential_force", row.tangential_force)):
-        low, high = getattr(found, name)
-        forces = np.array([getattr(one, name) for one in drawn]) * scene.finger.width
+        low, high = getattr(interval, name)
+        forces = np.array([getattr(solution, name) for solution in solutions]) * scene.finger.width
         assert low < value < high
         assert 0.85 <= np.mean((low <= forces) & (forces <= high)) <= 1.0
         # 95 % of normal draws, two dozen of which are solved: those spread otherwise than all by what their mu does.
@@ -89,17 +89,17 @@ def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, int
 
 
 def test_a_stickier_surface_has_the_wider_interval(intervals):
-    wide, narrow = (one.high - one.low for one in intervals)
+    wide, narrow = (interval.high - interval.low for interval in intervals)
     assert wide > 3 * narrow > 0
 
 
 def test_twice_the_error_of_calibration_makes_the_interval_nearly_twice_as_wide(analysis, prediction, intervals):
     alone = replace(prediction, trials=prediction.trials[:1])
-    doubled = with_intervals(drawn_by(analysis, replace(LEVEL, gain_error=0.02)), alone).trials[0].interval
+    doubled = with_intervals(with_bootstrap(analysis, replace(LEVEL, gain_error=0.02)), alone).trials[0].interval
     assert (doubled.high - doubled.low) / (intervals[0].high - intervals[0].low) == pytest.approx(2.0, rel=0.1)
 
 
-class Made:
+class FormulaSlide:
     """A slide whose SED is a formula of what mu and tau_max are off; none where mu is 0.03 off."""
 
     def __init__(self, formula, by_mu, row):
@@ -111,16 +111,16 @@ class Made:
         return SimpleNamespace(sed=sed, normal=none, tangential=none, indentation=none)
 
     def seds(self, scenes):
-        off = [(one.friction.mu - self.row.mu, one.friction.tau_max - self.row.tau_max) for one in scenes]
+        off = [(scene.friction.mu - self.row.mu, scene.friction.tau_max - self.row.tau_max) for scene in scenes]
         return np.array([[np.nan if abs(mu) > 0.03 else self.formula(mu, tau)] * 2 for mu, tau in off])
 
 
 def interval_of(analysis, prediction, monkeypatch, formula, by_mu=0.0, gain_error=0.004):
     row = prediction.trials[0]
-    slide = Made(formula, by_mu, row)
-    monkeypatch.setattr(uncertainty, "slides", lambda found, _=None: iter([slide] * len(found)))
+    slide = FormulaSlide(formula, by_mu, row)
+    monkeypatch.setattr(uncertainty, "slides", lambda scenes, _=None: iter([slide] * len(scenes)))
     alone = replace(prediction, trials=(row,))
-    return with_intervals(drawn_by(analysis, replace(LEVEL, gain_error=gain_error)), alone).trials[0].interval
+    return with_intervals(with_bootstrap(analysis, replace(LEVEL, gain_error=gain_error)), alone).trials[0].interval
 
 
 def test_where_the_sed_bends_draws_are_solved_and_missing_states_are_counted(analysis, prediction, monkeypatch):
@@ -145,55 +145,55 @@ def test_what_bends_only_where_both_loads_change_together_is_seen(analysis, pred
 
 
 def test_draws_that_are_solved_give_the_interval_of_all_of_them(analysis, prediction, monkeypatch):
-    found = interval_of(analysis, prediction, monkeypatch, lambda mu, _: np.exp(60.0 * mu), by_mu=60.0)
+    interval = interval_of(analysis, prediction, monkeypatch, lambda mu, _: np.exp(60.0 * mu), by_mu=60.0)
     row = prediction.trials[0]
     mu = friction_draws(analysis.strokes[0], 0, "maximum", replace(LEVEL, gain_error=0.004)).mu
     low, high = row.sed - 1.0 + np.exp(60.0 * (np.quantile(mu, [0.025, 0.975]) - row.mu))
-    assert found.method == "sampling"
-    assert [found.low, found.high] == pytest.approx([low, high], abs=0.03 * (high - low))
+    assert interval.method == "sampling"
+    assert [interval.low, interval.high] == pytest.approx([low, high], abs=0.03 * (high - low))
 
 
 def test_a_trial_without_a_prediction_keeps_its_reason(analysis, prediction):
     reasons = dict.fromkeys(("sed", "opposite_sed"), "No stroke was found in this trial.")
     row = replace(prediction.trials[0], prediction=None, opposite=None, reasons=reasons)
-    found = with_intervals(analysis, replace(prediction, trials=(row,))).trials[0]
-    assert found.interval.reason == found.opposite_interval.reason == "No stroke was found in this trial."
-    assert found.interval.low is None
+    trial = with_intervals(analysis, replace(prediction, trials=(row,))).trials[0]
+    assert trial.interval.reason == trial.opposite_interval.reason == "No stroke was found in this trial."
+    assert trial.interval.low is None
 
 
-def test_the_other_way_and_every_variant_have_intervals_that_hold_their_seds(beside):
-    (row,) = beside.trials
+def test_the_other_way_and_every_variant_have_intervals_that_hold_their_seds(with_variants):
+    (row,) = with_variants.trials
     assert row.opposite_interval.low < row.opposite_sed < row.opposite_interval.high
     assert len(row.alternatives) == 4
-    for one in row.alternatives:
-        assert one.interval.low < one.sed < one.interval.high
-        assert one.interval.method in ("derivatives", "sampling")
+    for alternative in row.alternatives:
+        assert alternative.interval.low < alternative.sed < alternative.interval.high
+        assert alternative.interval.method in ("derivatives", "sampling")
 
 
-def test_pressed_by_the_force_measured_the_uncertainty_of_that_force_is_in_the_interval(analysis, beside):
-    (row,) = beside.trials
-    pressed = next(one for one in row.alternatives if one.variant.driven == "force")
+def test_pressed_by_the_force_measured_the_uncertainty_of_that_force_is_in_the_interval(analysis, with_variants):
+    (row,) = with_variants.trials
+    variant = next(alternative for alternative in row.alternatives if alternative.variant.driven == "force")
     _, _, normal = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     least, most = np.quantile(normal, [0.025, 0.975])
-    scene = scene_along(row, pressed.variant, beside.options)
-    low, high = solved([with_loads(scene, {"force": least}), with_loads(scene, {"force": most})])
-    assert pressed.interval.by_force == pytest.approx((high - low) / (most - least), rel=0.02)
-    assert pressed.interval.high - pressed.interval.low >= 0.95 * (high - low)
+    scene = scene_along(row, variant.variant, with_variants.options)
+    low, high = seds_of([with_loads(scene, {"force": least}), with_loads(scene, {"force": most})])
+    assert variant.interval.by_force == pytest.approx((high - low) / (most - least), rel=0.02)
+    assert variant.interval.high - variant.interval.low >= 0.95 * (high - low)
 
 
-def test_the_depth_that_matches_holds_the_uncertainty_of_force_and_friction(analysis, beside):
+def test_the_depth_that_matches_holds_the_uncertainty_of_force_and_friction(analysis, with_variants):
     """Against slopes from solves at both ends of each load, by which all draws are carried."""
-    (row,) = beside.trials
-    pressed = next(one for one in row.alternatives if one.variant.driven == "force")
-    assert (row.matching_depth, row.matching_depth_interval) == (pressed.indentation, pressed.interval.indentation)
+    (row,) = with_variants.trials
+    variant = next(alternative for alternative in row.alternatives if alternative.variant.driven == "force")
+    assert (row.matching_depth, row.matching_depth_interval) == (variant.indentation, variant.interval.indentation)
     draws = dict(zip(("mu", "tau_max", "force"), friction_draws(analysis.strokes[0], 0, "maximum"), strict=True))
-    ends = {name: np.quantile(drawn, [0.025, 0.975]).tolist() for name, drawn in draws.items()}
-    scene = scene_along(row, pressed.variant, beside.options)
-    found = settled_predictions([with_loads(scene, {name: end}) for name, pair in ends.items() for end in pair])
-    depths = np.array([one.indentation for one in found]).reshape(-1, 2)
+    ends = {name: np.quantile(sample, [0.025, 0.975]).tolist() for name, sample in draws.items()}
+    scene = scene_along(row, variant.variant, with_variants.options)
+    solutions = settled_predictions([with_loads(scene, {name: end}) for name, pair in ends.items() for end in pair])
+    depths = np.array([solution.indentation for solution in solutions]).reshape(-1, 2)
     slopes = np.diff(depths)[:, 0] / np.diff(list(ends.values()))[:, 0]
-    carried = sum(slope * (drawn - drawn.mean()) for slope, drawn in zip(slopes, draws.values(), strict=True))
-    low, high = np.quantile(carried, [0.025, 0.975])
+    offsets = sum(slope * (sample - sample.mean()) for slope, sample in zip(slopes, draws.values(), strict=True))
+    low, high = np.quantile(offsets, [0.025, 0.975])
     assert np.ptp(row.matching_depth_interval) == pytest.approx(high - low, rel=0.05)
     assert 0.0 < row.matching_depth_error < 0.01
 
@@ -204,10 +204,10 @@ def test_the_depth_that_matches_holds_the_uncertainty_of_force_and_friction(anal
 def shallow(visit, number):
     """Return the analysis of one stroke of a visit, and the plan of its trial pressed 1 mm deep."""
     (part,) = (part for part in visit.parts if part[0].number == number)
-    alone = replace(visit, parts=[part], planted=[visit.planted[number - 1]])
+    alone = replace(visit, parts=[part], strokes=[visit.strokes[number - 1]])
     block = Block("b", "", 1, 1.0, ("", ""), (part[0],))
     plan = SessionPlan("sensotact", "S1", 0, "given", (block,), forces=True, frame=planted_truth.FRAME)
-    return alone.analysed(), plan
+    return alone.analyse(), plan
 
 
 FINITE = PredictionOptions(course="steady", kinematics="finite", intervals=True)
@@ -218,30 +218,32 @@ FINITE = PredictionOptions(course="steady", kinematics="finite", intervals=True)
 def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     """Against each draw's own solve from nothing, on a mesh of its own."""
     analysis, plan = shallow(planted_truth.visit(1), number)
-    (row,) = with_intervals(drawn_by(analysis, LEVEL), predict(analysis, plan, FINITE)).trials
-    found, scene = row.interval, row.prediction.scene
+    (row,) = with_intervals(with_bootstrap(analysis, LEVEL), predict(analysis, plan, FINITE)).trials
+    interval, scene = row.interval, row.prediction.scene
     draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
-    seds = np.array(solved([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu, tau_max, strict=True)]))
-    carried = row.sed + found.by_mu * (mu - row.mu) + found.by_tau_max * (tau_max - row.tau_max)
-    assert np.abs(carried - seds).max() < 0.1 * (found.high - found.low)
-    assert 0.90 <= np.mean((found.low <= seds) & (seds <= found.high)) <= 0.99
+    seds = np.array(seds_of([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu, tau_max, strict=True)]))
+    linear = row.sed + interval.by_mu * (mu - row.mu) + interval.by_tau_max * (tau_max - row.tau_max)
+    assert np.abs(linear - seds).max() < 0.1 * (interval.high - interval.low)
+    assert 0.90 <= np.mean((interval.low <= seds) & (seds <= interval.high)) <= 0.99
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_intervals_of_200_visits_hold_the_sed_of_the_friction_planted(kinematics):
     """The benches of the coverage of friction itself; the truth is the solve at what was planted, from nothing."""
-    options, held = replace(FINITE, kinematics=kinematics), []
+    options, hits = replace(FINITE, kinematics=kinematics), []
     for seed in range(1000, 1200):
         gains = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         visit = planted_truth.visit(seed, BenchSettings(gains=tuple(gains)))
         analysis, plan = shallow(visit, 2)
-        (row,) = with_intervals(drawn_by(analysis, LEVEL), predict(analysis, plan, options), both_ways=False).trials
-        truth = visit.planted[1]
-        (planted,) = solved([with_loads(row.prediction.scene, {"mu": truth.mu, "tau_max": truth.tau_max})])
-        held.append(row.interval.low <= planted <= row.interval.high)
-    assert 0.90 <= np.mean(held) <= 0.98
+        (row,) = with_intervals(
+            with_bootstrap(analysis, LEVEL), predict(analysis, plan, options), both_ways=False
+        ).trials
+        truth = visit.strokes[1]
+        (sed,) = seds_of([with_loads(row.prediction.scene, {"mu": truth.mu, "tau_max": truth.tau_max})])
+        hits.append(row.interval.low <= sed <= row.interval.high)
+    assert 0.90 <= np.mean(hits) <= 0.98
 
 
 @pytest.mark.slow

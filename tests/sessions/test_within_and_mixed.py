@@ -29,16 +29,15 @@ CO2 = """3.97 4.12 4.09 3.97|5.27 5.37 5.41 5.44|5.67 3.64 4.32 4.73 4.96 5.04 5
 
 def test_the_correlation_within_subjects_is_the_published_one():
     rows = [[float(word) for word in part.split()] for part in PH.split("|")]
-    others = [[float(word) for word in part.split()] for part in CO2.split("|")]
+    co2 = [[float(word) for word in part.split()] for part in CO2.split("|")]
     subjects = [str(i) for i, row in enumerate(rows) for _ in row]
-    found = repeated_correlation(subjects, [*chain(*rows)], [*chain(*others)])
-    assert found is not None
+    correlation = repeated_correlation(subjects, [*chain(*rows)], [*chain(*co2)])
     # The value of R's rmcorr (Bakdash & Marusich 2017) and of pingouin: r(38) = -0.507, p = 0.000847, -0.71 to -0.23.
-    assert found.dof == 38
-    assert found.r == pytest.approx(-0.507, abs=5e-4)
-    assert found.low == pytest.approx(-0.71, abs=5e-3)
-    assert found.high == pytest.approx(-0.23, abs=5e-3)
-    assert found.p == pytest.approx(0.000847, abs=2e-6)
+    assert correlation.dof == 38
+    assert correlation.r == pytest.approx(-0.507, abs=5e-4)
+    assert correlation.low == pytest.approx(-0.71, abs=5e-3)
+    assert correlation.high == pytest.approx(-0.23, abs=5e-3)
+    assert correlation.p == pytest.approx(0.000847, abs=2e-6)
 
 
 def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
@@ -46,24 +45,24 @@ def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
     names, x = np.repeat(list("abcdef"), 5), rng.normal(size=30)
     y = x + 0.5 * rng.normal(size=30)
 
-    def z(kept):
-        own = [names[kept] == name for name in np.unique(names[kept])]
-        a, b = (np.concatenate([v[kept][o] - v[kept][o].mean() for o in own]) for v in (x, y))
+    def z(rows):
+        own = [names[rows] == name for name in np.unique(names[rows])]
+        a, b = (np.concatenate([v[rows][o] - v[rows][o].mean() for o in own]) for v in (x, y))
         return np.arctanh(stats.pearsonr(a, b).statistic)
 
     whole = z(np.ones(30, bool))
     pseudo = [6 * whole - 5 * z(names != name) for name in "abcdef"]
     test = stats.ttest_1samp(pseudo, 0.0)
-    found = repeated_correlation(names, x, y)
-    assert found.people == pytest.approx(tuple(np.tanh(test.confidence_interval(0.95))))
-    assert found.people_p == pytest.approx(test.pvalue)
+    correlation = repeated_correlation(names, x, y)
+    assert correlation.people == pytest.approx(tuple(np.tanh(test.confidence_interval(0.95))))
+    assert correlation.people_p == pytest.approx(test.pvalue)
 
 
 def test_subjects_who_are_all_alike_tell_nothing_of_other_people():
-    found = repeated_correlation(list("aaabbbccc"), [1.0, 2.0, 3.0] * 3, [1.0, 2.5, 3.1] * 3)
-    assert (found.people, found.people_p) == (None, None)
+    components = repeated_correlation(list("aaabbbccc"), [1.0, 2.0, 3.0] * 3, [1.0, 2.5, 3.1] * 3)
+    assert (components.people, components.people_p) == (None, None)
     table = {subject: {0: level, 50: level + 30.0} for subject, level in (("a", 1.0), ("b", 4.0), ("c", 9.0))}
-    assert [(one.low, one.high) for one in within_means(table)] == [(None, None)] * 2
+    assert [(mean.low, mean.high) for mean in within_means(table)] == [(None, None)] * 2
 
 
 def test_subjects_with_one_trial_tell_nothing_of_what_goes_on_within_them():
@@ -83,21 +82,20 @@ def test_subjects_with_one_trial_tell_nothing_of_what_goes_on_within_them():
 
 def test_levels_of_subjects_do_not_matter_within_them():
     x, y = [1, 2, 3, 1, 2, 3], [1.0, 2.5, 3.0, 101.0, 102.5, 103.0]
-    found = repeated_correlation(["a"] * 3 + ["b"] * 3, x, y)
+    correlation = repeated_correlation(["a"] * 3 + ["b"] * 3, x, y)
     alone = stats.pearsonr([1, 2, 3], [1.0, 2.5, 3.0]).statistic
-    assert found is not None
-    assert found.r == pytest.approx(alone)
+    assert correlation.r == pytest.approx(alone)
     assert repeated_correlation(["a", "b"], [1, 2], [1, 2]) is None
 
 
 def test_of_two_stimuli_the_interval_within_is_the_paired_one_over_the_root_of_two():
     table = {"a": {0: 10.0, 1: 30.0}, "b": {0: 20.0, 1: 35.0}, "c": {0: 50.0, 1: 80.0}, "left out": {0: 5.0}}
-    found = within_means(table)
+    means = within_means(table)
     differences = np.array([20.0, 15.0, 30.0])
     half = stats.t.ppf(0.975, 2) * differences.std(ddof=1) / math.sqrt(2 * 3)
-    assert [one.n for one in found] == [3, 3]
-    assert [one.mean for one in found] == pytest.approx([80 / 3, 145 / 3])
-    assert [one.high - one.mean for one in found] == pytest.approx([half, half])
+    assert [mean.n for mean in means] == [3, 3]
+    assert [mean.mean for mean in means] == pytest.approx([80 / 3, 145 / 3])
+    assert [mean.high - mean.mean for mean in means] == pytest.approx([half, half])
 
 
 def test_scores_that_are_equal_but_for_round_off_tie_and_do_not_vary():
@@ -110,16 +108,12 @@ def test_scores_that_are_equal_but_for_round_off_tie_and_do_not_vary():
 
 def test_agreement_is_one_where_all_order_alike_and_kendalls_example_comes_out():
     alike = {str(k): {i: float(i * (k + 1)) for i in range(5)} for k in range(4)}
-    found = agreement(alike)
-    assert found is not None
-    assert found.kendall_w == pytest.approx(1.0)
-    # Kendall & Babington Smith's form by hand: ranks of three judges over four objects, R = 4, 8, 8, 10; S = 19.
+    concordance = agreement(alike)
+    assert concordance.kendall_w == pytest.approx(1.0)
+    # Kendall & Babington Smith's form by hand: ranks of three judges over four objects, R = 4, 8, 7, 11; S = 25.
     ranks = {"a": {0: 1, 1: 3, 2: 2, 3: 4}, "b": {0: 1, 1: 2, 2: 4, 3: 3}, "c": {0: 2, 1: 3, 2: 1, 3: 4}}
-    sums = [4, 8, 7, 11]
-    s = sum((total - 7.5) ** 2 for total in sums)
-    found = agreement(ranks)
-    assert found is not None
-    assert found.kendall_w == pytest.approx(12 * s / (9 * (64 - 4)))
+    concordance = agreement(ranks)
+    assert concordance.kendall_w == pytest.approx(12 * 25 / (9 * (64 - 4)))
 
 
 def test_a_balanced_mixed_model_has_the_slope_and_error_of_the_closed_form():
@@ -132,8 +126,8 @@ def test_a_balanced_mixed_model_has_the_slope_and_error_of_the_closed_form():
     # Balanced, with the same x for all: the slope is that of least squares within subjects.
     centred = score - np.repeat(score.reshape(12, 5).mean(axis=1), 5)
     expected = float((x - 2.0) @ centred) / float((x - 2.0) @ (x - 2.0))
-    left = centred - expected * (x - 2.0)
-    residual = math.sqrt(float(left @ left) / (60 - 12 - 1))
+    residuals = centred - expected * (x - 2.0)
+    residual = math.sqrt(float(residuals @ residuals) / (60 - 12 - 1))
     assert fit.estimates[1] == pytest.approx(expected, rel=1e-6)
     assert fit.within == pytest.approx(residual, rel=1e-3)
     assert fit.errors[1] == pytest.approx(residual / math.sqrt(12 * 10.0), rel=1e-3)
@@ -153,9 +147,8 @@ def test_drift_and_carry_over_are_told_apart_from_the_energy():
             before.append(previous)
             score.append(5.0 * index + 1.5 * i - 2.0 * previous + 3.0 * (k % 7) + rng.normal(0, 1))
     model = mixed_model(subjects, score, {"sed": sed, "place": place, "before": before})
-    assert model is not None
-    for name, planted in (("sed", 5.0), ("place", 1.5), ("before", -2.0)):
-        assert model.term(name).low < planted < model.term(name).high
+    for name, true_value in (("sed", 5.0), ("place", 1.5), ("before", -2.0)):
+        assert model.term(name).low < true_value < model.term(name).high
         assert model.term(name).high - model.term(name).low < 0.5
 
 
@@ -185,11 +178,11 @@ def test_p_values_of_several_comparisons_are_those_of_r_p_adjust_holm():
 
 def test_differences_between_stimuli_are_paired_and_leave_each_subjects_level_out():
     table = {"A": {0: 10.0, 50: 14.0}, "B": {0: 60.0, 50: 66.0}, "C": {0: 30.0, 50: 38.0}, "D": {0: 99.0}}
-    (one,) = differences(table)
-    assert (one.low_index, one.high_index, one.n, one.mean) == (0, 50, 3, 6.0)
+    (difference,) = differences(table)
+    assert (difference.low_index, difference.high_index, difference.n, difference.mean) == (0, 50, 3, 6.0)
     # t(0.975, 2) = 4.302653 times 2 / sqrt(3), by tables
-    assert (one.low, one.high) == pytest.approx((6.0 - 4.968275, 6.0 + 4.968275), abs=1e-5)
-    assert one.p_holm == one.p
+    assert (difference.low, difference.high) == pytest.approx((6.0 - 4.968275, 6.0 + 4.968275), abs=1e-5)
+    assert difference.p_holm == difference.p
 
 
 # Distance of pituitary to pterygomaxillary fissure of 27 children at 8, 10, 12 and 14 years [mm]: Potthoff & Roy 1964
@@ -246,9 +239,9 @@ def restricted_deviance(theta, y, columns, codes):
     v = np.eye(len(y)) + (columns[:, :2] @ factor @ factor.T @ columns[:, :2].T) * (codes[:, None] == codes)
     inverse = np.linalg.inv(v)
     information = columns.T @ inverse @ columns
-    left = y - columns @ np.linalg.solve(information, columns.T @ inverse @ y)
+    residuals = y - columns @ np.linalg.solve(information, columns.T @ inverse @ y)
     dof = len(y) - columns.shape[1]
-    square = left @ inverse @ left / dof
+    square = residuals @ inverse @ residuals / dof
     return sum(np.linalg.slogdet(m)[1] for m in (v, information)) + dof * (1.0 + np.log(2.0 * np.pi * square))
 
 
@@ -267,8 +260,8 @@ def test_nothing_is_likelier_than_the_fit_singular_or_not_and_rounding_moves_its
         abs=1e-8,
     )
     for name in ("estimates", "errors", "among"):
-        one, other = getattr(fit, name), getattr(again, name)
-        assert np.abs(one - other).max() <= 1e-12 * np.abs(one).max()
+        first, second = getattr(fit, name), getattr(again, name)
+        assert np.abs(first - second).max() <= 1e-12 * np.abs(first).max()
 
 
 def test_what_all_subjects_share_has_the_degrees_of_freedom_of_a_fit_to_each_alone():
@@ -321,9 +314,9 @@ def test_the_spread_of_subjects_has_the_closed_forms_of_its_limits():
 def test_in_a_balanced_design_the_spreads_are_those_of_the_analysis_of_variance():
     rng = np.random.default_rng(3)
     y = rng.normal(0, 4, (10, 5)) + rng.normal(0, 6, (10, 1))
-    found = spreads([str(k) for k in range(10) for _ in range(5)], y.ravel().tolist(), [])
+    components = spreads([str(k) for k in range(10) for _ in range(5)], y.ravel().tolist(), [])
     within = ((y - y.mean(axis=1, keepdims=True)) ** 2).sum() / 40
-    assert found.left.sd**2 == pytest.approx(within)
-    assert found.level.sd**2 == pytest.approx(y.mean(axis=1).var(ddof=1) - within / 5)
-    assert found.slope is None
+    assert components.left.sd**2 == pytest.approx(within)
+    assert components.level.sd**2 == pytest.approx(y.mean(axis=1).var(ddof=1) - within / 5)
+    assert components.slope is None
     assert spreads(["a", "a", "b", "b"], [1.0, 2.0, 3.0, 4.0], []) is None

@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_strokes import (
+from closed_form import (
     CALIBRATION,
     COUNTS,
     HEIGHT,
     PLAIN,
     N,
     T,
-    analysed,
+    analyse,
     block,
-    felt,
     names,
+    noisy,
     with_info,
     wrench,
 )
@@ -29,36 +29,36 @@ from sessions.strokes.stroke_measures import EVERYTHING
 def test_without_an_unloaded_stretch_there_are_no_numbers():
     inside = (T > 1.3) & (T < 2.8)
     n = 2.0 + 0.5 * np.sin(2 * np.pi * 2.0 * T)
-    raw = felt(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))[inside]
-    found = analysed(block(T[inside], raw))
-    assert "no_unloaded_stretch" in names(found, "refused")
-    (one,) = found.strokes
-    assert all(getattr(one, name) is None for name in EVERYTHING if name != "readings")
+    raw = noisy(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))[inside]
+    analysis = analyse(block(T[inside], raw))
+    assert "no_unloaded_stretch" in names(analysis, "refused")
+    (stroke,) = analysis.strokes
+    assert all(getattr(stroke, name) is None for name in EVERYTHING if name != "readings")
 
 
 def test_without_an_unloaded_stretch_counts_do_not_even_show_a_contact():
     inside = (T > 1.3) & (T < 2.8)
     n = 2.0 + 0.5 * np.sin(2 * np.pi * 2.0 * T)
-    raw = felt(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))[inside] / np.diag(COUNTS.matrix)
-    found = analysed(block(T[inside], raw), info=with_info(calibration=COUNTS))
-    assert found.strokes == ()
-    assert names(found, "refused") == {"no_unloaded_stretch"}
+    raw = noisy(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))[inside] / np.diag(COUNTS.matrix)
+    analysis = analyse(block(T[inside], raw), info=with_info(calibration=COUNTS))
+    assert analysis.strokes == ()
+    assert names(analysis, "refused") == {"no_unloaded_stretch"}
 
 
 def test_a_zero_that_somebody_stated_is_used():
     inside = (T > 1.3) & (T < 2.8)
-    raw = felt(PLAIN)[inside]
-    found = analysed(block(T[inside], raw), info=with_info(settings={ZERO_SETTING: ZERO_STATED}))
-    (one,) = found.strokes
-    assert one.mu_dynamic == pytest.approx(0.5, rel=0.01)
-    assert one.zero == ZERO_STATED
+    raw = noisy(PLAIN)[inside]
+    analysis = analyse(block(T[inside], raw), info=with_info(settings={ZERO_SETTING: ZERO_STATED}))
+    (stroke,) = analysis.strokes
+    assert stroke.mu_dynamic == pytest.approx(0.5, rel=0.01)
+    assert stroke.zero == ZERO_STATED
 
 
 def test_a_zero_that_moves_during_the_stroke_is_named_and_at_last_forbids_the_numbers():
     def with_step(newtons):
         step = np.zeros((len(T), 6))
         step[T > 2.0, 0] = newtons
-        return analysed(block(T, felt(PLAIN + step)))
+        return analyse(block(T, noisy(PLAIN + step)))
 
     assert names(with_step(0.02)) == set()
     assert names(with_step(0.07)) == {"drift"}
@@ -69,24 +69,24 @@ def test_a_zero_that_moves_during_the_stroke_is_named_and_at_last_forbids_the_nu
 
 def test_a_normal_axis_along_which_the_finger_pulls_is_refused():
     n = N * (1.0 + 0.2 * np.sin(2 * np.pi * 1.7 * T))
-    raw = felt(wrench(T, n, 0.5 * np.ones_like(T), 25.0 * (T - 2.0)))
-    found = analysed(block(T, raw), frame=Frame("+z", "set", HEIGHT, "set"))
-    assert found.strokes == ()
-    assert names(found, "refused") == {"normal_axis_implausible"}
+    raw = noisy(wrench(T, n, 0.5 * np.ones_like(T), 25.0 * (T - 2.0)))
+    analysis = analyse(block(T, raw), frame=Frame("+z", "set", HEIGHT, "set"))
+    assert analysis.strokes == ()
+    assert names(analysis, "refused") == {"normal_axis_implausible"}
 
 
 @pytest.mark.parametrize(("factor", "flaw"), [(1000.0, "units_implausible"), (0.001, "no_steady_sliding")])
 def test_torques_in_the_wrong_unit_give_no_speed_and_no_proof_of_sliding(factor, flaw):
-    raw = felt(PLAIN)
+    raw = noisy(PLAIN)
     raw[:, 3:] *= factor
-    (one,) = analysed(block(T, raw), info=with_info(calibration=wide())).strokes
-    assert flaw in one.flaws
-    assert one.speed is None
-    assert one.mu_dynamic is None
+    (stroke,) = analyse(block(T, raw), info=with_info(calibration=wide())).strokes
+    assert flaw in stroke.flaws
+    assert stroke.speed is None
+    assert stroke.mu_dynamic is None
 
 
 def test_a_sentence_has_all_digits_of_a_force_in_a_wrong_unit():
-    flaws = analysed(block(T, felt(PLAIN) * 6170.0), info=with_info(calibration=wide())).flaws
+    flaws = analyse(block(T, noisy(PLAIN) * 6170.0), info=with_info(calibration=wide())).flaws
     (sentence,) = [flaw.sentence for flaw in flaws if flaw.name == "units_implausible"]
     assert re.search(r"reaches 12\d{3} N, more than a finger presses", sentence)  # 6170 times 2 N, and filtered
 
@@ -97,14 +97,14 @@ def wide():
 
 def test_a_height_nobody_stated_forbids_a_speed_that_depends_on_it():
     ratio = 0.5 + 0.04 * (T - 2.0)  # rises by 8 % a second
-    raw = felt(wrench(T, N, ratio, 7.0 * (T - 2.0)))
-    (stated,) = analysed(block(T, raw)).strokes
-    (unknown,) = analysed(block(T, raw), frame=Frame("-z", "default", HEIGHT, "default")).strokes
-    assert stated.speed == pytest.approx(7.0, rel=0.05)
+    raw = noisy(wrench(T, N, ratio, 7.0 * (T - 2.0)))
+    (known,) = analyse(block(T, raw)).strokes
+    (unknown,) = analyse(block(T, raw), frame=Frame("-z", "default", HEIGHT, "default")).strokes
+    assert known.speed == pytest.approx(7.0, rel=0.05)
     assert unknown.speed is None
     assert unknown.reasons["speed"] == "height_unknown"
 
 
 def test_a_height_nobody_stated_leaves_a_speed_that_hardly_depends_on_it():
-    (one,) = analysed(block(T, felt(PLAIN)), frame=Frame("-z", "default", 0.0, "default")).strokes
-    assert one.speed == pytest.approx(25.0, rel=0.01)
+    (stroke,) = analyse(block(T, noisy(PLAIN)), frame=Frame("-z", "default", 0.0, "default")).strokes
+    assert stroke.speed == pytest.approx(25.0, rel=0.01)

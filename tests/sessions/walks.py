@@ -35,7 +35,7 @@ CODES = [trial.stimulus.code for trial in FORCES.trials]
 FIRST = FORCES.trials[0]
 
 
-def made_plan(answers, *, forces=True, phase="main", strokes_allowed=1, **options):
+def plan_of(answers, *, forces=True, phase="main", strokes_allowed=1, **options):
     """A plan of one block whose trials ask for `answers`; "choice" compares with the trial before."""
     trials = tuple(
         Trial(n, "b", Stimulus("d", n, f"K{n:02d}"), 1, 1, phase, answer, n - 1 if answer == "choice" else None)
@@ -45,10 +45,10 @@ def made_plan(answers, *, forces=True, phase="main", strokes_allowed=1, **option
     return SessionPlan("made", "S01", 0, "none", (block,), forces, Frame(), **options)
 
 
-PAIRS = made_plan(["none", "choice"] * 3)
-PAIRS_UNSEEN = made_plan(["none", "choice"] * 3, forces=False)
-NUMBERS = made_plan(["number"] * 4, forces=False)
-RESTFUL = made_plan(["line"] * 5, forces=False, rests=Rests(after_trials=2, duration=30.0))
+PAIRS = plan_of(["none", "choice"] * 3)
+PAIRS_UNSEEN = plan_of(["none", "choice"] * 3, forces=False)
+NUMBERS = plan_of(["number"] * 4, forces=False)
+RESTFUL = plan_of(["line"] * 5, forces=False, rests=Rests(after_trials=2, duration=30.0))
 _WHOLE = plan(protocol("adaptive-comparison"), "S01", 3, forces=False)
 ADAPTIVE = replace(_WHOLE, blocks=tuple(replace(block, trials=block.trials[:10]) for block in _WHOLE.blocks))
 PLANS_OF_ALL_KINDS = [FORCES, SCORES, PAIRS, PAIRS_UNSEEN, NUMBERS, RESTFUL, ADAPTIVE]
@@ -83,7 +83,7 @@ PLANS = st.sampled_from(PLANS_OF_ALL_KINDS)
 CHANCES = st.booleans().flatmap(lambda on: st.none() if on else EVENTS)
 
 
-def meant(state):
+def next_event(state):
     """The event that leads on from `state`."""
     match state:
         case Mounting(place):
@@ -115,7 +115,7 @@ def walks(draw):
     state, _ = start(plan)
     events = []
     for chance in draw(st.lists(CHANCES, max_size=80)):
-        event = meant(state) if chance is None else chance
+        event = next_event(state) if chance is None else chance
         events.append(event)
         state, _ = advance(state, event)
     return plan, events
@@ -124,9 +124,9 @@ def walks(draw):
 def steps(plan, events):
     """Every (state before, event, state after, commands) of a walk."""
     state, _ = start(plan)
-    found = []
+    passed = []
     for event in events:
         before = state
         state, commands = advance(state, event)
-        found.append((before, event, state, commands))
-    return found
+        passed.append((before, event, state, commands))
+    return passed

@@ -69,12 +69,12 @@ def application(tmp_path_factory):
 def type_size():
     """Return what chooses a size of type; the usual one comes back."""
 
-    def started_anew(scale):
+    def choose_scale(scale):
         choose(SCALE, scale)
         type_scale.cache_clear()
 
-    yield started_anew
-    started_anew(None)
+    yield choose_scale
+    choose_scale(None)
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def subject_page(application, type_size):
     """Return a function that shows a view in a window for the subject, at a size of type."""
     windows = []
 
-    def shown(view, scale, size, direction=None, theme=None, hand=None):
+    def show_page(view, scale, size, direction=None, theme=None, hand=None):
         type_size(scale)
         window = SubjectWindow(lambda: 0.0)
         windows.append(window)
@@ -96,7 +96,7 @@ def subject_page(application, type_size):
             application.processEvents()
         return window
 
-    yield shown
+    yield show_page
     for window in windows:
         window.hide()
         window.deleteLater()

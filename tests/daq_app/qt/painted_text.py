@@ -30,7 +30,7 @@ def painted_texts(widget):
     """Return every text that a widget paints, its ground painted anew."""
     if hasattr(widget, "forget_ground"):
         widget.forget_ground()
-    with _noted() as texts:
+    with _noting() as texts:
         widget.grab()
     return [text for text in texts if text.words]
 
@@ -38,7 +38,7 @@ def painted_texts(widget):
 def cut_or_colliding(widget):
     """Return the painted texts that are not wholly seen, and pairs of them that lie on each other."""
     texts = painted_texts(widget)
-    cut = [(one.words, one.place, one.room) for one in texts if one.is_cut]
+    cut = [(text.words, text.place, text.room) for text in texts if text.is_cut]
     pairs = [(a.words, b.words) for at, a in enumerate(texts) for b in texts[at + 1 :] if a.collides(b)]
     return cut + pairs
 
@@ -53,28 +53,28 @@ def paints_by_hand(widget):
 
 
 @contextmanager
-def _noted():
+def _noting():
     texts = []
 
-    def noting(draw):
-        def drawn(painter, *given):
+    def note_texts(draw):
+        def note_and_draw(painter, *arguments):
             if not isinstance(painter.device(), QPicture):  # as pyqtgraph's axes, which are measured by themselves
-                texts.append(_text(painter, given))
-            draw(painter, *given)
+                texts.append(_text(painter, arguments))
+            draw(painter, *arguments)
 
-        return drawn
+        return note_and_draw
 
     with pytest.MonkeyPatch.context() as patch:
         for name in ("drawText", "drawStaticText"):
-            patch.setattr(QPainter, name, noting(getattr(QPainter, name)))
+            patch.setattr(QPainter, name, note_texts(getattr(QPainter, name)))
         yield texts
 
 
-def _text(painter, given):
+def _text(painter, arguments):
     """Return a text by what `QPainter.drawText` or `drawStaticText` is given."""
     device = painter.device()
     room = QRectF(0.0, 0.0, device.width(), device.height())
-    at, *flags, words = given
+    at, *flags, words = arguments
     if isinstance(at, QPointF):
         metrics = QFontMetricsF(painter.font())
         if isinstance(words, str):
@@ -83,9 +83,9 @@ def _text(painter, given):
             place, words = QRectF(at, QSizeF(words.size())), words.text()
     else:
         box = QRectF(at)
-        wanted = int(flags[0]) if flags else int(Qt.TextFlag.TextWordWrap)
-        place = painter.boundingRect(box, wanted, words)
-        if not wanted & int(Qt.TextFlag.TextDontClip):
+        mode = int(flags[0]) if flags else int(Qt.TextFlag.TextWordWrap)
+        place = painter.boundingRect(box, mode, words)
+        if not mode & int(Qt.TextFlag.TextDontClip):
             room = room.intersected(painter.worldTransform().mapRect(box))
     if painter.hasClipping():
         room = room.intersected(painter.worldTransform().mapRect(painter.clipBoundingRect()))

@@ -26,6 +26,6 @@ def test_ctrl_c_closes_the_window_without_a_traceback(tmp_path, monkeypatch, arg
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     command = [sys.executable, "-c", CHILD, *arguments]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 130
-    assert "Traceback" not in done.stderr
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert process.returncode == 130
+    assert "Traceback" not in process.stderr

@@ -43,13 +43,13 @@ FOLDERS = "recent sessions"  # a list of names of folders
 MODELS_OWN = "scene and model"  # a table whose words are the report's
 
 
-def translated(text):
+def mark(text):
     """Return a text with marks around all of it but what is put in for its braces."""
     pieces = re.split(r"(\{[^}]*\})", text)
-    return "".join(one if one.startswith("{") else f"⟦{one}⟧" for one in pieces if one)
+    return "".join(piece if piece.startswith("{") else f"⟦{piece}⟧" for piece in pieces if piece)
 
 
-def left_in_english(text):
+def english_rest(text):
     """Return what of a text is neither within the marks of a translation nor data."""
     rest = DATA.sub(" ", re.sub(r"⟦[^⟦⟧]*⟧", " ", text))
     return rest if re.search("[A-Za-z]{3}", rest) and not text.startswith(SESSIONS_OWN) else ""
@@ -69,9 +69,9 @@ def texts_of(widget):
             yield from (widget.tabText(at) for at in range(widget.count()))
         case QMenu():
             yield from (action.text() for action in widget.actions())
-        case QListWidget() if widget.accessibleName() != translated(FOLDERS):
+        case QListWidget() if widget.accessibleName() != mark(FOLDERS):
             yield from (widget.item(at).text() for at in range(widget.count()))
-        case QTableView() if widget.accessibleName() != translated(MODELS_OWN):
+        case QTableView() if widget.accessibleName() != mark(MODELS_OWN):
             model = widget.model()
             yield from (str(model.headerData(at, Qt.Orientation.Horizontal, 0)) for at in range(model.columnCount()))
         case _:
@@ -79,13 +79,13 @@ def texts_of(widget):
 
 
 def english_in(window):
-    found = set()
+    english = set()
     for widget in (window, *window.findChildren(QWidget)):
         if not type(widget).__module__.startswith("PySide6") or not widget.objectName().startswith("qt_"):
             painted = painted_texts(widget) if widget.isVisible() and paints_by_hand(widget) else []
             texts = (*texts_of(widget), *(text.words for text in painted))
-            found.update(text for text in texts if left_in_english(text))
-    return {text for text in found if not text.startswith("Scroll ")}  # Qt's own
+            english.update(text for text in texts if english_rest(text))
+    return {text for text in english if not text.startswith("Scroll ")}  # Qt's own
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -93,7 +93,7 @@ def marked_language(tmp_path_factory):
     """A language that puts marks around each English text."""
     folder = tmp_path_factory.mktemp("translations")
     units = (
-        f"<trans-unit><source>{escape(text)}</source><target>{escape(translated(text))}</target></trans-unit>"
+        f"<trans-unit><source>{escape(text)}</source><target>{escape(mark(text))}</target></trans-unit>"
         for text in window_texts()
     )
     (folder / "experimenter_xx.xlf").write_text(f"<xliff><file>{''.join(units)}</file></xliff>", "utf-8")
@@ -112,7 +112,7 @@ def test_nothing_is_left_in_english_before_a_session(application, driver):
     window.act("keys")
     window.act("preview")
     application.processEvents()
-    preview = next(one for one in application.topLevelWidgets() if one.windowTitle().startswith("⟦daq-app · preview"))
+    preview = next(w for w in application.topLevelWidgets() if w.windowTitle().startswith("⟦daq-app · preview"))
     assert english_in(window) == set()
     assert english_in(preview) == set()
     preview.close()
@@ -124,19 +124,19 @@ def test_nothing_is_left_in_english_in_a_session_and_in_its_review(driver):
     window = driver.window
     window.page.subject.setText("P01")
     window.page.simulated.setChecked(True)
-    found = set()
+    english = set()
 
-    def looked(condition):
-        found.update(english_in(window))
+    def check(condition):
+        english.update(english_in(window))
         return condition()
 
     window.act("primary")
     driver.until(lambda: driver.session is not None, "the session")
-    driver.until(lambda: looked(lambda: driver.session.sealing == "sealed"))
+    driver.until(lambda: check(lambda: driver.session.sealing == "sealed"))
     window.go_to("review")
     analyst = window.rooms.analyst
-    driver.until(lambda: looked(lambda: analyst.state.stage == "predicted" and analyst.state.step is None))
-    assert found == set()
+    driver.until(lambda: check(lambda: analyst.state.stage == "predicted" and analyst.state.step is None))
+    assert english == set()
 
 
 def test_a_translation_with_other_braces_leaves_its_text_in_english(monkeypatch):
@@ -153,13 +153,13 @@ def test_a_file_that_cannot_be_read_leaves_the_window_in_english(tmp_path, monke
 
 def test_the_language_chosen_in_the_menu_is_that_of_the_next_start(driver):
     window = driver.window
-    spoken = window.rooms._menus.languages
-    names = [action.text() for action in spoken.actions()]
+    menu = window.rooms._menus.languages
+    names = [action.text() for action in menu.actions()]
     assert names == ["English (en)", "Xx"] or len(names) == len(languages(EXPERIMENTER))
-    assert spoken.checkedAction() is spoken.actions()[-1]
-    spoken.actions()[0].trigger()
+    assert menu.checkedAction() is menu.actions()[-1]
+    menu.actions()[0].trigger()
     assert preferences.language() == "en"
-    spoken.actions()[-1].trigger()
+    menu.actions()[-1].trigger()
     assert preferences.language() == "xx"
 
 
@@ -171,7 +171,7 @@ def test_a_process_that_is_started_speaks_the_language_of_the_environment(tmp_pa
         "from pathlib import Path; from daq_app import wording;"
         f"wording.FOLDER = Path({str(tmp_path)!r}); print(wording.tr('predicting'))"
     )
-    said = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], env={VARIABLE: "zz"}, capture_output=True, text=True, check=True
     )
-    assert said.stdout.strip() == "voorspellen"
+    assert process.stdout.strip() == "voorspellen"

@@ -38,7 +38,7 @@ def until_scoring(driver):
     driver.phase("scoring")
 
 
-def moved_on(driver, number):
+def next_trial(driver, number):
     driver.until(lambda: driver.session.trial != number, "the next trial")
 
 
@@ -68,7 +68,7 @@ def test_an_answer_can_be_given_with_keys_that_reach_the_experimenters_window(dr
         QTest.keyClick(window, key)
     assert window.subject.line.answer.score == 60.0
     QTest.keyClick(window, ENTER)
-    moved_on(driver, 1)
+    next_trial(driver, 1)
     assert driver.session.trials[0].answer == "score 60"
 
 
@@ -83,22 +83,22 @@ def test_no_key_answers_on_a_page_that_was_closed_and_its_mark_waits(driver):
     assert (driver.session.phase, window.subject.line.answer.score) == ("scoring", 50.0)
     QTest.keyClick(window, Qt.Key.Key_F6)
     QTest.keyClick(window, ENTER)
-    moved_on(driver, 1)
+    next_trial(driver, 1)
     assert driver.session.trials[0].answer == "score 50"
 
 
 def test_a_report_that_comes_between_the_answer_and_its_record_asks_for_no_second_answer(driver):
     begin(driver)
     until_scoring(driver)
-    subject, asked = driver.window.subject, driver.view.subject
+    subject, view = driver.window.subject, driver.view.subject
     QTest.keyClick(subject.line, Qt.Key.Key_Right)
-    subject.show_view(asked, None)
+    subject.show_view(view, None)
     assert subject.line.answer.score == 50.0
     with_answer = driver.window.bridge.view
     QTest.keyClick(subject.line, ENTER)
     driver.window.show_view(with_answer)
     assert not subject.scoring
-    moved_on(driver, 1)
+    next_trial(driver, 1)
     until_scoring(driver)
     assert subject.scoring
     assert subject.line.answer.score is None
@@ -143,7 +143,7 @@ def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0
     assert driver.session.phase == "scoring"
     assert window.subject.number.field.text() == "20"
     QTest.keyClick(window, ENTER)
-    moved_on(driver, 1)
+    next_trial(driver, 1)
     assert driver.session.trials[0].answer == "number 20"
 
 
@@ -156,15 +156,15 @@ def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_cour
     try:
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
         QTest.keyClick(window.subject.line, ENTER)
-        moved_on(driver, 1)
-        sent = []
+        next_trial(driver, 1)
+        messages = []
         with monkeypatch.context() as patch:
-            patch.setattr(window.bridge, "send", sent.append)
+            patch.setattr(window.bridge, "send", messages.append)
             for place in (window.subject, window):
                 QTest.keyClick(place, ENTER)
-            assert sent == []
+            assert messages == []
             QTest.keyClick(window.subject, SPACE)
-            assert sent == [driver.view.course.primary.sends]
+            assert messages == [driver.view.course.primary.sends]
     finally:
         QApplication.setDoubleClickInterval(interval)
 
@@ -177,7 +177,7 @@ def test_a_reason_that_is_typed_while_the_course_goes_on_discards_no_other_trial
     assert "trial 1 (" in course._question.text()
     QTest.keyClicks(course.line, "it was dropped")
     window.bridge.send(steps.Scored(40.0))  # meanwhile the subject answers, on another screen
-    moved_on(driver, 1)
+    next_trial(driver, 1)
     QTest.keyClick(course.line, ENTER)
     assert course.asking
     assert course.line.text() == "it was dropped"
@@ -229,8 +229,8 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
     first = recording.trials[0]
     assert (first.outcome, first.score, first.take.number) == ("scored", 50.0, 1)
     assert [take.discarded for take in first.other_takes] == ["the redo was undone"]
-    replayed = replay(recording, tmp_path / "replayed", None, lambda *_: None)
-    assert not list(different_events(recording, replayed))
+    replica = replay(recording, tmp_path / "replayed", None, lambda *_: None)
+    assert not list(different_events(recording, replica))
 
 
 def test_the_page_of_the_next_session_has_no_code_proposes_the_next_and_enter_begins_none(driver):
@@ -262,19 +262,19 @@ def test_the_enter_that_keeps_the_rulers_length_begins_no_session(driver):
 
 
 def test_enter_in_the_address_connects_what_was_typed_and_a_wrong_one_is_named_and_can_be_mended(driver):
-    window, chosen = driver.window, driver.window.bench._choice
+    window, choice = driver.window, driver.window.bench._choice
     window.bridge.send(Disconnect())
     driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
     try:
         for address, words in (("simm:", "simm"), ("sim:?rate=100", "")):
-            chosen.setFocus()
-            chosen.lineEdit().selectAll()
-            QTest.keyClicks(chosen, address)
-            QTest.keyClick(chosen, ENTER)
+            choice.setFocus()
+            choice.lineEdit().selectAll()
+            QTest.keyClicks(choice, address)
+            QTest.keyClick(choice, ENTER)
             driver.until(lambda: driver.state.bench.link in ("none", "open"), "an answer")
-            told = "" if driver.view.banner is None else driver.view.banner.sentence
-            assert words in told
-            assert "None" not in told
+            sentence = "" if driver.view.banner is None else driver.view.banner.sentence
+            assert words in sentence
+            assert "None" not in sentence
         assert driver.state.bench.link == "open"
         assert driver.state.bench.info.rate == 100.0
         assert driver.session is None

@@ -27,12 +27,12 @@ WINDOW, SUBJECT = "daq-app", "daq-app · subject"
 def desk_of(screens):
     with server(sum(screens), HEIGHT) as display:
         desk = Desk(display)
-        left = 0
+        offset = 0
         for at, width in enumerate(screens):
-            monitor = f"{width}/{width // 4}x{HEIGHT}/{HEIGHT // 4}+{left}+0"
+            monitor = f"{width}/{width // 4}x{HEIGHT}/{HEIGHT // 4}+{offset}+0"
             command = ["xrandr", "--setmonitor", f"screen{at}", monitor, "none" if at else "screen"]
             subprocess.run(command, env=desk.environment, check=True, capture_output=True)
-            left += width
+            offset += width
         manager = subprocess.Popen(["openbox", "--sm-disable"], env=desk.environment, stderr=subprocess.DEVNULL)
         try:
             yield desk
@@ -62,12 +62,12 @@ def begin(desk, folder):
     time.sleep(1.0)
     desk.do("type", "P07")
 
-    def begun():
+    def has_begun():
         desk.press("Return")  # until the simulated bench is connected this only says what is missing
         time.sleep(1.0)
         return "started" in kinds(folder)
 
-    until(begun, "the session")
+    until(has_begun, "the session")
     desk.press("space")
     mount_asked(folder, 1)
 
@@ -105,9 +105,9 @@ def test_one_keyboard_runs_trial_after_trial_without_the_mouse_and_a_note_keeps_
         desk.press("Return")
         count(folder, "note", 1)
         answer_by_keys(desk, folder, 2)
-        found = events(folder)
-        assert [event.data["text"] for event in found if event.kind == "note"] == ["loud 12"]
-        assert [event.data["score"] for event in found if event.kind == "scored"] == [50.0, 50.0]
+        log = events(folder)
+        assert [event.data["text"] for event in log if event.kind == "note"] == ["loud 12"]
+        assert [event.data["score"] for event in log if event.kind == "scored"] == [50.0, 50.0]
 
 
 def test_keys_of_the_course_work_on_the_subjects_window_and_a_click_there_takes_no_key_from_a_note(tmp_path):
@@ -121,10 +121,10 @@ def test_keys_of_the_course_work_on_the_subjects_window_and_a_click_there_takes_
         desk.press("n")  # on the subject's window, which has the keyboard
         until(lambda: desk.active() == WINDOW, "the note")
         desk.do("type", "a")
-        left, top, width, height = desk.box(desk.window("subject$"))
-        assert left >= DESK
+        x, y, width, height = desk.box(desk.window("subject$"))
+        assert x >= DESK
         for share in range(20, 80, 2):  # down the window: the line's height is its own affair
-            desk.do("mousemove", left + width // 2, top + height * share // 100, "click", 1)
+            desk.do("mousemove", x + width // 2, y + height * share // 100, "click", 1)
         desk.do("type", "10b")
         desk.press("Return")
         count(folder, "note", 1)
@@ -163,5 +163,5 @@ def test_no_key_typed_into_another_program_answers_and_the_subjects_window_comes
             count(folder, "scored", 1)
         finally:
             other.terminate()
-            typed, _ = other.communicate()
-        assert typed.split() == ["1", "12"]
+            text, _ = other.communicate()
+        assert text.split() == ["1", "12"]

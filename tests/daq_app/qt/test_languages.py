@@ -12,21 +12,21 @@ from daq_app.wording import SUBJECT, translations
 from sessions.plan.protocols import protocol
 
 pytestmark = pytest.mark.qt
-OTHERS = ("de", "fr", "ja", "ar")
+TRANSLATED = ("de", "fr", "ja", "ar")
 NAMES = ("{number}", "{count}", "{code}", "{low}", "{high}", "{score}")
 
 
 @pytest.fixture
-def shown(subject_page):
+def show_page(subject_page):
     """Return a function that shows the subject's page at a size of type."""
     return lambda view, scale=1.0, size=(900, 560): subject_page(view, scale, size)
 
 
-@pytest.mark.parametrize("language", OTHERS)
+@pytest.mark.parametrize("language", TRANSLATED)
 def test_each_file_has_every_text_with_its_words_in_braces(language):
-    written = translations(SUBJECT, language)
-    assert set(written) == set(SubjectText)
-    for text, translation in written.items():
+    texts = translations(SUBJECT, language)
+    assert set(texts) == set(SubjectText)
+    for text, translation in texts.items():
         names = [name for name in NAMES if name in text]
         assert all(name in translation for name in names)
 
@@ -36,8 +36,8 @@ def test_a_language_that_the_program_does_not_speak_leaves_its_own_texts_english
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
-@pytest.mark.parametrize("language", ["en", *OTHERS])
-def test_no_text_of_the_page_is_clipped_however_large_the_type(shown, language, scale):
+@pytest.mark.parametrize("language", ["en", *TRANSLATED])
+def test_no_text_of_the_page_is_clipped_however_large_the_type(show_page, language, scale):
     words = translator(language)
     for name in ("sensotact-friction", "magnitude-estimation"):
         block = protocol(name).in_language(language).blocks[1]
@@ -47,23 +47,23 @@ def test_no_text_of_the_page_is_clipped_however_large_the_type(shown, language, 
                 "line", block.question or "Judge it", "", block.scale_ends or ("a", "b"), 0, (1, 1), "right", language
             ),
         ):
-            page = shown(view, scale)
+            page = show_page(view, scale)
             for part in page.findChildren(QLabel):
                 if part.isVisible() and part.text():
                     assert part.height() >= part.heightForWidth(part.width()), part.text()
 
 
-def test_a_page_that_changes_its_language_has_every_word_in_the_new_one(shown):
+def test_a_page_that_changes_its_language_has_every_word_in_the_new_one(show_page):
     english = protocol("sensotact-friction").blocks[0]
-    page = shown(SubjectView("line", "How sticky was it?", "", english.scale_ends, 0, (1, 1), "right", "en"))
+    page = show_page(SubjectView("line", "How sticky was it?", "", english.scale_ends, 0, (1, 1), "right", "en"))
     german = protocol("sensotact-friction").in_language("de").blocks[0]
     page.show_view(SubjectView("line", german.question, "", german.scale_ends, 0, (1, 1), "right", "de"), None)
     texts = [part.text() for part in page.findChildren(QLabel) if part.isVisible() and part.text()]
     assert sorted(texts) == sorted([german.question, *german.scale_ends])
 
 
-def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(shown):
-    page = shown(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
+def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(show_page):
+    page = show_page(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
     line = page.line
     assert page.layoutDirection() == Qt.LayoutDirection.RightToLeft
     assert line.place_of(0.0).x() > line.place_of(100.0).x()
@@ -77,16 +77,16 @@ def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(shown):
     assert page.next.text() == "التالي"
 
 
-def test_back_in_english_the_line_is_as_it_was(shown):
-    page = shown(SubjectView("line", "كم؟", "", ("a", "b"), 0, (1, 1), "right", "ar"))
+def test_back_in_english_the_line_is_as_it_was(show_page):
+    page = show_page(SubjectView("line", "كم؟", "", ("a", "b"), 0, (1, 1), "right", "ar"))
     page.show_view(SubjectView("line", "How?", "", ("a", "b"), 0, (2, 1)), None)
     assert page.line.place_of(0.0).x() < page.line.place_of(100.0).x()
     assert page.next.text() == "Next"
 
 
-def test_next_stays_at_the_answering_hand_in_every_language(shown):
+def test_next_stays_at_the_answering_hand_in_every_language(show_page):
     for language in ("en", "ar"):
-        page = shown(SubjectView("line", "?", "", ("a", "b"), 0, (1, 1), "right", language))
+        page = show_page(SubjectView("line", "?", "", ("a", "b"), 0, (1, 1), "right", language))
         page.line._take(page.line.answer.press(0.0, 50.0, "mouse").release())
         assert page.next.mapTo(page, QPointF(0, 0)).x() > page.width() / 2
 
@@ -97,21 +97,21 @@ def test_a_character_that_no_font_draws_is_named():
     assert missing_glyphs(["a \U000f0000 b"], QFont()) == "\U000f0000"
 
 
-@pytest.mark.parametrize("language", OTHERS)
-def test_screen_readers_speak_the_language_of_the_page_and_tell_the_line_as_a_slider(shown, language):
+@pytest.mark.parametrize("language", TRANSLATED)
+def test_screen_readers_speak_the_language_of_the_page_and_tell_the_line_as_a_slider(show_page, language):
     words = translator(language)
-    page = shown(SubjectView("line", "?", ends=("low", "high"), key=(1, 1), language=language))
-    named = words(SubjectText.LINE).format(low="low", high="high")
-    said = QAccessible.queryAccessibleInterface(page.line)
-    assert said.role() == QAccessible.Role.Slider
-    assert said.text(QAccessible.Text.Name) == named
-    assert said.text(QAccessible.Text.Description) == words(SubjectText.UNANSWERED)
+    page = show_page(SubjectView("line", "?", ends=("low", "high"), key=(1, 1), language=language))
+    name = words(SubjectText.LINE).format(low="low", high="high")
+    reader = QAccessible.queryAccessibleInterface(page.line)
+    assert reader.role() == QAccessible.Role.Slider
+    assert reader.text(QAccessible.Text.Name) == name
+    assert reader.text(QAccessible.Text.Description) == words(SubjectText.UNANSWERED)
     QTest.keyClick(page.line, Qt.Key.Key_End)
     score = round(page.line.answer.score)
-    assert said.text(QAccessible.Text.Description) == words(SubjectText.ANSWERED).format(score=score)
+    assert reader.text(QAccessible.Text.Description) == words(SubjectText.ANSWERED).format(score=score)
     assert page.next.accessibleName() == words(SubjectText.NEXT)
     assert page.number.field.accessibleName() == words(SubjectText.OWN_NUMBER)
     assert page.choice.accessibleName() == words(SubjectText.OF_TWO)
     assert page.press.accessibleName() == words(SubjectText.PRESSING)
-    ours = {made.accessibleName() for made in (page.line, page.next, page.number.field, page.choice, page.press)}
+    ours = {widget.accessibleName() for widget in (page.line, page.next, page.number.field, page.choice, page.press)}
     assert not ours & {str(text) for text in SubjectText}

@@ -81,14 +81,14 @@ def themed(application, request):
     """Return a function that shows a widget in a theme; the other windows of this process keep theirs."""
     fusion = QStyleFactory.create("Fusion")
 
-    def shown(widget, palette=tokens.palette):
+    def show(widget, palette=tokens.palette):
         widget.setStyle(fusion)
         widget.setPalette(palette(request.param))
         widget.setStyleSheet(tokens.style_sheet(request.param))
         widget.show()
         application.processEvents()
 
-    return shown
+    return show
 
 
 @pytest.mark.parametrize("kind", [QListWidget, QTableWidget, QTreeWidget])
@@ -163,32 +163,32 @@ LONG = "a text that is longer than its room"
 
 
 def _tabs():
-    made = QTabBar()
-    made.setUsesScrollButtons(False)
-    made.setElideMode(Qt.TextElideMode.ElideRight)
-    made.addTab(LONG)
-    made.addTab(LONG)
-    return made
+    bar = QTabBar()
+    bar.setUsesScrollButtons(False)
+    bar.setElideMode(Qt.TextElideMode.ElideRight)
+    bar.addTab(LONG)
+    bar.addTab(LONG)
+    return bar
 
 
 def _cells(head, cell):
-    made = QTableWidget(1, 1)
-    made.setHorizontalHeaderLabels([head])
-    made.setItem(0, 0, QTableWidgetItem(cell))
-    made.setColumnWidth(0, 60)
-    return made
+    table = QTableWidget(1, 1)
+    table.setHorizontalHeaderLabels([head])
+    table.setItem(0, 0, QTableWidgetItem(cell))
+    table.setColumnWidth(0, 60)
+    return table
 
 
 def _list():
-    made = QListWidget()
-    made.addItem(LONG)
-    return made
+    widget = QListWidget()
+    widget.addItem(LONG)
+    return widget
 
 
 def _field():
-    made = QLineEdit()
-    made.setPlaceholderText(LONG)
-    return made
+    field = QLineEdit()
+    field.setPlaceholderText(LONG)
+    return field
 
 
 @pytest.mark.parametrize(
@@ -205,27 +205,27 @@ def _field():
 @pytest.mark.usefixtures("application")
 def test_a_row_an_example_a_tab_a_head_and_a_cell_are_noticed_where_they_are_cut(make, room):
     window = QWidget()
-    made = make()
-    made.setParent(window)
+    widget = make()
+    widget.setParent(window)
     window.resize(800, 200)
-    made.resize(100, 100)
+    widget.resize(100, 100)
     window.show()
     assert [text for text, *_ in cut_off(window)].count(LONG) >= 1
-    made.resize(room or 700, 100)
-    if isinstance(made, QTableWidget):
-        made.setColumnWidth(0, 600)
+    widget.resize(room or 700, 100)
+    if isinstance(widget, QTableWidget):
+        widget.setColumnWidth(0, 600)
     assert [text for text, *_ in cut_off(window) if text == LONG] == []
 
 
 @pytest.fixture
 def windows(driver, type_size):
     """Return a function that makes the experimenter's window in a theme and at a size of type."""
-    made, bridge = [], driver.window.bridge
+    shown, bridge = [], driver.window.bridge
 
     def make(size, scale, theme):
         type_size(scale)
         window = MainWindow(bridge)
-        made.append(window)
+        shown.append(window)
         window.setStyleSheet(tokens.style_sheet(theme))
         window.resize(*size)
         window.show()
@@ -235,12 +235,12 @@ def windows(driver, type_size):
 
     yield make
     bridge.blockSignals(False)
-    for window in made:
+    for window in shown:
         bridge.changed.disconnect(window.show_view)
         bridge.frame.disconnect(window._draw)
-        for one in (window.subject, window):
-            one.hide()
-            one.deleteLater()
+        for widget in (window.subject, window):
+            widget.hide()
+            widget.deleteLater()
 
 
 def settle(application):
@@ -275,12 +275,12 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
     assert cut_off(window.keys) == []
     window.act("keys")
     window.act("preview")
-    (shown,) = window.findChildren(SubjectPreview)
-    for row in range(shown.list.count()):
-        shown.list.setCurrentRow(row)
+    (subject_preview,) = window.findChildren(SubjectPreview)
+    for row in range(subject_preview.list.count()):
+        subject_preview.list.setCurrentRow(row)
         settle(driver.application)
-        assert cut_off(shown) == []
-    shown.close()
+        assert cut_off(subject_preview) == []
+    subject_preview.close()
     window.bridge.blockSignals(True)
     window.live.bar.hold.click()
     for messages in (MOUNT, (*SCORE, Judged(1, 1, BAD)), PAUSED, CLOSING):
@@ -335,25 +335,25 @@ def is_too_narrow(scrolled):
 
 def cut_axes(window):
     """Return every name of an axis that is longer than its axis, or lies on its numbers."""
-    found = []
+    cut = []
     for plot in window.findChildren(ZoomedPlot):
         across = plot.getPlotItem().getAxis("bottom")
         numbers = across.style["tickTextOffset"][1] + QFontMetricsF(across.style["tickFont"]).ascent()
         if plot.isVisible() and across.label.isVisible() and across.label.y() + DOCUMENT_MARGIN < numbers:
-            found.append((across.labelText, across.label.y(), numbers))
+            cut.append((across.labelText, across.label.y(), numbers))
         for side in ("left", "bottom") if plot.isVisible() else ():
             axis = plot.getPlotItem().getAxis(side)
             room = axis.size().height() if side == "left" else axis.size().width()
             if axis.label.isVisible() and axis.label.boundingRect().width() > room + ROUNDING:
-                found.append((axis.labelText, axis.label.boundingRect().width(), room))
+                cut.append((axis.labelText, axis.label.boundingRect().width(), room))
     for canvas in window.findChildren(FingerCanvas):
         axis = canvas._bar.getAxis("bottom")
         place = axis.label.mapRectToParent(axis.label.boundingRect())
         if canvas.isVisible() and (
             place.left() < -DOCUMENT_MARGIN or place.right() > axis.size().width() + DOCUMENT_MARGIN
         ):
-            found.append((axis.labelText, place, axis.size()))
-    return found
+            cut.append((axis.labelText, place, axis.size()))
+    return cut
 
 
 @pytest.mark.parametrize("language", ["en", "de", "fr", "ja", "ar"])

@@ -11,9 +11,9 @@ pytestmark = pytest.mark.qt
 
 @pytest.fixture(scope="module")
 def looks():
-    found = importlib.util.spec_from_file_location("looks", Path(__file__).parents[3] / "docs" / "looks.py")
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
+    spec = importlib.util.spec_from_file_location("looks", Path(__file__).parents[3] / "docs" / "looks.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     return module
 
 
@@ -25,8 +25,8 @@ def test_contrast_is_that_of_the_standard(looks):
 def test_all_that_is_written_and_a_selected_row_stand_out_in_both_themes(looks):
     assert ("on_act", "act") in looks.PAIRS
     for theme in looks.THEMES.values():
-        for written, ground in looks.PAIRS:
-            assert looks.contrast(getattr(theme, written), getattr(theme, ground)) >= 4.5, (written, ground)
+        for ink, ground in looks.PAIRS:
+            assert looks.contrast(getattr(theme, ink), getattr(theme, ground)) >= 4.5, (ink, ground)
 
 
 @pytest.mark.usefixtures("application")

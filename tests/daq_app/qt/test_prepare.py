@@ -37,10 +37,10 @@ def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):
 
 def test_the_wheel_over_a_list_scrolls_the_page_and_chooses_nothing(driver):
     page = driver.window.page
-    for chosen in (page.protocol, page.stroking, page.studies):
-        before = chosen.currentText()
-        assert not wheel(driver.application, chosen, chosen.rect().center(), -2)
-        assert chosen.currentText() == before
+    for box in (page.protocol, page.stroking, page.studies):
+        before = box.currentText()
+        assert not wheel(driver.application, box, box.rect().center(), -2)
+        assert box.currentText() == before
 
 
 def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_connects_it(driver):
@@ -51,10 +51,10 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     driver.until(
         lambda: row.words.text().startswith("SIMULATED Net F/T SI-36-0.5: nothing lost.\n"), "readings in time"
     )
-    said = row.words.text().split("\n")
-    assert said[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
-    assert said[2].startswith(f"Noise: {1000 * max(zero.noise[:3]):.2g} mN")
-    assert said[3].startswith("Life: ")
+    lines = row.words.text().split("\n")
+    assert lines[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
+    assert lines[2].startswith(f"Noise: {1000 * max(zero.noise[:3]):.2g} mN")
+    assert lines[3].startswith("Life: ")
     row.connect_button.click()
     driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
     assert row.words.text() == "no transducer: not connected."
@@ -66,7 +66,7 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
 
 def test_the_strip_at_the_top_says_lamp_subject_device_and_language_and_has_no_button(driver):
     header = driver.window.header
-    names = {shown.accessibleName() or shown.text() for shown in header.findChildren(QLabel)}
+    names = {label.accessibleName() or label.text() for label in header.findChildren(QLabel)}
     assert {"new session", "not recording", "language that the subject reads English (en)"} <= names
     assert any(name.startswith("SIMULATED Net F/T") for name in names)
     assert header.findChildren(QAbstractButton) == []

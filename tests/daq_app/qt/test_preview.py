@@ -16,28 +16,28 @@ PACE = 1.0  # no test here waits for a session
 
 
 @pytest.fixture
-def opened(application):
+def open_preview(application):
     """Return a function that shows a preview of pages."""
-    made = []
+    previews = []
 
     def show(pages):
-        made.append(SubjectPreview(pages, QSize(1366, 768)))
-        made[-1].show()
+        previews.append(SubjectPreview(pages, QSize(1366, 768)))
+        previews[-1].show()
         application.processEvents()
-        return made[-1]
+        return previews[-1]
 
     yield show
-    for shown in made:
-        shown.close()
-        shown.deleteLater()
+    for shown_preview in previews:
+        shown_preview.close()
+        shown_preview.deleteLater()
 
 
-def test_keys_buttons_and_list_turn_the_pages(opened):
-    shown = opened(preview(SessionForm()))
-    titles = [shown.picture.page._title.text()]
+def test_keys_buttons_and_list_turn_the_pages(open_preview):
+    dialog = open_preview(preview(SessionForm()))
+    titles = [dialog.picture.page._title.text()]
     for key in (Qt.Key.Key_Right, Qt.Key.Key_PageDown, Qt.Key.Key_Left, Qt.Key.Key_Down):
-        QTest.keyClick(shown.list, key)
-        titles.append(shown.list.currentItem().text())
+        QTest.keyClick(dialog.list, key)
+        titles.append(dialog.list.currentItem().text())
     assert titles == [
         "Welcome",
         "the surface is changed",
@@ -45,35 +45,35 @@ def test_keys_buttons_and_list_turn_the_pages(opened):
         "the surface is changed",
         "stickiness: stroke",
     ]
-    QTest.mouseClick(shown.on, Qt.MouseButton.LeftButton)
-    assert shown.picture.accessibleName().startswith("the subject's page: Judge the stickiness")
-    assert not shown.picture.page.next.isHidden()  # as after an answer
-    shown.list.setCurrentRow(shown.list.count() - 1)
-    assert not shown.on.isEnabled()
-    QTest.keyClick(shown.list, Qt.Key.Key_Escape)
-    assert not shown.isVisible()
+    QTest.mouseClick(dialog.on, Qt.MouseButton.LeftButton)
+    assert dialog.picture.accessibleName().startswith("the subject's page: Judge the stickiness")
+    assert not dialog.picture.page.next.isHidden()  # as after an answer
+    dialog.list.setCurrentRow(dialog.list.count() - 1)
+    assert not dialog.on.isEnabled()
+    QTest.keyClick(dialog.list, Qt.Key.Key_Escape)
+    assert not dialog.isVisible()
 
 
-def test_a_page_is_the_subjects_own_window_in_its_language_and_direction(opened):
+def test_a_page_is_the_subjects_own_window_in_its_language_and_direction(open_preview):
     words = translator("ar")
-    shown = opened(preview(SessionForm(language="ar"), words))
-    shown.list.setCurrentRow(3)
-    page = shown.picture.page
+    dialog = open_preview(preview(SessionForm(language="ar"), words))
+    dialog.list.setCurrentRow(3)
+    page = dialog.picture.page
     assert page.next.text() == words(SubjectText.NEXT)
     assert page.layoutDirection() == Qt.LayoutDirection.RightToLeft
     assert (page.width(), page.height()) == (1366, 768)
     assert not page.isVisible()
 
 
-def test_characters_that_no_font_draws_are_named_on_their_page(opened):
-    lost = "\U000e0fff"  # stands for nothing, and no font has it
-    shown = opened(
-        [PreviewPage("a", SubjectView("read", "Rest")), PreviewPage("b", SubjectView("read", f"Rest{lost}"))]
+def test_characters_that_no_font_draws_are_named_on_their_page(open_preview):
+    sign = "\U000e0fff"  # stands for nothing, and no font has it
+    dialog = open_preview(
+        [PreviewPage("a", SubjectView("read", "Rest")), PreviewPage("b", SubjectView("read", f"Rest{sign}"))]
     )
-    assert not shown.lost.isVisible()
-    QTest.keyClick(shown.list, Qt.Key.Key_Right)
-    assert shown.lost.isVisible()
-    assert lost in shown.lost.text()
+    assert not dialog.lost.isVisible()
+    QTest.keyClick(dialog.list, Qt.Key.Key_Right)
+    assert dialog.lost.isVisible()
+    assert sign in dialog.lost.text()
 
 
 def test_it_opens_from_prepare_and_records_nothing(driver):
@@ -81,12 +81,12 @@ def test_it_opens_from_prepare_and_records_nothing(driver):
     window.setFocus()
     QTest.keyClick(window, Qt.Key.Key_F7)
     QTest.mouseClick(window.page._preview, Qt.MouseButton.LeftButton)
-    shown = window.findChildren(SubjectPreview)
-    assert len(shown) == 2
+    previews = window.findChildren(SubjectPreview)
+    assert len(previews) == 2
     assert driver.session is None
     assert not Path(window.page.folder.text()).exists()
-    for one in shown:
-        (close,) = (made for made in one.findChildren(QPushButton) if made.text().startswith("Close"))
+    for shown_preview in previews:
+        (close,) = (button for button in shown_preview.findChildren(QPushButton) if button.text().startswith("Close"))
         QTest.mouseClick(close, Qt.MouseButton.LeftButton)
 
 

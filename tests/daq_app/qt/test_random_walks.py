@@ -25,7 +25,7 @@ KEY = Qt.Key
 COURSE = [KEY.Key_Space] * 8 + [KEY.Key_R, KEY.Key_S, KEY.Key_P, KEY.Key_N, KEY.Key_0, KEY.Key_I, KEY.Key_D]
 COURSE += [KEY.Key_Escape] * 3 + [KEY.Key_F1, KEY.Key_F2, KEY.Key_F3, KEY.Key_F4, KEY.Key_F5, KEY.Key_F6, KEY.Key_Tab]
 COURSE += [KEY.Key_H, KEY.Key_Plus, KEY.Key_Minus, KEY.Key_B, KEY.Key_A, KEY.Key_T, KEY.Key_Return]
-HELD = [KEY.Key_E, KEY.Key_N, KEY.Key_M, KEY.Key_Z]
+WITH_CONTROL = [KEY.Key_E, KEY.Key_N, KEY.Key_M, KEY.Key_Z]
 ANSWER = [KEY.Key_Left, KEY.Key_Right, KEY.Key_Home, KEY.Key_Return, KEY.Key_Return, KEY.Key_Space, KEY.Key_1]
 BY_ITSELF = {"taring", "ready", "stroking", "settling", "resuming"}  # phases that end without anybody
 LONGEST = 60.0  # that such a phase may last on a busy machine [s]
@@ -63,7 +63,7 @@ class Walk:
         return key.name
 
     def held_key(self):
-        key = self.random.choice(HELD)
+        key = self.random.choice(WITH_CONTROL)
         QTest.keyClick(self.window, key, CONTROL)
         return key.name
 
@@ -156,7 +156,7 @@ class Walk:
         elif bench.link == "open" and not bench.info.simulated:
             self.window.bridge.send(Disconnect())
 
-    def plugged(self):
+    def is_free(self):
         """Return whether the simulated bench is connected and no session is in hand."""
         bench = self.driver.state.bench
         return self.driver.session is None and bench.link == "open" and bench.info.simulated
@@ -168,7 +168,7 @@ class Walk:
         window = self.window
         if QApplication.activeModalWidget() is not None:
             return "a dialog stands in the way"
-        if not any(made.isEnabled() and made.isVisible() for made in window.rail.buttons.values()):
+        if not any(button.isEnabled() and button.isVisible() for button in window.rail.buttons.values()):
             return "no room can be entered"
         if window.rooms.room == "review":
             return (
@@ -183,14 +183,14 @@ class Walk:
             return ""
         session = self.driver.session
         if session is None:
-            lacking = [frame for frame in window.page.frames.values() if "not ready" in frame.accessibleName()]
-            said = [frame for frame in lacking if frame.words.isVisibleTo(frame) and frame.words.text().strip()]
-            return "" if lacking and said == lacking else "Start is not lit, and no card says why"
+            not_ready = [frame for frame in window.page.frames.values() if "not ready" in frame.accessibleName()]
+            explained = [frame for frame in not_ready if frame.words.isVisibleTo(frame) and frame.words.text().strip()]
+            return "" if not_ready and explained == not_ready else "Start is not lit, and no card says why"
         if window.subject.scoring:
             answer = window.course.buttons["no answer"].isEnabled()
             return "" if answer or window.course.asking else "an answer is due, and cannot be given or left out"
         acts = (window.course.buttons["skip"], window.course.buttons["pause"], window.course.buttons["end"])
-        if session.phase in BY_ITSELF or any(made.isEnabled() for made in acts):
+        if session.phase in BY_ITSELF or any(button.isEnabled() for button in acts):
             return ""
         return (
             "" if to_do.sentence.text().startswith(("Wait", "The session is being")) else f"{session.phase}: no way on"
@@ -205,7 +205,7 @@ class Walk:
         window.setFocus()
         window.act("go to run" if driver.session is not None else "go to prepare")
         deadline = time.monotonic() + 3 * LONGEST
-        while not self.plugged():  # a session that was asked for may begin meanwhile
+        while not self.is_free():  # a session that was asked for may begin meanwhile
             session = driver.session
             what = f"{session and session.phase}, {window.to_do.sentence.text()!r}, {driver.view.banner}"
             assert time.monotonic() < deadline, f"seed {self.seed}, after {self.steps[-12:]}: {what}"
@@ -240,7 +240,7 @@ def files(tmp_path, monkeypatch, driver):  # noqa: ARG001  the driver writes the
     return str(wrong), str(tmp_path / "recordings")
 
 
-def walked(driver, seed, files, steps):
+def walk_randomly(driver, seed, files, steps):
     walk = Walk(driver, seed, files)
     walk.good_form()
     for _ in range(steps):
@@ -252,10 +252,10 @@ def test_a_walk_notices_a_start_that_is_dark_without_a_reason_and_a_dialog_in_th
     walk = Walk(driver, 0, files)
     assert walk.dead_end() == ""  # the card says that the subject's code is missing
     words = driver.window.page.frames["Subject"].words
-    said = words.text()
+    sentence = words.text()
     words.setText("")
     assert "no card says why" in walk.dead_end()
-    words.setText(said)
+    words.setText(sentence)
     box = QMessageBox(driver.window)
     box.setModal(True)
     box.show()
@@ -266,10 +266,10 @@ def test_a_walk_notices_a_start_that_is_dark_without_a_reason_and_a_dialog_in_th
 
 
 def test_a_hundred_random_steps_lead_into_no_dead_end(driver, files):
-    walked(driver, 1, files, 100)
+    walk_randomly(driver, 1, files, 100)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 2 + int(os.environ.get("WALKS", "10"))))
 def test_long_walks_of_random_steps_lead_into_no_dead_end(driver, files, seed):
-    walked(driver, seed, files, 200)
+    walk_randomly(driver, seed, files, 200)

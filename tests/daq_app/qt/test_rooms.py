@@ -29,33 +29,33 @@ def rooms(driver):
 
 def entries(menu):
     """Return every entry of a menu and of those below it, by its words without the key."""
-    found = {}
+    actions = {}
     for action in menu.actions():
         below = action.menu()
         if isinstance(below, QMenu):
-            found |= entries(below)
+            actions |= entries(below)
         else:
-            found[action.text().split("\t")[0]] = action
-    return found
+            actions[action.text().split("\t")[0]] = action
+    return actions
 
 
 def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
     window = driver.window
-    found = entries(window.menuBar())
+    actions = entries(window.menuBar())
     plot, page = window.live.plots[0], window.page.screen_fields.thumbnail
     try:
-        found["Dark"].trigger()
+        actions["Dark"].trigger()
         assert tokens.theme_of(window) == tokens.DARK
         assert plot.grab().toImage().pixelColor(1, 1).name() == tokens.DARK.surface  # what is painted by hand follows
         driver.application.processEvents()
         assert page._picture.toImage().pixelColor(2, 2).name() == tokens.DARK.ground
         assert tokens.chosen_tokens() == tokens.DARK
-        found["150 %"].trigger()
+        actions["150 %"].trigger()
         assert preferences.chosen_scale() == 1.5
         assert preferences.type_scale() == 1.0  # until the next start: no part of a window is larger than the rest
         assert "next start" in window.notice._words.text()
     finally:
-        found["System"].trigger()
+        actions["System"].trigger()
         preferences.choose(preferences.SCALE, None)
 
 
@@ -114,19 +114,19 @@ def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_pla
 def test_a_session_that_is_open_stays_as_it_is_when_it_is_chosen_again(rooms, monkeypatch):
     monkeypatch.chdir(SESSION.parent)
     rooms.open(Path(SESSION.name))
-    shown = rooms.analyst
+    analyst = rooms.analyst
     rooms.review.recent.itemClicked.emit(rooms.review.recent.item(0))
-    assert rooms.analyst is shown
+    assert rooms.analyst is analyst
 
 
 def test_a_session_that_is_open_follows_the_theme_with_its_plots_and_all_that_it_shows(driver, rooms):
-    found = entries(driver.window.menuBar())
+    actions = entries(driver.window.menuBar())
     rooms.open(SESSION)
     driver.until(lambda: rooms.analyst.state.report is not None, "the report")
     try:
         for theme, room, colours in (("Dark", "review", tokens.DARK), ("Light", "prepare", tokens.LIGHT)):
             driver.window.go_to(room)
-            found[theme].trigger()
+            actions[theme].trigger()
             driver.application.processEvents()
             driver.window.go_to("review")
             driver.application.processEvents()
@@ -136,7 +136,7 @@ def test_a_session_that_is_open_follows_the_theme_with_its_plots_and_all_that_it
         rooms.analyst.ask(Choose(0))
         driver.until(lambda: rooms.analyst.state.row == 0 and rooms.analyst.state.step is None, "the trial")
     finally:
-        found["System"].trigger()
+        actions["System"].trigger()
 
 
 def test_a_new_session_that_is_asked_for_in_review_is_prepared_in_sight(driver, rooms):
@@ -152,18 +152,18 @@ def test_a_new_session_that_is_asked_for_in_review_is_prepared_in_sight(driver, 
 
 def test_every_entry_of_the_menu_does_something_and_course_entries_wait_for_a_session(driver, rooms):
     window = driver.window
-    found = entries(window.menuBar())
+    actions = entries(window.menuBar())
     assert {"Open session…", "Write report…", "Export…", "Keys", "About daq-app", "Dark", "150 %", "Bench"} <= set(
-        found
+        actions
     )
-    assert not found["End…"].isEnabled()
-    assert not found["Write report…"].isEnabled()
-    found["Keys"].trigger()
+    assert not actions["End…"].isEnabled()
+    assert not actions["Write report…"].isEnabled()
+    actions["Keys"].trigger()
     assert window.keys.isVisible()
-    found["Keys"].trigger()
+    actions["Keys"].trigger()
     rooms.open(SESSION)
-    assert found["Write report…"].isEnabled()
-    begin_room = found["Prepare"]
+    assert actions["Write report…"].isEnabled()
+    begin_room = actions["Prepare"]
     begin_room.trigger()
     assert rooms.room == "prepare"
 
@@ -185,11 +185,11 @@ def test_a_window_opens_for_the_first_time_as_large_as_it_likes_where_the_screen
     window = QWidget()
     screen = window.screen().availableSize()
     for likes, takes in (((0.9, 0.8), (0.9, 0.8)), ((2.0, 0.5), (1.0, 0.5))):
-        wanted, taken = (QSize(int(screen.width() * a), int(screen.height() * b)) for a, b in (likes, takes))
-        window.sizeHint = lambda wanted=wanted: wanted
+        preferred, granted = (QSize(int(screen.width() * a), int(screen.height() * b)) for a, b in (likes, takes))
+        window.sizeHint = lambda preferred=preferred: preferred
         preferences.restore_place(window)
-        assert window.size().height() == taken.height()
-        assert taken.width() - 16 <= window.width() <= taken.width()
+        assert window.size().height() == granted.height()
+        assert granted.width() - 16 <= window.width() <= granted.width()
 
 
 def test_about_names_the_versions_it_stands_on():

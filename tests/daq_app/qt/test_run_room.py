@@ -16,7 +16,7 @@ from daq_app.window.view_course import Inspection, Tile
 from sessions.run import steps
 from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
 from tests.daq_app.qt.written_text import cut_off
-from tests.daq_app.session_messages import drawn
+from tests.daq_app.session_messages import stroke_at
 
 pytestmark = pytest.mark.qt
 
@@ -32,7 +32,7 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     assert not middle.strip.isVisible()
     begin(driver, "P30")
     assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
-    one_trial(driver, drawn=False)
+    one_trial(driver, stays=False)
     stroke = driver.session.of(1).quality.stroke
     first = middle.strip.tiles[0]
     click(first)
@@ -120,18 +120,18 @@ def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_strok
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application, type_size, scale):
     type_size(scale)
-    shown = InspectedTrial(lambda: None)
-    shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
+    panel = InspectedTrial(lambda: None)
+    panel.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
     cells = (("N", "12.34 N"), ("T", "12.34 N"), ("mu", "0.41"), ("speed", "120 mm/s"))
     words = "Redo: the finger was not lifted between strokes. Lift the finger between strokes."
-    heading, stroke = "Trial 12, D86, take 2: done again, score 40", drawn(np.linspace(0.0, 3.0, 50))
-    shown.show_trial(Inspection(12, heading, words, words, "refused", cells, stroke))
-    shown.resize(420, round(640 * scale))  # as the middle of a window of 1366 pixels at 200 % is
-    shown.show()
+    heading, stroke = "Trial 12, D86, take 2: done again, score 40", stroke_at(np.linspace(0.0, 3.0, 50))
+    panel.show_trial(Inspection(12, heading, words, words, "refused", cells, stroke))
+    panel.resize(420, round(640 * scale))  # as the middle of a window of 1366 pixels at 200 % is
+    panel.show()
     application.processEvents()
-    assert shown.width() == 420
-    assert cut_off(shown) == []
-    shown.hide()
+    assert panel.width() == 420
+    assert cut_off(panel) == []
+    panel.hide()
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
@@ -148,8 +148,8 @@ def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(
     tile = strip.tiles[40]
     place = tile.mapTo(strip.viewport(), tile.rect().center())
     assert strip.viewport().rect().contains(place)
-    assert all(made.width() >= made.sizeHint().width() for made in strip.tiles)
-    assert all(made.height() >= made.sizeHint().height() for made in strip.tiles)
+    assert all(widget.width() >= widget.sizeHint().width() for widget in strip.tiles)
+    assert all(widget.height() >= widget.sizeHint().height() for widget in strip.tiles)
     strip.hide()
 
 
@@ -174,18 +174,18 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
     driver.application.processEvents()
     marks = (Mark("onset", 2.0, 2.0), Mark("lift", 5.0, 5.0))
 
-    def fed(first, last):
+    def feed_readings(first, last):
         time = np.arange(first, last, 0.01)
         inside = (time > 2.0) & (time < 5.0)
         Feed.trace.add(time, np.tile(np.where(inside, 3.0, 0.0), (len(CHANNELS), 1)))
         panel.draw(marks, last)
         return panel.plots[0]._columns.values
 
-    drawn = fed(0.0, 20.0)
-    assert np.nanmax(drawn) == 3.0
+    curve = feed_readings(0.0, 20.0)
+    assert np.nanmax(curve) == 3.0
     for minute in range(4):
-        awaited = fed(20.0 + 60.0 * minute, 80.0 + 60.0 * minute)
-    np.testing.assert_array_equal(awaited, drawn)
+        later_curve = feed_readings(20.0 + 60.0 * minute, 80.0 + 60.0 * minute)
+    np.testing.assert_array_equal(later_curve, curve)
     panel.hide()
 
 
@@ -198,18 +198,18 @@ def test_buttons_over_the_pictures_are_whole_or_not_there(driver, width, opened)
     panel.show()
     if opened:
         panel.toggle_drawer()
-    seen = set()
+    visible = set()
     for height in range(150, 420, 15):
         panel.resize(width, height)
         for _ in range(3):
             driver.application.processEvents()
         for act in (panel.bar.finite, panel.bar.length, panel.bar.hold):
-            seen.add(act.isVisible())
+            visible.add(act.isVisible())
             if act.isVisible():
                 assert act.visibleRegion().boundingRect() == act.rect(), height
                 assert act.height() >= act.sizeHint().height()
     panel.hide()
-    assert seen == {False, True}
+    assert visible == {False, True}
 
 
 def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transducer_sends(driver):
@@ -223,17 +223,17 @@ def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transdu
     click(panel.bar.hold)
     assert not panel.bar.hold.isChecked()
 
-    def fed(first, last):
+    def feed_readings(first, last):
         time = np.arange(first, last, 0.01)
         Feed.trace.add(time, np.ones((len(CHANNELS), len(time))))
         panel.draw((), last)
         return panel.plots[0]._end, panel.plots[4]._end, panel.bar.hold.isChecked()
 
-    assert fed(100.0, 105.0) == ("now", "now", False)
+    assert feed_readings(100.0, 105.0) == ("now", "now", False)
     click(panel.bar.hold)
-    assert fed(105.0, 106.0) == ("held", "held", True)
+    assert feed_readings(105.0, 106.0) == ("held", "held", True)
     Feed.trace = LiveTrace(100.0)  # of a transducer that was plugged in anew
-    assert fed(0.0, 1.0) == ("now", "now", False)
+    assert feed_readings(0.0, 1.0) == ("now", "now", False)
     panel.hide()
 
 

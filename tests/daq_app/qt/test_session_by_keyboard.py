@@ -32,13 +32,13 @@ def begin(driver, subject="P07"):
     driver.phase("mounting")
 
 
-def one_trial(driver, *, presses=3, drawn=True):
-    """Mount, let the simulated hand stroke, score with the arrow keys; a stroke that is `drawn` stays meanwhile."""
+def one_trial(driver, *, presses=3, stays=True):
+    """Mount, let the simulated hand stroke, score with the arrow keys; a stroke that is `stays` stays meanwhile."""
     window, number = driver.window, driver.session.trial
     QTest.keyClick(window, SPACE)
     driver.phase("scoring")
     driver.until(lambda: driver.session.of(number).quality is not None, "what is said of the stroke")
-    if drawn:
+    if stays:
         driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", "the stroke stays while its score is awaited")
     for _ in range(presses):
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
@@ -72,10 +72,10 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
     assert [record.score for record in recording.trials] == [50.0, 52.0, 52.0]
     assert recording.trials[1].take.number == 2
     assert [take.number for take in recording.trials[1].other_takes] == [1]
-    scored = [event.data for event in recording.events if event.kind == "scored"]
-    assert [position for _, position in scored[0]["positions"]] == [50.0]
-    assert [position for _, position in scored[1]["positions"]] == [50.0, 51.0, 52.0, 53.0]
-    assert all(data["input_device"] == "keyboard" for data in scored)
+    answers = [event.data for event in recording.events if event.kind == "scored"]
+    assert [position for _, position in answers[0]["positions"]] == [50.0]
+    assert [position for _, position in answers[1]["positions"]] == [50.0, 51.0, 52.0, 53.0]
+    assert all(data["input_device"] == "keyboard" for data in answers)
     assert driver.state.failed is None
     assert driver.state.drawing is None
     qualities = [trial.quality for trial in driver.session.trials]
@@ -145,7 +145,7 @@ def test_an_error_while_drawing_is_said_and_the_session_goes_on(driver, monkeypa
     monkeypatch.setattr(driver.window.bridge.model, "add", fails)
     driver.until(lambda: driver.view.banner is not None, "the banner")
     assert "the recording goes on" in driver.view.banner.sentence
-    one_trial(driver, drawn=False)
+    one_trial(driver, stays=False)
     assert driver.view.lamp.grade == "on"
 
 
@@ -241,12 +241,12 @@ def test_what_is_below_the_sentence_stays_in_place_when_a_shorter_one_comes(driv
 
 
 def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says(driver):
-    notice, lost = driver.window.notice, Banner("wrong", "The transducer does not answer: no readings for 1 s.")
-    notice.show_view(lost, "", "Mount")
+    notice, banner = driver.window.notice, Banner("wrong", "The transducer does not answer: no readings for 1 s.")
+    notice.show_view(banner, "", "Mount")
     notice.warn("Close once more.")
     for seconds in (2, 3):  # the banner counts
         notice.show_view(
-            replace(lost, sentence=f"The transducer does not answer: no readings for {seconds} s."), "", "Mount"
+            replace(banner, sentence=f"The transducer does not answer: no readings for {seconds} s."), "", "Mount"
         )
         assert "does not answer" in notice._words.text()
         assert notice._words.text().endswith("Close once more.")
@@ -277,8 +277,8 @@ def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_ke
     window.bridge.send(steps.Abort("enough"))
     driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
     recording = Recording.open(Path(driver.session.folder))
-    [given] = [event.data for event in recording.events if event.kind == "number_given"]
-    assert (given["number"], given["input_device"]) == (12.5, "keyboard")
+    [answer] = [event.data for event in recording.events if event.kind == "number_given"]
+    assert (answer["number"], answer["input_device"]) == (12.5, "keyboard")
 
 
 def test_which_of_two_is_chosen_with_a_key_and_kept(driver):

@@ -27,10 +27,10 @@ READING = [(GERMAN, LEFT_TO_RIGHT), (JAPANESE, LEFT_TO_RIGHT), (ARABIC, RIGHT_TO
 def page(subject_page):
     """Return a function that shows a view in a window for the subject, in the program's own style."""
 
-    def shown(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
+    def show(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
         return subject_page(view, scale, size, direction, tokens.LIGHT, "right")
 
-    return shown
+    return show
 
 
 def box(widget):
@@ -43,9 +43,9 @@ def box(widget):
 def test_a_long_instruction_is_seen_whole_with_the_bar_beneath_it(page, text, direction, scale):
     window = page(SubjectView("read", text[:40], text, force=True), scale, direction)
     assert cut_off(window) == []
-    shown = [box(window._title), box(window._text), box(window.press)]
-    assert all(window.rect().contains(one) for one in shown)
-    assert not any(upper.intersects(lower) for upper, lower in pairwise(shown))
+    boxes = [box(window._title), box(window._text), box(window.press)]
+    assert all(window.rect().contains(rect) for rect in boxes)
+    assert not any(upper.intersects(lower) for upper, lower in pairwise(boxes))
 
 
 def test_type_becomes_smaller_only_where_a_text_is_not_seen_whole(page):
@@ -65,20 +65,20 @@ def test_the_words_of_each_end_stand_beneath_it_and_are_seen_whole(page, directi
     assert cut_off(window) == []
     line = window.line
     for position, words in zip((0.0, 100.0), ends, strict=True):
-        (shown,) = (one for one in window.findChildren(QLabel) if one.text() == words)
-        assert shown.width() > 0
+        (label,) = (candidate for candidate in window.findChildren(QLabel) if candidate.text() == words)
+        assert label.width() > 0
         end = line.mapTo(window, line.place_of(position).toPoint())
-        assert box(shown).center().x() == pytest.approx(end.x(), abs=2)
+        assert box(label).center().x() == pytest.approx(end.x(), abs=2)
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_whole(page, scale):
     window = page(SubjectView("choice", "Which one?", key=(1, 1)), scale)
-    for made in (window.choice.first, window.choice.second):
-        assert made.width() >= made.sizeHint().width()
-        assert made.height() >= 96 * scale
-        assert made.fontMetrics().height() >= 20 * scale
-        assert made.fontMetrics().horizontalAdvance(made.text()) < made.width()
+    for button in (window.choice.first, window.choice.second):
+        assert button.width() >= button.sizeHint().width()
+        assert button.height() >= 96 * scale
+        assert button.fontMetrics().height() >= 20 * scale
+        assert button.fontMetrics().horizontalAdvance(button.text()) < button.width()
 
 
 @pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])

@@ -12,39 +12,39 @@ TIMES = [1.0, 1.5, 2.0, 4.0]
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=st.lists(st.tuples(st.sampled_from(["play", "seek", "speed", "on"]), st.integers(0, 3)), max_size=12))
 def test_a_replay_stands_where_it_was_put_whatever_plays_and_however_fast(steps):
-    bar, shown = TransportBar("the replay"), []
-    bar.moved.connect(shown.append)
+    bar, places = TransportBar("the replay"), []
+    bar.moved.connect(places.append)
     bar.set_times(TIMES, 1)
     for what, by in steps:
-        before = shown[-1]
+        before = places[-1]
         match what:
             case "play":
                 bar.toggle()
-                assert shown[-1] == (0 if before == len(TIMES) - 1 and bar.playing else before)
+                assert places[-1] == (0 if before == len(TIMES) - 1 and bar.playing else before)
             case "seek":
                 bar.seek(by)
-                assert shown[-1] == by
+                assert places[-1] == by
             case "speed":
                 bar.speed.setCurrentIndex(by)
                 bar.speed.activated.emit(by)
-                assert shown[-1] == before
+                assert places[-1] == before
             case "on":
                 bar.step(+1)
-                assert (shown[-1], bar.playing) == (min(before + 1, len(TIMES) - 1), False)
+                assert (places[-1], bar.playing) == (min(before + 1, len(TIMES) - 1), False)
 
 
 def test_a_replay_ends_at_its_last_reading_and_begins_anew_from_there(application):
-    bar, shown, ended = TransportBar("the replay"), [], []
-    bar.moved.connect(shown.append)
-    bar.ended.connect(lambda: ended.append(bar.playing))
+    bar, places, ends = TransportBar("the replay"), [], []
+    bar.moved.connect(places.append)
+    bar.ended.connect(lambda: ends.append(bar.playing))
     bar.set_times([0.0, 0.1, 0.2])
     bar.speed.setCurrentIndex(SPEEDS.index(4.0))
     bar.speed.activated.emit(SPEEDS.index(4.0))
     bar.toggle()
-    while not ended:
+    while not ends:
         application.processEvents()
-    assert (shown[-1], ended, bar.play.text()) == (2, [False], "▶")
+    assert (places[-1], ends, bar.play.text()) == (2, [False], "▶")
     bar.toggle()
-    assert shown[-1] == 0
+    assert places[-1] == 0
     assert bar.playing
     bar.toggle()

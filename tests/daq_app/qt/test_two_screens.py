@@ -29,13 +29,13 @@ preferences.store_ruler_length(desk, 80.0)     # a line meant to be 100 mm long 
 preferences.store_ruler_length(tablet, 125.0)  # and 125 here
 subject = SubjectWindow(lambda: 0.0)
 subject.show()
-told = []
+lengths = []
 for screen in (desk, tablet, desk):
     subject.move(screen.geometry().topLeft() + QPoint(40, 40))
     application.processEvents()
     length = (subject.line.place_of(100.0) - subject.line.place_of(0.0)).x()
-    told.append([subject.screen().name(), length * screen.devicePixelRatio(), screen.devicePixelRatio()])
-print(json.dumps({"told": told, "dots": [s.physicalDotsPerInch() for s in (desk, tablet)]}))
+    lengths.append([subject.screen().name(), length * screen.devicePixelRatio(), screen.devicePixelRatio()])
+print(json.dumps({"lengths": lengths, "dots": [s.physicalDotsPerInch() for s in (desk, tablet)]}))
 """
 
 
@@ -45,9 +45,9 @@ def test_the_line_is_100_mm_by_each_screens_own_ruler_when_the_window_moves_betw
     environment = {**os.environ, "QT_QPA_PLATFORM": f"offscreen:configfile={config}"}
     command = [sys.executable, "-c", CHILD, str(tmp_path)]
     child = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=True)
-    found = json.loads(child.stdout)
-    assert [(name, density) for name, _, density in found["told"]] == [("desk", 1), ("tablet", 2), ("desk", 1)]
+    document = json.loads(child.stdout)
+    assert [(name, density) for name, _, density in document["lengths"]] == [("desk", 1), ("tablet", 2), ("desk", 1)]
     # The screens say 100 dots an inch in units of which the tablet has two pixels each.
-    on_desk, on_tablet = (dots / 25.4 * 100.0 for dots in found["dots"])
-    lengths = [length for _, length, _ in found["told"]]
+    on_desk, on_tablet = (dots / 25.4 * 100.0 for dots in document["dots"])
+    lengths = [length for _, length, _ in document["lengths"]]
     assert lengths == pytest.approx([on_desk * 100 / 80, 2 * on_tablet * 100 / 125, on_desk * 100 / 80], abs=1e-6)

@@ -30,12 +30,12 @@ def test_one_trial_and_an_early_end_with_real_keys_and_a_real_mouse(tmp_path):
         desk.do("windowfocus", "--sync", window)
         desk.do("type", "P07")
 
-        def begun():
+        def has_begun():
             desk.keys(window, "Return")  # until the simulated bench is connected this only says what is missing
             time.sleep(1.0)
             return "started" in kinds(folder)
 
-        until(begun, "the session")
+        until(has_begun, "the session")
         desk.keys(window, "space")
         until(lambda: "mount_asked" in kinds(folder), "the first trial")
         desk.keys(window, "space")
@@ -53,9 +53,9 @@ def test_one_trial_and_an_early_end_with_real_keys_and_a_real_mouse(tmp_path):
         until(lambda: "ended" in kinds(folder), "the end")
         [session] = folder.glob("*/")
         recording = Recording.open(session)
-        [scored] = [event.data for event in recording.events if event.kind == "scored"]
-        assert scored["score"] == pytest.approx(50.0, abs=1.0)
-        assert scored["input_device"] == "mouse"
+        [answer] = [event.data for event in recording.events if event.kind == "scored"]
+        assert answer["score"] == pytest.approx(50.0, abs=1.0)
+        assert answer["input_device"] == "mouse"
         assert recording.end["cause"] == "aborted"
         assert recording.end["reason"] == "enough"
         assert "SIMULATED" in recording.simulated_sentence
@@ -66,9 +66,11 @@ def test_without_a_screen_one_sentence_says_what_to_do(tmp_path):
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")}
     environment["PYTHONPATH"] = str(ROOT)
     for display in (None, ":99999"):
-        told = {**environment, **({"DISPLAY": display} if display else {})}
-        done = subprocess.run([sys.executable, "-m", "daq_app"], cwd=tmp_path, env=told, capture_output=True, text=True)
-        assert done.returncode == 1
-        assert done.stdout == ""
-        assert done.stderr.count("\n") == 1
-        assert "screen" in done.stderr
+        screenless = {**environment, **({"DISPLAY": display} if display else {})}
+        process = subprocess.run(
+            [sys.executable, "-m", "daq_app"], cwd=tmp_path, env=screenless, capture_output=True, text=True
+        )
+        assert process.returncode == 1
+        assert process.stdout == ""
+        assert process.stderr.count("\n") == 1
+        assert "screen" in process.stderr

@@ -57,7 +57,7 @@ def covers(desk, screens):
         until(lambda: desk.box(desk.window("subject$")) == desk.box(desk.window("^daq-app$")), "the subject's page")
 
 
-def whole(folder):
+def answers_of_whole(folder):
     """Check that the one session below a folder is whole, and return its answers."""
     until(lambda: "ended" in kinds(folder), "the end")
     [session] = folder.glob("*/")
@@ -84,7 +84,7 @@ def test_ten_trials_by_keyboard_alone(tmp_path, screens):
         count(folder, "scored", TRIALS)
         time.sleep(2.0)  # the finger is away
         desk.press("space")
-        answers = whole(folder)
+        answers = answers_of_whole(folder)
     assert [answer["score"] for answer in answers] == [50.0] * TRIALS
     assert {answer["input_device"] for answer in answers} == {"keyboard"}
 
@@ -106,7 +106,7 @@ def test_ten_trials_by_mouse_alone(tmp_path, screens):
                 mouse.click("Next")
                 count(folder, "scored", number)
             mouse.click("End session")
-            answers = whole(folder)
+            answers = answers_of_whole(folder)
         finally:
             mouse.close()
     assert [answer["score"] for answer in answers] == pytest.approx([50.0] * TRIALS, abs=1.0)

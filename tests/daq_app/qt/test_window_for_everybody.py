@@ -32,8 +32,8 @@ CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget)
 
 
 def controls(window):
-    found = [w for kind in CONTROLS for w in window.findChildren(kind)]
-    return [w for w in found if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
+    widgets = [w for kind in CONTROLS for w in window.findChildren(kind)]
+    return [w for w in widgets if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
 
 
 def test_every_control_has_a_name_for_screen_readers(driver):
@@ -52,45 +52,47 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
     window = driver.window
     page = window.page
     page.subject.setFocus()
-    order, seen = [], set()
+    order, reached = [], set()
     for _ in range(60):
         focused = window.focusWidget()
-        if focused in seen:
+        if focused in reached:
             break
-        seen.add(focused)
+        reached.add(focused)
         order.append(focused)
         QTest.keyClick(focused, Qt.Key.Key_Tab)
-    asked = [page.subject, page.stroking, page.answering, page.with_forces, page.area]
-    asked += [page.studies, page.protocol, page.seed, page.people_score, page.folder]
-    places = [order.index(widget) for widget in asked]
+    fields = [page.subject, page.stroking, page.answering, page.with_forces, page.area]
+    fields += [page.studies, page.protocol, page.seed, page.people_score, page.folder]
+    places = [order.index(widget) for widget in fields]
     assert places == sorted(places)
     visible = [
         w for w in controls(window) if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus
     ]
-    unreached = [w.accessibleName() for w in visible if w not in seen and not _in_a_group_with_one_of(w, seen)]
+    unreached = [w.accessibleName() for w in visible if w not in reached and not _in_a_group_with_one_of(w, reached)]
     assert unreached == []
 
 
-def _in_a_group_with_one_of(widget, seen):
+def _in_a_group_with_one_of(widget, reached):
     """Radio buttons of a group are one stop; arrows go on within it."""
     group = widget.group() if isinstance(widget, QAbstractButton) else None
-    return group is not None and any(button in seen for button in group.buttons())
+    return group is not None and any(button in reached for button in group.buttons())
 
 
 def test_a_click_leaves_space_to_the_primary_button(driver):
-    for made in driver.window.findChildren(QAbstractButton):
-        assert not made.focusPolicy() & Qt.FocusPolicy.ClickFocus, made.accessibleName()
+    for button in driver.window.findChildren(QAbstractButton):
+        assert not button.focusPolicy() & Qt.FocusPolicy.ClickFocus, button.accessibleName()
 
 
 def test_every_key_of_the_list_is_obeyed_and_no_two_are_the_same():
-    assert len({known.key for known in KEYS}) == len(KEYS)
+    assert len({entry.key for entry in KEYS}) == len(KEYS)
     special = {"Space": Qt.Key.Key_Space, "F1": Qt.Key.Key_F1, "Esc": Qt.Key.Key_Escape}
     special |= {f"F{number}": Qt.Key(Qt.Key.Key_F1 + number - 1) for number in range(2, 8)}
-    for known in KEYS:
-        held = Qt.KeyboardModifier.ControlModifier if known.key.startswith("Ctrl+") else Qt.KeyboardModifier.NoModifier
-        name = known.key.removeprefix("Ctrl+")
+    for entry in KEYS:
+        modifier = (
+            Qt.KeyboardModifier.ControlModifier if entry.key.startswith("Ctrl+") else Qt.KeyboardModifier.NoModifier
+        )
+        name = entry.key.removeprefix("Ctrl+")
         key = special.get(name) or Qt.Key(ord(name))
-        assert act_of(QKeyEvent(QEvent.Type.KeyPress, key, held)) == known.act
+        assert act_of(QKeyEvent(QEvent.Type.KeyPress, key, modifier)) == entry.act
 
 
 def test_f1_shows_the_keys_and_escape_hides_them(driver):
@@ -124,12 +126,12 @@ def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
     assert (window.width(), window.height()) == (683, 384)
     area = next(area for area in window.rooms.findChildren(QScrollArea) if area.isAncestorOf(window.middle))
     assert area.horizontalScrollBar().maximum() == 0
-    for shown in (window.middle.redo, window.live.plots[1], window.to_do.primary):
-        if area.isAncestorOf(shown):
-            area.ensureWidgetVisible(shown)
-        place = shown.rect().translated(shown.mapTo(window, shown.rect().topLeft()))
+    for widget in (window.middle.redo, window.live.plots[1], window.to_do.primary):
+        if area.isAncestorOf(widget):
+            area.ensureWidgetVisible(widget)
+        place = widget.rect().translated(widget.mapTo(window, widget.rect().topLeft()))
         assert window.rect().contains(place)
-        assert shown.height() >= shown.minimumHeight()
+        assert widget.height() >= widget.minimumHeight()
     window.resize(1440, 900)
 
 
@@ -154,8 +156,8 @@ def test_no_button_beside_the_plan_cuts_its_words_off(driver):
     course.buttons["redo"].setText("Redo 98–99 R")  # of two that are compared, late in a long session
     course.ensurePolished()
     edges = course.layout().contentsMargins()
-    wanted = course._bottom.widget(0).layout().sizeHint().width() + edges.left() + edges.right()
-    assert wanted <= driver.window._left.width()
+    width = course._bottom.widget(0).layout().sizeHint().width() + edges.left() + edges.right()
+    assert width <= driver.window._left.width()
     course.buttons["end"].setText(before[0])
     course.buttons["redo"].setText(before[1])
 
@@ -173,7 +175,7 @@ def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
     assert window.bench.isVisible()
 
 
-def fitted(subject):
+def fit_line(subject):
     """Let the line fit its screen, and return what is known of that."""
     subject.fit_screen()
     return preferences.millimetres(subject.screen())
@@ -182,10 +184,10 @@ def fitted(subject):
 def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_remembered(driver):
     window, model = driver.window, driver.window.bridge.model
     remembered = preferences.settings
-    for kinematics, kept in (("finite", "yes"), ("small", "no")):
+    for kinematics, value in (("finite", "yes"), ("small", "no")):
         QTest.keyClick(window, Qt.Key.Key_M)
         assert model.kinematics == kinematics
-        assert remembered().value(FINITE) == kept
+        assert remembered().value(FINITE) == value
         again = LivePanel(window.bridge.feed, model)
         assert again.bar.finite.isChecked() == (kinematics == "finite")
 
@@ -207,8 +209,8 @@ def test_numbers_have_a_point_in_every_country(driver, locale):
     try:
         driver.window.live._read_at = 0.0
         driver.until(lambda: "." in driver.window.live.bar.values["N"].text(), "a number")
-        shown = repr(driver.view)
-        assert not re.search(r"\d,\d", shown)
+        text = repr(driver.view)
+        assert not re.search(r"\d,\d", text)
     finally:
         QLocale.setDefault(before)
 
@@ -283,15 +285,15 @@ def test_a_touch_is_recorded_as_a_touch(driver):
 def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     subject = driver.window.subject
     screen = subject.screen()
-    before = fitted(subject).pixels
+    before = fit_line(subject).pixels
     assert preferences.store_ruler_length(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
-    assert fitted(subject).pixels == pytest.approx(before * 100 / 80)
-    assert fitted(subject).checked
+    assert fit_line(subject).pixels == pytest.approx(before * 100 / 80)
+    assert fit_line(subject).checked
     length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
     assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
     assert preferences.store_ruler_length(screen, 3.0) is None
     preferences.settings().clear()
-    assert fitted(subject).pixels == pytest.approx(before)
+    assert fit_line(subject).pixels == pytest.approx(before)
 
 
 def test_next_stands_where_the_answering_hand_is(driver):
@@ -311,9 +313,9 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
     subject: QWidget = driver.window.subject
     line = shown_line(driver)
     QTest.keyClick(line, Qt.Key.Key_Right)
-    shown = [w for w in subject._pages.widget(1).findChildren(QWidget) if w.isVisible()]
-    assert line in shown
-    texts = [w.text() for w in shown if hasattr(w, "text")]
+    widgets = [w for w in subject._pages.widget(1).findChildren(QWidget) if w.isVisible()]
+    assert line in widgets
+    texts = [w.text() for w in widgets if hasattr(w, "text")]
     assert not any(re.search(r"\d", text) for text in texts)
 
 
@@ -339,14 +341,14 @@ def _filled(bar):
 def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
     line = answer_fields.ScoreLine(lambda: 0.0)
     line.begin(("not at all", "very"))
-    told = QAccessible.queryAccessibleInterface(line)
-    assert told.role() == QAccessible.Role.Slider
-    assert "No answer yet" in told.text(QAccessible.Text.Description)
+    reader = QAccessible.queryAccessibleInterface(line)
+    assert reader.role() == QAccessible.Role.Slider
+    assert "No answer yet" in reader.text(QAccessible.Text.Description)
     assert not line.answered
-    told.valueInterface().setCurrentValue(72)
+    reader.valueInterface().setCurrentValue(72)
     assert line.answer.score == 72.0
     QTest.keyClick(line, Qt.Key.Key_Left)
-    assert told.valueInterface().currentValue() == 71
+    assert reader.valueInterface().currentValue() == 71
     line.begin(("not at all", "very"))
     assert not line.answered
 
@@ -359,9 +361,9 @@ def test_a_number_is_read_aloud_with_its_value(driver):
 
 
 def test_no_name_for_screen_readers_hides_the_value_that_a_label_shows(driver):
-    named = [shown for shown in driver.window.findChildren(QLabel) if shown.text() and shown.accessibleName()]
-    assert driver.window.bench._fields["rate"] in named
-    silent = [shown for shown in named if shown.text() != "–"]
+    labels = [label for label in driver.window.findChildren(QLabel) if label.text() and label.accessibleName()]
+    assert driver.window.bench._fields["rate"] in labels
+    silent = [label for label in labels if label.text() != "–"]
     assert [
         s.text() for s in silent if s.text().replace("\u200b", "") not in s.accessibleName() and s.text() != "SIMULATED"
     ] == []
@@ -371,13 +373,13 @@ def test_no_name_for_screen_readers_hides_the_value_that_a_label_shows(driver):
 def test_every_drop_down_is_read_aloud_with_one_label_and_what_is_chosen(driver):
     lists = driver.window.findChildren(QComboBox)
     assert len(lists) >= 6
-    for shown in lists:
-        said = QAccessible.queryAccessibleInterface(shown)
-        related = said.relations()
+    for box in lists:
+        reader = QAccessible.queryAccessibleInterface(box)
+        related = reader.relations()
         labels = [of.text(QAccessible.Text.Name) for of, how in related if how & QAccessible.RelationFlag.Label]
-        assert labels == [shown.accessibleName()]
+        assert labels == [box.accessibleName()]
         assert labels[0].strip()
-        assert said.text(QAccessible.Text.Value) == shown.currentText()
+        assert reader.text(QAccessible.Text.Value) == box.currentText()
 
 
 @pytest.mark.parametrize("size", [16, 64, 256])

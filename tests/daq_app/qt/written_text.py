@@ -38,26 +38,26 @@ ELEMENTS = {
 
 def cut_off(window):
     """Return every text that has less room than it needs, or lies on another."""
-    found = []
-    for shown in window.findChildren(QWidget):
-        if shown.isVisible():
-            found += [one for one in texts_of(shown) if one[0] and is_less(*one[1:])]
-            found += cut_or_colliding(shown) if paints_by_hand(shown) else []
-    return found
+    texts = []
+    for widget in window.findChildren(QWidget):
+        if widget.isVisible():
+            texts += [text for text in texts_of(widget) if text[0] and is_less(*text[1:])]
+            texts += cut_or_colliding(widget) if paints_by_hand(widget) else []
+    return texts
 
 
 def is_less(room, needed):
     return any(has + ROUNDING < needs for has, needs in zip(room, needed, strict=True))
 
 
-def texts_of(shown):
+def texts_of(widget):
     """Return what is written in a widget: each text with the room that it has and that it needs [px]."""
-    return next((texts(shown) for kind, texts in KINDS.items() if isinstance(shown, kind)), [])
+    return next((texts(widget) for kind, texts in KINDS.items() if isinstance(widget, kind)), [])
 
 
-def size_of(shown, text, width=None, font=None):
+def size_of(widget, text, width=None, font=None):
     """Return the width and height of a text as a widget writes it, broken into lines where a `width` is given."""
-    metrics = shown.fontMetrics() if font is None else QWidget.fontMetrics(_in(font))
+    metrics = widget.fontMetrics() if font is None else QWidget.fontMetrics(_in(font))
     if width is not None:
         return metrics.boundingRect(QRect(0, 0, max(width, 1), HIGHEST), WRAPPED, text).size().toTuple()
     lines = text.split("\n")
@@ -65,97 +65,97 @@ def size_of(shown, text, width=None, font=None):
 
 
 def _in(font):
-    made = QWidget()
-    made.setFont(font)
-    return made
+    widget = QWidget()
+    widget.setFont(font)
+    return widget
 
 
-def _label(shown):
-    needed = shown.sizeHint().width() if not shown.wordWrap() else 0
-    high = shown.heightForWidth(shown.width()) if shown.wordWrap() else shown.sizeHint().height()
-    return [(shown.text(), shown.size().toTuple(), (needed, high))]
+def _label(widget):
+    needed = widget.sizeHint().width() if not widget.wordWrap() else 0
+    high = widget.heightForWidth(widget.width()) if widget.wordWrap() else widget.sizeHint().height()
+    return [(widget.text(), widget.size().toTuple(), (needed, high))]
 
 
-def _button(shown):
+def _button(widget):
     option = QStyleOptionButton()
-    shown.initStyleOption(option)
-    element = next(element for kind, element in ELEMENTS.items() if isinstance(shown, kind))
-    room = shown.style().subElementRect(element, option, shown).size().toTuple()
-    return [(shown.text(), room, size_of(shown, shown.text().replace("&", "")))]
+    widget.initStyleOption(option)
+    element = next(element for kind, element in ELEMENTS.items() if isinstance(widget, kind))
+    room = widget.style().subElementRect(element, option, widget).size().toTuple()
+    return [(widget.text(), room, size_of(widget, widget.text().replace("&", "")))]
 
 
-def _list_to_choose_from(shown):
-    if shown.isEditable():  # its field is a `QLineEdit`
+def _list_to_choose_from(widget):
+    if widget.isEditable():  # its field is a `QLineEdit`
         return []
     option = QStyleOptionComboBox()
-    shown.initStyleOption(option)
+    widget.initStyleOption(option)
     field = QStyle.SubControl.SC_ComboBoxEditField
-    room = shown.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, shown).size().toTuple()
-    return [(shown.currentText(), room, size_of(shown, shown.currentText()))]
+    room = widget.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, widget).size().toTuple()
+    return [(widget.currentText(), room, size_of(widget, widget.currentText()))]
 
 
-def _field(shown):
+def _field(widget):
     """Return what stands in a field that nobody types in, and the example in one that is empty."""
     option = QStyleOptionFrame()
-    shown.initStyleOption(option)
-    room = shown.style().subElementRect(QStyle.SubElement.SE_LineEditContents, option, shown).size()
-    typed = not isinstance(shown.parentWidget(), QAbstractSpinBox)  # what is typed moves along
-    text = shown.placeholderText() if typed else shown.text()
-    return [(text, (room - QSize(2 * ENTRY_MARGIN, 0)).toTuple(), size_of(shown, text))]
+    widget.initStyleOption(option)
+    room = widget.style().subElementRect(QStyle.SubElement.SE_LineEditContents, option, widget).size()
+    is_empty_example = not isinstance(widget.parentWidget(), QAbstractSpinBox)  # what is typed moves along
+    text = widget.placeholderText() if is_empty_example else widget.text()
+    return [(text, (room - QSize(2 * ENTRY_MARGIN, 0)).toTuple(), size_of(widget, text))]
 
 
-def _heads(shown):
+def _heads(widget):
     """Return the names of columns, and of rows."""
-    model, across = shown.model(), shown.orientation() == Qt.Orientation.Horizontal
-    told = [at for at in range(shown.count()) if not shown.isSectionHidden(at)]
-    found = []
-    for at in told:
-        text = str(model.headerData(at, shown.orientation()) or "")
-        room = (shown.sectionSize(at), shown.height()) if across else (shown.width(), shown.sectionSize(at))
-        found.append((text, room, size_of(shown, text)))
-    return found
+    model, across = widget.model(), widget.orientation() == Qt.Orientation.Horizontal
+    sections = [at for at in range(widget.count()) if not widget.isSectionHidden(at)]
+    texts = []
+    for at in sections:
+        text = str(model.headerData(at, widget.orientation()) or "")
+        room = (widget.sectionSize(at), widget.height()) if across else (widget.width(), widget.sectionSize(at))
+        texts.append((text, room, size_of(widget, text)))
+    return texts
 
 
-def _rows(shown):
+def _rows(widget):
     """Return the rows of a list: one that is wider than the list is cut, for nobody scrolls a list to the right."""
-    wide = shown.viewport().width()
+    wide = widget.viewport().width()
     return [
-        (str(at.data()), (wide, shown.visualRect(at).height()), shown.sizeHintForIndex(at).toTuple())
-        for at in (shown.model().index(row, 0) for row in range(shown.model().rowCount()))
-        if not shown.isRowHidden(at.row())
+        (str(at.data()), (wide, widget.visualRect(at).height()), widget.sizeHintForIndex(at).toTuple())
+        for at in (widget.model().index(row, 0) for row in range(widget.model().rowCount()))
+        if not widget.isRowHidden(at.row())
     ]
 
 
-def _cells(shown):
+def _cells(widget):
     """Return the cells of a table; one that wraps its words is as wide as its column."""
-    model, found = shown.model(), []
+    model, texts = widget.model(), []
     for at in (model.index(row, column) for row in range(model.rowCount()) for column in range(model.columnCount())):
         text, font = str(at.data() or ""), at.data(Qt.ItemDataRole.FontRole)
-        room = shown.columnWidth(at.column()) - 2 * CELL_MARGIN, shown.rowHeight(at.row())
-        if not shown.isColumnHidden(at.column()) and not shown.isRowHidden(at.row()):
-            found.append((text, room, size_of(shown, text, room[0] if shown.wordWrap() else None, font)))
-    return found
+        room = widget.columnWidth(at.column()) - 2 * CELL_MARGIN, widget.rowHeight(at.row())
+        if not widget.isColumnHidden(at.column()) and not widget.isRowHidden(at.row()):
+            texts.append((text, room, size_of(widget, text, room[0] if widget.wordWrap() else None, font)))
+    return texts
 
 
-def _tabs(shown):
+def _tabs(widget):
     return [
-        (shown.tabText(at), shown.tabRect(at).intersected(shown.rect()).size().toTuple(), size_of(shown, text))
-        for at in range(shown.count())
-        for text in [shown.tabText(at).replace("&", "")]
+        (widget.tabText(at), widget.tabRect(at).intersected(widget.rect()).size().toTuple(), size_of(widget, text))
+        for at in range(widget.count())
+        for text in [widget.tabText(at).replace("&", "")]
     ]
 
 
-def _menus(shown):
+def _menus(widget):
     return [
-        (text, shown.actionGeometry(act).intersected(shown.rect()).size().toTuple(), size_of(shown, text))
-        for act in shown.actions()
+        (text, widget.actionGeometry(act).intersected(widget.rect()).size().toTuple(), size_of(widget, text))
+        for act in widget.actions()
         for text in [act.text().replace("&", "")]
     ]
 
 
-def _bar(shown):
-    text = shown.text() if shown.isTextVisible() else ""
-    return [(text, shown.size().toTuple(), size_of(shown, text))]
+def _bar(widget):
+    text = widget.text() if widget.isTextVisible() else ""
+    return [(text, widget.size().toTuple(), size_of(widget, text))]
 
 
 KINDS = {

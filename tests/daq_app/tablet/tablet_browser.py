@@ -18,9 +18,9 @@ class Browser:
     """One tab; `wait` lets the program go on while the page is waited for."""
 
     def __init__(self, folder: Path, wait=lambda: time.sleep(0.01), size=(1024, 700)):
-        told = ("--remote-debugging-port=0", f"--user-data-dir={folder}", "--window-size={},{}".format(*size))
+        options = ("--remote-debugging-port=0", f"--user-data-dir={folder}", "--window-size={},{}".format(*size))
         self.process = subprocess.Popen(
-            [CHROMIUM, *FLAGS, *told, "about:blank"],
+            [CHROMIUM, *FLAGS, *options, "about:blank"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -32,7 +32,7 @@ class Browser:
         self.number = 0
         with connect(browser, max_size=None) as talk:
             target = self._call(talk, "Target.getTargets")["targetInfos"]
-        page = next(one["targetId"] for one in target if one["type"] == "page")
+        page = next(entry["targetId"] for entry in target if entry["type"] == "page")
         at = f"{browser.partition('/devtools')[0]}/devtools/page/{page}"
         self.open = ExitStack()
         self.page = self.open.enter_context(connect(at, max_size=None))
@@ -55,17 +55,17 @@ class Browser:
 
     def value(self, script):
         """Return what a script gives."""
-        done = self.call("Runtime.evaluate", expression=script, returnByValue=True)
-        assert "exceptionDetails" not in done, done
-        return done["result"].get("value")
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
 
     def until(self, script, what=None):
         """Wait until a script gives something true, and return it."""
         end = time.monotonic() + PATIENCE
-        while not (found := self.value(script)):
+        while not (value := self.value(script)):
             assert time.monotonic() < end, f"{what or script} did not come: {self.value('document.body.innerText')}"
             self.wait()
-        return found
+        return value
 
     def shown(self, name):
         return self.value(f"!document.getElementById('{name}').hidden")

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from session_messages import BEGUN, FIRST, PLAN, SCORE, after, logged
+from session_messages import BEGUN, FIRST, PLAN, SCORE, after, log
 
 from daq_app.tablet.dialogue import Act, Dialogue, Page, Stored, event_of, read
 from daq_app.window.subject import subject_view
@@ -12,7 +12,7 @@ from sessions.run import steps
 ACTS = [[1000.0, "press", 20.0, "touch"], [1500.0, "drag", 60.0, "touch"], [1600.0, "release", None, "touch"]]
 
 
-def given(key, acts=ACTS):
+def answer_given(key, acts=ACTS):
     return read(json.dumps({"type": "given", "key": key, "acts": acts, "sent": 2000.0}))
 
 
@@ -20,26 +20,26 @@ class Tablet:
     """A dialogue with what it has sent."""
 
     def __init__(self):
-        self.sent = []
-        self.dialogue = Dialogue(self.sent.append)
+        self.messages = []
+        self.dialogue = Dialogue(self.messages.append)
 
     def show(self, *messages):
         session = after(*messages).session
         self.dialogue.show(subject_view(session), session, str, mirrored=False)
-        return next(message for message in reversed(self.sent) if isinstance(message, Page))
+        return next(message for message in reversed(self.messages) if isinstance(message, Page))
 
     def give(self, key):
-        return self.dialogue.take(given(key), lambda at: at * 1e-3)
+        return self.dialogue.take(answer_given(key), lambda at: at * 1e-3)
 
 
 def test_a_page_is_sent_once_and_tells_nothing_of_the_stimulus():
     tablet = Tablet()
     page = tablet.show(*SCORE)
     tablet.show(*SCORE)
-    assert len(tablet.sent) == 1
+    assert len(tablet.messages) == 1
     assert (page.view.kind, page.view.ends) == ("line", ("low end", "high end"))
-    told = repr(page).replace(page.key, "")
-    assert not any(trial.stimulus.code in told for trial in PLAN.trials)
+    text = repr(page).replace(page.key, "")
+    assert not any(trial.stimulus.code in text for trial in PLAN.trials)
 
 
 def test_an_answer_goes_to_the_recorder_once_and_is_acknowledged_when_it_is_safe():
@@ -48,22 +48,22 @@ def test_an_answer_goes_to_the_recorder_once_and_is_acknowledged_when_it_is_safe
     answer = tablet.give(key)
     assert answer == steps.Scored(60.0, ((1.0, 20.0), (1.5, 60.0)), 1.0, 0, PLAN.answering_hand, "touch")
     assert tablet.give(key) is None  # the tablet asks again: it has heard of nothing yet
-    assert not [sent for sent in tablet.sent if isinstance(sent, Stored)]
-    tablet.show(*SCORE, logged("scored", 1, score=60.0))
-    assert tablet.sent.count(Stored(key)) == 1
+    assert not [message for message in tablet.messages if isinstance(message, Stored)]
+    tablet.show(*SCORE, log("scored", 1, score=60.0))
+    assert tablet.messages.count(Stored(key)) == 1
     assert tablet.give(key) is None  # its acknowledgement got lost: it is told again
-    assert tablet.sent.count(Stored(key)) == 2
+    assert tablet.messages.count(Stored(key)) == 2
 
 
 def test_an_answer_that_comes_too_late_is_written_down_as_a_note():
     tablet = Tablet()
     key = tablet.show(*SCORE).key
-    tablet.show(*SCORE, logged("take_discarded", 1, reason="redo"), steps.StartTake(1, 2), steps.AskStroke(FIRST))
+    tablet.show(*SCORE, log("take_discarded", 1, reason="redo"), steps.StartTake(1, 2), steps.AskStroke(FIRST))
     note = tablet.give(key)
     assert isinstance(note, steps.Note)
     assert "60.0" in note.text
     assert key in note.text
-    assert Stored(key) in tablet.sent
+    assert Stored(key) in tablet.messages
 
 
 def test_an_answer_waits_on_the_tablet_while_no_session_runs():
@@ -71,7 +71,7 @@ def test_an_answer_waits_on_the_tablet_while_no_session_runs():
     key = tablet.show(*SCORE).key
     tablet.dialogue.show(subject_view(None), None, str, mirrored=False)
     assert tablet.give(key) is None
-    assert not [sent for sent in tablet.sent if isinstance(sent, Stored)]
+    assert not [message for message in tablet.messages if isinstance(message, Stored)]
     tablet.show(*BEGUN)
     assert isinstance(tablet.give(key), steps.Note)
 

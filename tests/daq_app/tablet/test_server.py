@@ -24,11 +24,11 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.fixture
 def server(monkeypatch):
     monkeypatch.setattr(module, "WRONG_CODE", 0.01)
-    heard = []
-    made = TabletServer("127.0.0.1", 0, lambda said, _at: heard.append(said), lambda: None)
-    made.heard = heard
-    yield made
-    made.close()
+    requests = []
+    tablet_server = TabletServer("127.0.0.1", 0, lambda request, _at: requests.append(request), lambda: None)
+    tablet_server.requests = requests
+    yield tablet_server
+    tablet_server.close()
 
 
 def place(server):
@@ -42,7 +42,7 @@ def socket(server, **hello):
         yield talk
 
 
-def said(talk):
+def receive(talk):
     return json.loads(talk.recv(5.0))
 
 
@@ -78,21 +78,21 @@ def test_another_page_cannot_talk_in_the_name_of_the_browser(server):
 def test_one_device_is_let_in_by_the_code_and_comes_back_by_its_token(server):
     server.send(Force(0.5))
     with socket(server, code=server.code, pixels_per_mm=4.0) as first:
-        welcome = said(first)
+        welcome = receive(first)
         assert welcome["type"] == "welcome"
-        assert said(first) == {"type": "force", "part": 0.5}  # what came before it
+        assert receive(first) == {"type": "force", "part": 0.5}  # what came before it
         assert socket_refused(server, code=server.code)  # the code is used
     with socket(server, token=welcome["token"]) as again:
-        assert said(again)["type"] == "welcome"
+        assert receive(again)["type"] == "welcome"
         assert server.connected
-        until(lambda: len(server.heard) == 2)  # the server sends the welcome before it calls the window
-    assert [type(one) for one in server.heard] == [Hello, Hello]
-    assert server.heard[0].pixels_per_mm == 4.0
+        until(lambda: len(server.requests) == 2)  # the server sends the welcome before it calls the window
+    assert [type(request) for request in server.requests] == [Hello, Hello]
+    assert server.requests[0].pixels_per_mm == 4.0
 
 
 def socket_refused(server, **hello):
     with socket(server, **hello) as talk:
-        return said(talk)["type"] == "refused"
+        return receive(talk)["type"] == "refused"
 
 
 def test_a_code_that_is_guessed_at_becomes_another(server):
@@ -108,39 +108,39 @@ def test_a_code_that_is_guessed_at_becomes_another(server):
 def test_many_who_guess_at_once_wait_for_each_other(server, monkeypatch):
     waiting, most, pause = [], [], time.sleep
 
-    def slept(seconds):
+    def sleep_counted(seconds):
         waiting.append(1)
         most.append(len(waiting))
         pause(seconds)
         waiting.pop()
 
-    monkeypatch.setattr(module.time, "sleep", slept)
+    monkeypatch.setattr(module.time, "sleep", sleep_counted)
     with ThreadPoolExecutor(8) as pool:
-        refused = list(pool.map(lambda code: socket_refused(server, code=code), ["1", "", "٤", "x" * 200] * 2))
-    assert all(refused)
+        refusals = list(pool.map(lambda code: socket_refused(server, code=code), ["1", "", "٤", "x" * 200] * 2))
+    assert all(refusals)
     assert max(most) == 1
 
 
 def test_an_error_of_ours_ends_one_conversation_and_no_other(server):
     server._received = None  # no function
     with socket(server, code=server.code) as talk:
-        token = said(talk)["token"]
+        token = receive(talk)["token"]
         with pytest.raises(ConnectionClosed):
             talk.recv(5.0)
     server._received = lambda *_: None
     with socket(server, token=token) as talk:
-        assert said(talk)["type"] == "welcome"
+        assert receive(talk)["type"] == "welcome"
 
 
 def test_a_new_code_lets_go_of_the_device_that_was_there(server):
     with socket(server, code=server.code) as first:
-        token = said(first)["token"]
+        token = receive(first)["token"]
         server.renew()
         with pytest.raises(ConnectionClosed):
             first.recv(5.0)
     assert socket_refused(server, token=token)
     with socket(server, code=server.code) as second:
-        assert said(second)["type"] == "welcome"
+        assert receive(second)["type"] == "welcome"
 
 
 @pytest.mark.parametrize(
@@ -148,15 +148,15 @@ def test_a_new_code_lets_go_of_the_device_that_was_there(server):
 )
 def test_nonsense_ends_the_conversation_and_nothing_else(server, text):
     with socket(server, code=server.code) as talk:
-        token = said(talk)["token"]
+        token = receive(talk)["token"]
         talk.send(text)
         with pytest.raises(ConnectionClosed):
             talk.recv(5.0)
     with socket(server, token=token) as talk:
-        assert said(talk)["type"] == "welcome"
+        assert receive(talk)["type"] == "welcome"
         talk.send(json.dumps({"type": "given", "key": "a", "acts": [[1.0, "press", 5.0, "pen"]], "sent": 2.0}))
-        until(lambda: isinstance(server.heard[-1], AnswerGiven))
-    assert isinstance(server.heard[-1], AnswerGiven)
+        until(lambda: isinstance(server.requests[-1], AnswerGiven))
+    assert isinstance(server.requests[-1], AnswerGiven)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_an_address_that_is_not_the_labs_own_is_refused_with_a_sentence(address,
 )
 def test_what_the_command_line_asks_for_in_vain_is_one_sentence(arguments, code, words):
     command, screen = [sys.executable, "-m", "daq_app", *arguments], {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
-    done = subprocess.run(command, env=screen, capture_output=True, text=True, check=False)
-    assert done.returncode == code
-    assert words in done.stderr
-    assert done.stderr.count("\n") == 1
+    process = subprocess.run(command, env=screen, capture_output=True, text=True, check=False)
+    assert process.returncode == code
+    assert words in process.stderr
+    assert process.stderr.count("\n") == 1

@@ -44,39 +44,39 @@ def desk(application, tmp_path, monkeypatch):  # noqa: F811  the fixture
         widget.deleteLater()
 
 
-def answered(driver, number):
+def answer_to(driver, number):
     driver.until(lambda: driver.session.of(number).answer is not None, f"the answer to {number}")
     return driver.session.of(number).answer
 
 
 def ask(driver):
     """Bring the session in hand to its next question, doing each step once."""
-    done = []
+    steps_done = []
 
-    def asked():
+    def is_asked():
         here, primary = (driver.session.phase, driver.session.trial), driver.view.course.primary
-        if here[0] != "scoring" and primary is not None and primary.sends is not None and here not in done:
-            done.append(here)
+        if here[0] != "scoring" and primary is not None and primary.sends is not None and here not in steps_done:
+            steps_done.append(here)
             driver.window.bridge.send(primary.sends)
         return here[0] == "scoring"
 
-    driver.until(asked, "a question")
+    driver.until(is_asked, "a question")
 
 
-BOXES = """[...document.querySelectorAll('#title, #line, #ends span, #next')].map(one => {
-  const range = document.createRange(), words = one.id == 'line' ? one : (range.selectNodeContents(one), range);
-  const box = (one.id == 'next' ? one : words).getBoundingClientRect();
+BOXES = """[...document.querySelectorAll('#title, #line, #ends span, #next')].map(item => {
+  const range = document.createRange(), words = item.id == 'line' ? item : (range.selectNodeContents(item), range);
+  const box = (item.id == 'next' ? item : words).getBoundingClientRect();
   return [box.x, box.y, box.width, box.height];
 })"""  # of what the subject sees [px]
 
 
-def meet(one, other):
+def meet(first, second):
     """Say whether two boxes lie over each other."""
-    return all(one[k] < other[k] + other[k + 2] and other[k] < one[k] + one[k + 2] for k in (0, 1))
+    return all(first[k] < second[k] + second[k + 2] and second[k] < first[k] + first[k + 2] for k in (0, 1))
 
 
 def shown_words(window):
-    return " ".join(one.text() for one in window.notice.findChildren(QLabel))
+    return " ".join(label.text() for label in window.notice.findChildren(QLabel))
 
 
 def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
@@ -124,11 +124,11 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
         boxes = browser.value(BOXES)
         assert len(boxes) == 5
         assert all(x >= 0 and x + wide <= size[0] and y >= 0 and y + high <= size[1] for x, y, wide, high in boxes)
-        assert not any(meet(one, other) for at, one in enumerate(boxes) for other in boxes[at + 1 :])
+        assert not any(meet(box, other) for at, box in enumerate(boxes) for other in boxes[at + 1 :])
     browser.call("Emulation.clearDeviceMetricsOverride")
     browser.until(f"innerWidth == {own_width}")  # else the click may miss a button that moves
     browser.click("next")
-    assert answered(driver, 1) == "score 70"
+    assert answer_to(driver, 1) == "score 70"
     browser.until("pending.length == 0", "the acknowledgement")
 
     ask(driver)  # by key
@@ -136,7 +136,7 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     browser.key("ArrowRight")
     browser.key("PageUp")
     browser.key("Enter")
-    assert answered(driver, 2) == "score 60"
+    assert answer_to(driver, 2) == "score 60"
 
     ask(driver)  # while the network is away
     browser.until("asked()", "the line")
@@ -148,16 +148,16 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     browser.until("document.body.innerText.includes('kept on this device')")
     assert driver.session.of(3).answer is None
     browser.call("Page.reload")  # and it is back
-    assert answered(driver, 3) == "score 30"
+    assert answer_to(driver, 3) == "score 30"
     browser.until("pending.length == 0", "the acknowledgement")
 
     folder = Path(driver.session.folder)
     window.bridge.send(steps.Abort("enough"))
     driver.until(lambda: driver.session.sealing == "sealed", "the end")
-    scored = [event for event in Recording.open(folder).events if event.kind == "scored"]
-    assert [event.data["score"] for event in scored] == [70.0, 60.0, 30.0]
-    assert [event.data["input_device"] for event in scored] == ["touch", "keyboard", "touch"]
-    for event in scored:  # the tablet's clock became the session's
+    answers = [event for event in Recording.open(folder).events if event.kind == "scored"]
+    assert [event.data["score"] for event in answers] == [70.0, 60.0, 30.0]
+    assert [event.data["input_device"] for event in answers] == ["touch", "keyboard", "touch"]
+    for event in answers:  # the tablet's clock became the session's
         times = [time for time, _ in event.data["positions"]]
         assert times == sorted(times)
         assert 0.0 < event.time_ns * 1e-9 - times[-1] < 20.0
@@ -210,5 +210,5 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     give(browser)
     browser.until("!document.getElementById('next').hidden")
     browser.click("next")
-    assert answered(driver, driver.session.trial) == expected
+    assert answer_to(driver, driver.session.trial) == expected
     browser.until("pending.length == 0", "the acknowledgement")

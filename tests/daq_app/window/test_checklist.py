@@ -25,7 +25,7 @@ def card(form, name, bench=REAL):
 
 def test_a_form_that_is_right_has_no_card_open_and_its_sentence_names_the_subject(form):
     cards = checklist(form, REAL, "measured")
-    assert all(one.ready for one in cards)
+    assert all(card.ready for card in cards)
     assert headline(cards, form.subject) == "Press Enter to start the session of P07."
 
 
@@ -70,8 +70,8 @@ def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypa
 
 def test_every_card_that_is_open_says_why_and_the_missing_transducer_comes_first(form):
     cards = checklist(replace(form, subject="", seed="x"), Bench(), "measured")
-    assert all(one.words for one in cards if not one.ready)
-    assert [one.name for one in cards if not one.ready] == ["Study and protocol", "Subject", "Transducer"]
+    assert all(card.words for card in cards if not card.ready)
+    assert [card.name for card in cards if not card.ready] == ["Study and protocol", "Subject", "Transducer"]
     assert headline(cards, "") == "Connect a transducer, or choose scores only."
 
 

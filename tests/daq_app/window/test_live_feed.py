@@ -29,7 +29,7 @@ def sliding(n, *, speed=25.0, mu=0.5, normal=2.0, height=20.0):
     return np.hstack([force, np.cross(place, force)])
 
 
-def fed(feed, wrench, block=117):
+def feed_blocks(feed, wrench, block=117):
     for first in range(0, len(wrench), block):
         feed.add(live(first, wrench[first : first + block]), FRAME)
 
@@ -41,7 +41,7 @@ def channel(feed, name):
 def test_force_ratio_speed_and_place_are_those_of_a_finger_that_slides_at_a_known_speed():
     feed = LiveFeed()
     feed.device(INFO)
-    fed(feed, sliding(7000))
+    feed_blocks(feed, sliding(7000))
     assert channel(feed, "N") == pytest.approx(2.0)
     assert channel(feed, "T") == pytest.approx(1.0)
     assert channel(feed, "mu") == pytest.approx(0.5)
@@ -54,7 +54,7 @@ def test_force_ratio_speed_and_place_are_those_of_a_finger_that_slides_at_a_know
 def test_nothing_is_said_of_ratio_place_and_speed_where_nothing_presses():
     feed = LiveFeed()
     feed.device(INFO)
-    fed(feed, sliding(3000, normal=0.2))
+    feed_blocks(feed, sliding(3000, normal=0.2))
     assert np.isnan(channel(feed, "mu")).all()
     assert np.isnan(channel(feed, "speed")).all()
     assert channel(feed, "N") == pytest.approx(0.2)
@@ -84,7 +84,7 @@ def test_a_reading_that_the_device_calls_invalid_moves_no_speed():
 def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time():
     feed = LiveFeed()
     feed.device(INFO)
-    fed(feed, sliding(1000))
+    feed_blocks(feed, sliding(1000))
     feed.take_begins()
     feed.add(live(1000, sliding(300)), FRAME)
     feed.add(live(1310, sliding(50)), FRAME)
@@ -98,25 +98,25 @@ def test_readings_that_are_missing_leave_a_gap_however_few_they_are():
     feed.device(INFO)
     feed.add(live(0, sliding(100)), FRAME)
     feed.add(live(103, sliding(100)), FRAME)
-    drawn = feed.trace.columns(0.0, 0.05, 500)
-    [gap] = np.flatnonzero(np.isnan(drawn.values[CHANNELS.index("N")]))
-    assert drawn.time[gap - 1] == 99 / RATE
-    assert drawn.time[gap + 1] == 103 / RATE
+    columns = feed.trace.columns(0.0, 0.05, 500)
+    [gap] = np.flatnonzero(np.isnan(columns.values[CHANNELS.index("N")]))
+    assert columns.time[gap - 1] == 99 / RATE
+    assert columns.time[gap + 1] == 103 / RATE
 
 
 def test_readings_that_came_in_several_messages_are_taken_as_one_up_to_whatever_came_between():
     first, second = live(0, sliding(100)), live(100, sliding(50))
-    zeroed, other = live(150, sliding(10), zero=(1.0,) * 6), live(0, sliding(5), stream=2)
-    found = list(together([first, second, "a word", zeroed, other]))
-    assert [len(f.time) if isinstance(f, Live) else f for f in found] == [150, "a word", 10, 5]
-    assert found[0].time.tolist() == [*first.time, *second.time]
-    assert found[0].wrench.tolist() == [*first.wrench.tolist(), *second.wrench.tolist()]
+    rezeroed, other = live(150, sliding(10), zero=(1.0,) * 6), live(0, sliding(5), stream=2)
+    messages = list(together([first, second, "a word", rezeroed, other]))
+    assert [len(f.time) if isinstance(f, Live) else f for f in messages] == [150, "a word", 10, 5]
+    assert messages[0].time.tolist() == [*first.time, *second.time]
+    assert messages[0].wrench.tolist() == [*first.wrench.tolist(), *second.wrench.tolist()]
 
 
 def test_a_new_stream_begins_a_new_picture():
     feed = LiveFeed()
     feed.device(INFO)
-    fed(feed, sliding(1000))
+    feed_blocks(feed, sliding(1000))
     feed.add(live(0, sliding(20), stream=2), FRAME)
     assert len(channel(feed, "N")) == 20
     assert len(feed.take()) == 20

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from desk import PLAN
 
 from daq_app.recorder.messages import Live
 from daq_app.window.live_follower import Follower, settled_scene
@@ -22,11 +23,9 @@ from daq_app.window.live_model import (
 )
 from daq_app.window.live_model_process import LiveModel
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.strokes import FrictionParameters
 from solver import NoSteadyState, solve
 
-PLAN = plan(protocol("sensotact-friction"), "S01", 3, setting=VisitSetting(frame=Frame("-z", "set", 20.0, "set")))
 MU, NORMAL, AREA = 0.6, 2.0, PLAN.contact_area
 FRICTION = FrictionParameters(1, 0, MU, None, MU * NORMAL / AREA, AREA, 20.0, 1, "maximum", ())
 NOTHING = (0.0,) * 6
@@ -50,7 +49,7 @@ def live(time_, wrench, status=None, stream=1):
 
 
 @functools.cache
-def solved(scene, **_):
+def solve_once(scene, **_):
     """Solve a scene once for all tests."""
     return solve(scene)
 
@@ -61,54 +60,54 @@ def follower():
 
 
 def test_sliding_forces_lead_to_the_sed_of_the_full_solve(follower):
-    said = follower.take(forces_of(stroke(), FRAME))
-    found = solved(settled_scene(PLAN, FRICTION, NORMAL))
-    assert said.sed[-1] == pytest.approx(found.sed_ending, rel=0.02)  # what the stepper's mesh is good to
-    assert said.depth == pytest.approx(found.indentation, rel=0.02)
-    assert said.mu == pytest.approx(MU, rel=1e-9)
-    assert np.nanmax(np.abs(said.row - found.row.sed)) < 0.04 * np.nanmax(found.row.sed)
+    provisional = follower.take(forces_of(stroke(), FRAME))
+    solution = solve_once(settled_scene(PLAN, FRICTION, NORMAL))
+    assert provisional.sed[-1] == pytest.approx(solution.sed_ending, rel=0.02)  # what the stepper's mesh is good to
+    assert provisional.depth == pytest.approx(solution.indentation, rel=0.02)
+    assert provisional.mu == pytest.approx(MU, rel=1e-9)
+    assert np.nanmax(np.abs(provisional.row - solution.row.sed)) < 0.04 * np.nanmax(solution.row.sed)
 
 
 def test_the_picture_holds_the_energy_that_the_row_tells(follower):
-    said = follower.take(forces_of(stroke(), FRAME))
-    middles = said.picture.nodes[said.picture.faces].mean(axis=1)
+    provisional = follower.take(forces_of(stroke(), FRAME))
+    middles = provisional.picture.nodes[provisional.picture.faces].mean(axis=1)
     here = np.argmin(np.hypot(*(middles - [0.5, 0.6]).T))
-    assert 0.1 * said.sed[-1] < said.picture.sed[here] < 10 * said.sed[-1]
-    assert said.picture.outline[:, 1].min() == pytest.approx(0.0, abs=1e-3)
+    assert 0.1 * provisional.sed[-1] < provisional.picture.sed[here] < 10 * provisional.sed[-1]
+    assert provisional.picture.outline[:, 1].min() == pytest.approx(0.0, abs=1e-3)
 
 
 def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_it_tells_instead(follower):
     finite = Follower(Use(PLAN, "finite"))
     within = finite.take(forces_of(stroke(rate=100), FRAME))
     assert not within.instead.any()
-    found = solve(settled_scene(PLAN, FRICTION, NORMAL, "finite"))
-    assert within.sed[-1] == pytest.approx(found.sed_ending, rel=0.03)  # what the stepper's mesh is good to
-    assert within.depth == pytest.approx(found.indentation, rel=0.01)
+    solution = solve(settled_scene(PLAN, FRICTION, NORMAL, "finite"))
+    assert within.sed[-1] == pytest.approx(solution.sed_ending, rel=0.03)  # what the stepper's mesh is good to
+    assert within.depth == pytest.approx(solution.indentation, rel=0.01)
     assert model_words(within, None, "").state == "provisional"
-    lifted = Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1)
-    finite.take(lifted)
+    lift = Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1)
+    finite.take(lift)
     hard = forces_of(stroke(rate=100), FRAME)
     beyond = finite.take(Forces(5.0 + hard.time, 3.0 * hard.normal, 5.0 * hard.pull, 0, 1))
     first = int(np.argmax(beyond.instead))
     assert first > 0
     assert beyond.instead[first:].all()  # what it lost is not taken up again in the middle of a press
-    follower.take(lifted)
+    follower.take(lift)
     small = follower.take(Forces(5.0 + hard.time, 3.0 * hard.normal, 5.0 * hard.pull, 0, 1))
     assert beyond.sed[first:].tolist() == small.sed[first:].tolist()
     assert model_words(beyond, None, "").state == "instead"
     trace = ModelTrace()
     trace.add_prediction(beyond)
-    told = np.isfinite(trace.columns(5.0, 8.0, 2000).values)
-    assert (told[0] != told[1]).all()
-    finite.take(lifted)
+    is_known = np.isfinite(trace.columns(5.0, 8.0, 2000).values)
+    assert (is_known[0] != is_known[1]).all()
+    finite.take(lift)
     assert not finite.take(forces_of(stroke(0.5), FRAME)).instead.any()
 
 
 def test_a_lifted_finger_forgets_the_friction_of_the_touch_before(follower):
     follower.take(forces_of(stroke(), FRAME))
-    lifted = follower.take(Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1))
-    assert lifted.sed[-1] == 0.0
-    assert lifted.mu < MU
+    after_lift = follower.take(Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1))
+    assert after_lift.sed[-1] == 0.0
+    assert after_lift.mu < MU
 
 
 def test_another_plan_with_the_same_finger_needs_no_other_mesh(follower):
@@ -127,23 +126,23 @@ def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again
 
 
 def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
-    monkeypatch.setattr("daq_app.window.live_follower.solve", solved)
-    said = follower.take(forces_of(stroke(), FRAME))
+    monkeypatch.setattr("daq_app.window.live_follower.solve", solve_once)
+    shown_values = follower.take(forces_of(stroke(), FRAME))
     settled = follower.settling(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
-    steady = said.sed[(said.time >= 1.2) & (said.time <= 2.0)]
+    steady = shown_values.sed[(shown_values.time >= 1.2) & (shown_values.time <= 2.0)]
     assert settled.provisional == pytest.approx(steady.mean())
     assert abs(settled.difference) < 0.02
-    words = model_words(said, settled, "").words
+    words = model_words(shown_values, settled, "").words
     assert f"{1000 * settled.sed:.2f} kPa" in words
     assert "at the measured force, small strain" in words
     assert f"± {100 * settled.error:.2g} % by the mesh; model: " in words
-    provisional = model_words(said, None, "").words
+    provisional = model_words(shown_values, None, "").words
     assert "mesh, model: no estimate · at the measured force" in provisional
     assert f"{1000 * settled.provisional:.2f} kPa" in words
 
 
 def test_a_full_solve_whose_nested_mesh_has_no_such_state_has_no_estimate_from_the_mesh(follower, monkeypatch):
-    monkeypatch.setattr("daq_app.window.live_follower.solve", lambda scene: replace(solved(scene), nested=None))
+    monkeypatch.setattr("daq_app.window.live_follower.solve", lambda scene: replace(solve_once(scene), nested=None))
     follower.take(forces_of(stroke(), FRAME))
     settled = follower.settling(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     assert settled.error is None
@@ -197,7 +196,7 @@ def test_joined_batches_are_one_batch():
 
 
 @pytest.mark.parametrize(
-    ("said", "settled", "problem", "state"),
+    ("provisional", "settled", "problem", "state"),
     [
         (None, None, "", "none"),
         (None, None, "no finger", "none"),
@@ -206,8 +205,8 @@ def test_joined_batches_are_one_batch():
         (None, SettledSolve(1, None, None, None, np.empty(0), None, None, "finite", "it wedges"), "", "failed"),
     ],
 )
-def test_every_state_of_the_model_has_words(said, settled, problem, state):
-    words = model_words(said, settled, problem)
+def test_every_state_of_the_model_has_words(provisional, settled, problem, state):
+    words = model_words(provisional, settled, problem)
     assert words.state == state
     assert words.words
 
@@ -237,8 +236,8 @@ def test_a_process_of_its_own_answers_batches_and_the_full_solve_beside_them():
         until(lambda: news.extend(model.poll()) or news)
         model.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 1.5)))
         model.add(live(2.0 + np.arange(20) / 200, np.zeros((20, 6))), FRAME)
-        said = model.predictions
-        until(lambda: (model.poll(), model.settled is not None and model.predictions > said)[1])
+        count = model.predictions
+        until(lambda: (model.poll(), model.settled is not None and model.predictions > count)[1])
         assert abs(model.settled.difference) < 0.02
         model._child.process.terminate()
         until(lambda: model.poll() or model.problem)

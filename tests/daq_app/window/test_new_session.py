@@ -4,7 +4,7 @@ from datetime import datetime
 from pathlib import Path
 
 import pytest
-from recordings import PLAN, TRIAL, begun
+from recordings import PLAN, TRIAL, new_writer
 
 from daq_app.recorder.messages import People, StartSession
 from daq_app.window.new_session import (
@@ -30,19 +30,19 @@ FORM = SessionForm(subject="P07", folder="kept")
 
 
 def test_a_form_that_is_right_begins_a_session_in_a_folder_of_its_own():
-    made = check_form(replace(FORM, study="pilot", seed="7"), SIMULATED, NOW, 99)
-    assert isinstance(made, StartSession)
-    assert made.folder == "kept/pilot/P07_sensotact-friction_20260301T143005"
-    assert made.plan.subject == "P07"
-    assert made.plan.seed == 7
-    assert made.plan.frame == SIMULATED.frame
-    assert {s.name: (s.value, s.origin) for s in made.settings} == {"seed": (7, "set"), "study": ("pilot", "set")}
+    request = check_form(replace(FORM, study="pilot", seed="7"), SIMULATED, NOW, 99)
+    assert isinstance(request, StartSession)
+    assert request.folder == "kept/pilot/P07_sensotact-friction_20260301T143005"
+    assert request.plan.subject == "P07"
+    assert request.plan.seed == 7
+    assert request.plan.frame == SIMULATED.frame
+    assert {s.name: (s.value, s.origin) for s in request.settings} == {"seed": (7, "set"), "study": ("pilot", "set")}
 
 
 def test_an_empty_seed_is_a_new_one_and_is_marked_as_nobodys_choice():
-    made = check_form(FORM, REAL, NOW, 99)
-    assert made.plan.seed == 99
-    assert made.settings[0].origin == "default"
+    request = check_form(FORM, REAL, NOW, 99)
+    assert request.plan.seed == 99
+    assert request.settings[0].origin == "default"
 
 
 @pytest.mark.parametrize(
@@ -78,29 +78,29 @@ def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind)
     ],
 )
 def test_what_is_wrong_is_said_beside_its_field(form, bench, field, words):
-    made = check_form(form, bench, NOW, 0)
-    assert isinstance(made, Refusal)
-    assert list(made.sentences) == [field]
-    assert words in made.sentences[field]
-    assert made.sentences[field].endswith(".")
+    request = check_form(form, bench, NOW, 0)
+    assert isinstance(request, Refusal)
+    assert list(request.sentences) == [field]
+    assert words in request.sentences[field]
+    assert request.sentences[field].endswith(".")
 
 
 def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
-    made = check_form(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
-    assert "is a file" in made.sentences["folder"]
+    request = check_form(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
+    assert "is a file" in request.sentences["folder"]
 
 
 def test_a_folder_below_the_home_of_nobody_or_that_no_file_system_can_hold_is_refused_beside_its_field(tmp_path):
-    for typed in ("~nobody-of-that-name/recordings", str(tmp_path / ("x" * 300))):
-        assert "folder" in refusals(replace(FORM, folder=typed, study="pilot"), REAL)
+    for folder_name in ("~nobody-of-that-name/recordings", str(tmp_path / ("x" * 300))):
+        assert "folder" in refusals(replace(FORM, folder=folder_name, study="pilot"), REAL)
 
 
 def test_sessions_that_were_cut_short_are_listed_whatever_else_lies_in_the_folder(tmp_path):
-    begun(tmp_path / "P01").close()
+    new_writer(tmp_path / "P01").close()
     (tmp_path / "gone").mkdir()
     (tmp_path / "gone" / "session.sqlite").symlink_to(tmp_path / "nowhere")
-    assert [one.folder for one in unfinished_sessions(tmp_path)] == [tmp_path / "P01"]
+    assert [session.folder for session in unfinished_sessions(tmp_path)] == [tmp_path / "P01"]
     assert unfinished_sessions(tmp_path / ("x" * 300)) == ()
 
 
@@ -110,9 +110,9 @@ def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_
 
 
 def test_the_axis_of_pressing_and_the_contact_area_are_recorded_as_they_were_set():
-    made = check_form(replace(FORM, normal="+x", area="85"), REAL, NOW, 0).plan
-    assert (made.frame.normal, made.frame.normal_origin) == ("+x", "set")
-    assert (made.contact_area, made.contact_area_origin) == (85.0, "set")
+    request = check_form(replace(FORM, normal="+x", area="85"), REAL, NOW, 0).plan
+    assert (request.frame.normal, request.frame.normal_origin) == ("+x", "set")
+    assert (request.contact_area, request.contact_area_origin) == (85.0, "set")
     assert check_form(FORM, REAL, NOW, 0).plan.frame.normal_origin == "default"
 
 
@@ -129,15 +129,15 @@ def in_study(study, subject):
 
 def test_a_session_of_a_study_is_the_one_decided_at_enrolment_whatever_the_page_says(study):
     member = enrol(study, "P07", Body(contact_angle=40.0))
-    made = check_form(in_study(study, "P07"), SIMULATED, NOW, 99)
+    request = check_form(in_study(study, "P07"), SIMULATED, NOW, 99)
     again = check_form(replace(in_study(study, "P07"), forces=False), SIMULATED, NOW, 98)
-    assert made.plan.protocol == "sensotact-friction"
-    assert made.plan.contact_angle == 40.0
-    assert made.plan.seed == again.plan.seed not in (7, 98, 99)
-    assert {s.name: s.origin for s in made.settings}["seed"] == "default"
-    codes = {trial.stimulus.code for block in made.plan.blocks for trial in block.trials}
+    assert request.plan.protocol == "sensotact-friction"
+    assert request.plan.contact_angle == 40.0
+    assert request.plan.seed == again.plan.seed not in (7, 98, 99)
+    assert {s.name: s.origin for s in request.settings}["seed"] == "default"
+    codes = {trial.stimulus.code for block in request.plan.blocks for trial in block.trials}
     assert codes == set(study_key(study).stimuli)
-    assert (member.slot, made.folder) == (0, str(study / "P07_forces_20260301T143005"))
+    assert (member.slot, request.folder) == (0, str(study / "P07_forces_20260301T143005"))
 
 
 def test_who_is_not_enrolled_is_enrolled_at_a_button_and_who_was_withdrawn_is_refused(study):
@@ -166,8 +166,8 @@ def test_a_study_that_cannot_be_read_says_so(study):
 
 def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and_come_before_what_counts(tmp_path):
     assert optional_phases(FORM) == ("pre-evaluation", "practice")
-    made = check_form(replace(FORM, pre_evaluation=True, practice=True), REAL, NOW, 0).plan
-    phases = list(dict.fromkeys(trial.phase for trial in made.trials))
+    request = check_form(replace(FORM, pre_evaluation=True, practice=True), REAL, NOW, 0).plan
+    phases = list(dict.fromkeys(trial.phase for trial in request.trials))
     assert phases == ["pre-evaluation", "practice", "main"]
     bare = tmp_path / "bare.toml"
     lines = protocol_file("sensotact-friction").read_text(encoding="utf-8").splitlines()
@@ -183,26 +183,26 @@ def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and
 def test_any_protocol_is_piloted_on_the_simulated_bench_and_without_it(name, tmp_path):
     form = SessionForm(protocol=name, folder=str(tmp_path), subject="Ada Lovelace", height="tall")
     for bench, forces in ((Bench(True, True, Frame()), True), (Bench(True), False), (Bench(), False)):
-        made = check_form(pilot_form(form, bench), bench, NOW, 5)
-        assert made.people.kind == "simulated people"
-        assert made.plan.subject == "PILOT"
-        assert made.plan.forces is forces
-        assert Path(made.folder).parent == tmp_path / "pilots"
+        request = check_form(pilot_form(form, bench), bench, NOW, 5)
+        assert request.people.kind == "simulated people"
+        assert request.plan.subject == "PILOT"
+        assert request.plan.forces is forces
+        assert Path(request.folder).parent == tmp_path / "pilots"
 
 
 def test_a_pilot_in_a_study_runs_the_studys_protocol_and_leaves_nothing_in_it(tmp_path):
     text = protocol_file("paired-comparison").read_text(encoding="utf-8")
     create_study(tmp_path / "study", text, 11, blinded=True)
     form = SessionForm(study="study", folder=str(tmp_path))
-    made = check_form(pilot_form(form, Bench()), Bench(), NOW, 5)
-    assert made.plan.protocol == "paired-comparison"
-    assert Path(made.folder).parent == tmp_path / "pilots"
-    assert not any(setting.name == "study" for setting in made.settings)
+    request = check_form(pilot_form(form, Bench()), Bench(), NOW, 5)
+    assert request.plan.protocol == "paired-comparison"
+    assert Path(request.folder).parent == tmp_path / "pilots"
+    assert not any(setting.name == "study" for setting in request.settings)
 
 
 def test_a_skipped_trial_of_a_session_that_was_cut_short_is_not_done(tmp_path):
     trials = tuple(replace(TRIAL, number=number) for number in (1, 2, 3))
-    writer = begun(tmp_path / "cut", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=trials),)))
+    writer = new_writer(tmp_path / "cut", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=trials),)))
     writer.event("take_started", 1, {"take": 1})
     writer.event("scored", 1, {"score": 50.0})
     writer.event("take_kept", 1, {"take": 1})
@@ -222,7 +222,7 @@ def test_sessions_of_one_subject_that_were_cut_short_are_told_apart_by_when_they
     time.tzset()
     monkeypatch.setattr("sessions.recording.head.datetime", Clock)
     for hour in (8, 11):
-        begun(tmp_path / f"at-{hour}", plan=PLAN).close()
+        new_writer(tmp_path / f"at-{hour}", plan=PLAN).close()
     words = {cut.folder.name: cut.words[: len("S01, 2026-11-26 17:51")] for cut in unfinished_sessions(tmp_path)}
     assert words == {"at-8": "S01, 2026-11-26 17:51", "at-11": "S01, 2026-11-26 20:51"}
     monkeypatch.undo()

@@ -21,13 +21,13 @@ ANSWERS = {
 
 @pytest.mark.parametrize("name", protocol_names())
 def test_every_text_that_a_protocol_gives_the_subject_is_on_a_page(name):
-    chosen = protocol(name)
+    study = protocol(name)
     pages = preview(SessionForm(protocol=name))
-    told = " ".join(f"{page.view.title} {page.view.text} {' '.join(page.view.ends)}" for page in pages)
-    for block in chosen.blocks:
-        assert block.instruction in told
-        assert block.question in told
-        assert all(end in told for end in block.scale_ends or ())
+    text = " ".join(f"{page.view.title} {page.view.text} {' '.join(page.view.ends)}" for page in pages)
+    for block in study.blocks:
+        assert block.instruction in text
+        assert block.question in text
+        assert all(end in text for end in block.scale_ends or ())
     assert {page.view.kind for page in pages} == {"read", ANSWERS[name]}
 
 
@@ -71,9 +71,9 @@ def test_whatever_else_is_wrong_with_the_form_its_pages_are_shown():
 
 def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
     (tmp_path / "wrong.toml").write_text("name = ")
-    refused = preview(replace(SessionForm(), protocol=str(tmp_path / "wrong.toml")))
-    assert isinstance(refused, Refusal)
-    assert "wrong.toml" in refused.sentences["protocol"]
+    refusal = preview(replace(SessionForm(), protocol=str(tmp_path / "wrong.toml")))
+    assert isinstance(refusal, Refusal)
+    assert "wrong.toml" in refusal.sentences["protocol"]
 
 
 def test_the_mirror_keeps_what_the_protocol_keeps_from_the_experimenter():

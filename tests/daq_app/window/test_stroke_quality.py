@@ -14,7 +14,7 @@ from tests.daq_app.session_messages import INFO, PLAN
 
 
 @pytest.fixture
-def judged(monkeypatch):
+def judge_stroke(monkeypatch):
     """Return a function that judges a stroke whose N goes linearly from 2 N to `last`, with flaws beside it."""
 
     def judge(last, *flaws):
@@ -24,35 +24,35 @@ def judged(monkeypatch):
         stroke = SimpleNamespace(curve=curve, steady=(0.0, 2.0), mu_dynamic=0.4, mu_dynamic_interval=None, speed=20.0)
         stroke.normal_force = stroke.tangential_force = 1.0
         stroke.onset = stroke.lift = None
-        found = [Flaw(name, f"{name} at length.", grade) for name, grade in flaws]
-        analysis = SimpleNamespace(strokes=[stroke], flaws=found, friction=[None])
+        named_flaws = [Flaw(name, f"{name} at length.", grade) for name, grade in flaws]
+        analysis = SimpleNamespace(strokes=[stroke], flaws=named_flaws, friction=[None])
         monkeypatch.setattr(stroke_quality, "analyse_blocks", lambda *_: analysis)
         return stroke_quality.stroke_quality(ReadingBlock.__new__(ReadingBlock), PLAN, INFO, PLAN.trials[0])
 
     return judge
 
 
-def test_a_force_that_falls_by_half_asks_for_another_stroke(judged):
+def test_a_force_that_falls_by_half_asks_for_another_stroke(judge_stroke):
     # The medians of the first and the last quarter of a line from 2 to 0.4 lie at 1/8 and 7/8 of it: 1.8 and 0.6.
-    quality = judged(0.4)
+    quality = judge_stroke(0.4)
     assert quality.fell == pytest.approx(1 - 0.6 / 1.8, abs=2e-3)
     assert quality.grade == "doubtful"
     assert verdict(quality) == "Redo: pressed less than half as hard at the end. Keep pressing until the end."
-    assert judged(1.6).words == ()
-    assert verdict(judged(1.6)) == "Good"
+    assert judge_stroke(1.6).words == ()
+    assert verdict(judge_stroke(1.6)) == "Good"
 
 
-def test_the_worst_comes_first_and_says_what_to_do(judged):
-    refused = judged(0.4, (FlawName.STICK_SLIP, "doubtful"), (FlawName.TOO_LITTLE_FORCE, "refused"))
+def test_the_worst_comes_first_and_says_what_to_do(judge_stroke):
+    refused = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"), (FlawName.TOO_LITTLE_FORCE, "refused"))
     assert verdict(refused) == "Redo: pressed too lightly. Press harder."
     assert refused.words[1:] == (stroke_quality.LEAVING, "stick slip")
-    doubtful = judged(0.4, (FlawName.STICK_SLIP, "doubtful"))
+    doubtful = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"))
     assert verdict(doubtful).startswith("Redo: pressed less than half as hard")
 
 
-def test_what_no_further_stroke_mends_is_doubted_alone(judged):
-    assert verdict(judged(2.0, (FlawName.HEIGHT_UNKNOWN, "doubtful"))).startswith("Doubtful: height unknown")
-    assert verdict(judged(2.0, (FlawName.LOST_READINGS, "note"))).startswith("Doubtful: readings were lost")
+def test_what_no_further_stroke_mends_is_doubted_alone(judge_stroke):
+    assert verdict(judge_stroke(2.0, (FlawName.HEIGHT_UNKNOWN, "doubtful"))).startswith("Doubtful: height unknown")
+    assert verdict(judge_stroke(2.0, (FlawName.LOST_READINGS, "note"))).startswith("Doubtful: readings were lost")
 
 
 @pytest.mark.parametrize("flaws", [[], [Flaw(FlawName.NO_STROKE, "No stroke at length.", "refused")]])

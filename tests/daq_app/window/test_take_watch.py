@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from session_messages import GOOD, INFO, SCORE, after, logged
+from session_messages import GOOD, INFO, SCORE, after, log
 
 from daq_app.recorder.messages import Live
 from daq_app.window import stroke_quality
@@ -37,16 +37,16 @@ class Pool:
 def test_a_process_that_ended_while_it_waited_for_strokes_is_replaced_at_the_next(monkeypatch):
     pools = [Pool(ended=True), Pool(ended=False)]
     monkeypatch.setattr(stroke_quality, "process_pool", lambda _: pools.pop(0))
-    said, feed = [], LiveFeed()
-    judge = Judge(said.append)
+    messages, feed = [], LiveFeed()
+    judge = Judge(messages.append)
     judge.prepare()
     feed.device(INFO)
     judge.heard(steps.StartTake(1, 1), feed)
     number = np.arange(700)
     feed.add(Live(1, number, number / 100.0, number, np.zeros((700, 6)), number * 0, (0.0,) * 6), Frame())
-    judge.heard(logged("finger_lifted", 1, time=3.6), feed)
+    judge.heard(log("finger_lifted", 1, time=3.6), feed)
     judge.look(feed, after(*SCORE))
-    assert said == [Judged(1, 1, GOOD)]
+    assert messages == [Judged(1, 1, GOOD)]
 
 
 PREPARED = """
@@ -67,10 +67,10 @@ if __name__ == "__main__":
 def test_a_window_that_is_killed_leaves_no_process_behind(tmp_path):
     script = tmp_path / "prepared.py"
     script.write_text(PREPARED)
-    told = tmp_path / "told"
-    with told.open("w") as out:
+    output_file = tmp_path / "told"
+    with output_file.open("w") as out:
         subprocess.run([sys.executable, str(script)], stdout=out, check=False)
-    worker = Path(f"/proc/{int(told.read_text())}")
+    worker = Path(f"/proc/{int(output_file.read_text())}")
     end = time.monotonic() + 60.0  # of a machine that hangs, not of a slow one
     while worker.exists() and time.monotonic() < end:
         time.sleep(0.05)

@@ -17,8 +17,8 @@ from session_messages import (
     TARE,
     TOUCH,
     after,
-    drawn,
-    logged,
+    log,
+    stroke_at,
 )
 
 from daq_app.recorder import messages as m
@@ -28,8 +28,8 @@ from daq_app.window.view_course import KINDS, course_view, inspection, tiles, ve
 from sessions.plan.plan import Visibility
 from sessions.run import steps
 
-DRAWN = drawn(np.arange(3.0))
-KEPT = (logged("scored", 1, score=40.0), logged("take_kept", 1), steps.AskMount(SECOND))
+STROKE = stroke_at(np.arange(3.0))
+KEPT = (log("scored", 1, score=40.0), log("take_kept", 1), steps.AskMount(SECOND))
 
 
 def kinds(*messages):
@@ -41,15 +41,15 @@ def test_each_trial_is_one_tile_with_a_state_of_its_own():
     assert kinds(*SCORE) == ["current", "coming", "coming"]
     assert kinds(*SCORE, Judged(1, 1, GOOD), *KEPT) == ["done", "current", "coming"]
     assert kinds(*SCORE, Judged(1, 1, BAD), *KEPT) == ["flawed", "current", "coming"]
-    assert kinds(*SCORE, logged("skip", 1, reason="torn"), steps.AskMount(SECOND)) == ["skipped", "current", "coming"]
-    again = (*SCORE, logged("take_discarded", 1, reason="a slip"), steps.StartTake(1, 2), Judged(1, 2, GOOD), *KEPT)
+    assert kinds(*SCORE, log("skip", 1, reason="torn"), steps.AskMount(SECOND)) == ["skipped", "current", "coming"]
+    again = (*SCORE, log("take_discarded", 1, reason="a slip"), steps.StartTake(1, 2), Judged(1, 2, GOOD), *KEPT)
     assert kinds(*again) == ["redone", "current", "coming"]
 
 
 def test_no_two_states_share_a_shape_or_words():
     assert len({mark for mark, _ in KINDS.values()}) == len(KINDS)
-    shown = tiles(after(*SCORE, Judged(1, 1, GOOD), *KEPT).session)
-    assert [tile.words for tile in shown[:3]] == [
+    view = tiles(after(*SCORE, Judged(1, 1, GOOD), *KEPT).session)
+    assert [tile.words for tile in view[:3]] == [
         f"trial 1, {FIRST.stimulus.code}: done",
         f"trial 2, {SECOND.stimulus.code}: in hand",
         f"trial 3, {PLAN.trials[2].stimulus.code}: still to come",
@@ -57,84 +57,82 @@ def test_no_two_states_share_a_shape_or_words():
 
 
 def test_an_inspected_trial_says_its_verdict_its_means_and_its_score():
-    judged = replace(GOOD, stroke=DRAWN)
-    shown = inspection(after(*SCORE, Judged(1, 1, judged), *KEPT).session, 1)
-    assert shown.heading == f"Trial 1, {FIRST.stimulus.code}: done, score 40"
-    assert shown.verdict == "Good"
-    assert shown.cells == (("N", "1.23 N"), ("T", "0.50 N"), ("mu", "0.41"), ("speed", "21 mm/s"))
-    assert shown.stroke is DRAWN
+    quality = replace(GOOD, stroke=STROKE)
+    view = inspection(after(*SCORE, Judged(1, 1, quality), *KEPT).session, 1)
+    assert view.heading == f"Trial 1, {FIRST.stimulus.code}: done, score 40"
+    assert view.verdict == "Good"
+    assert view.cells == (("N", "1.23 N"), ("T", "0.50 N"), ("mu", "0.41"), ("speed", "21 mm/s"))
+    assert view.stroke is STROKE
 
 
 def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
-    flawed = FLAW._replace(advice="Slide further, at one speed.")
-    assert verdict(Quality((flawed,))) == "Redo: no steady window. Slide further, at one speed."
+    flaw = FLAW._replace(advice="Slide further, at one speed.")
+    assert verdict(Quality((flaw,))) == "Redo: no steady window. Slide further, at one speed."
     assert verdict(Quality((FLAW._replace(grade="doubtful"),))) == "Doubtful: no steady window."
-    assert verdict(Quality((flawed._replace(grade="note"),))).startswith("Doubtful: no steady window")
-    assert verdict(Quality((flawed._replace(grade="doubtful"),))).startswith("Redo: no steady window. Slide")
+    assert verdict(Quality((flaw._replace(grade="note"),))).startswith("Doubtful: no steady window")
+    assert verdict(Quality((flaw._replace(grade="doubtful"),))).startswith("Redo: no steady window. Slide")
 
 
 @pytest.mark.parametrize(
     ("messages", "number", "why"),
     [
         (SCORE, 2, "Its stroke is still to come."),
-        ((*SCORE, logged("skip", 1, reason="torn")), 1, "It was left out: no stroke of it counts."),
+        ((*SCORE, log("skip", 1, reason="torn")), 1, "It was left out: no stroke of it counts."),
         ((*SCORE, *KEPT), 1, "Its stroke was recorded, and this window has not looked at it"),
     ],
 )
 def test_a_trial_without_a_stroke_says_why(messages, number, why):
-    shown = inspection(after(*messages).session, number)
-    assert shown.verdict.startswith(why)
-    assert shown.stroke is None
-    assert {text for _, text in shown.cells} == {"–"}
+    view = inspection(after(*messages).session, number)
+    assert view.verdict.startswith(why)
+    assert view.stroke is None
+    assert {text for _, text in view.cells} == {"–"}
 
 
 def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
     blind = replace(PLAN, shown=Visibility(experimenter=()))
     begun = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
-    judged = Judged(1, 1, replace(GOOD, stroke=DRAWN))
-    shown = inspection(after(BEGUN[0], begun, *TARE[2:], judged, *KEPT).session, 1)
-    assert shown.verdict == "Forces are not shown in this protocol."
-    assert shown.stroke is None
-    assert "score" not in shown.heading
+    quality = Judged(1, 1, replace(GOOD, stroke=STROKE))
+    view = inspection(after(BEGUN[0], begun, *TARE[2:], quality, *KEPT).session, 1)
+    assert view.verdict == "Forces are not shown in this protocol."
+    assert view.stroke is None
+    assert "score" not in view.heading
 
 
 def test_a_take_that_was_discarded_keeps_its_reason():
-    again = (*SCORE, logged("take_discarded", 1, reason="the finger slipped"), steps.StartTake(1, 2))
+    again = (*SCORE, log("take_discarded", 1, reason="the finger slipped"), steps.StartTake(1, 2))
     assert "discarded: the finger slipped." in inspection(after(*again).session, 1).details
 
 
 def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset():
-    done = (*SCORE, Judged(1, 1, replace(GOOD, stroke=DRAWN)), *KEPT)
+    first_take = (*SCORE, Judged(1, 1, replace(GOOD, stroke=STROKE)), *KEPT)
     again = (
-        logged("redo", 2, reason="mistaken"),
-        logged("take_discarded", 1, take=1, reason="mistaken"),
+        log("redo", 2, reason="mistaken"),
+        log("take_discarded", 1, take=1, reason="mistaken"),
         steps.AskMount(FIRST),
         steps.StartTake(1, 2),
         steps.MeasureZero(),
     )
-    session = after(*done, *again).session
+    session = after(*first_take, *again).session
     view = course_view(session, BenchState(), 0.0)
     assert (view.undo.label, view.undo.key, view.undo.enabled) == ("Undo redo 1", "Ctrl+Z", True)
     assert view.notice.startswith(f"Done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
     undone = (
-        logged("undo_redo", 1),
-        logged("take_discarded", 1, take=2, reason="the redo was undone"),
-        logged("take_restored", 1, take=1),
-        logged("take_kept", 1, take=1),
+        log("undo_redo", 1),
+        log("take_discarded", 1, take=2, reason="the redo was undone"),
+        log("take_restored", 1, take=1),
+        log("take_kept", 1, take=1),
         steps.AskMount(SECOND),
     )
-    before, now = after(*done).session, after(*done, *again, *undone).session
+    before, now = after(*first_take).session, after(*first_take, *again, *undone).session
     assert tiles(now) == tiles(before)
     assert inspection(now, 1).verdict == "Good"
     assert "score 40" in inspection(now, 1).heading
     assert not course_view(now, BenchState(), 0.0).undo.enabled
-    stroked = after(*done, *again, steps.AskStroke(FIRST), logged("contact_onset", 1, time=9.0, noticed=9.0)).session
+    stroked = after(*first_take, *again, steps.AskStroke(FIRST), log("contact_onset", 1, time=9.0, noticed=9.0)).session
     assert not course_view(stroked, BenchState(), 0.0).undo.enabled
 
 
 def test_a_redo_before_the_stroke_or_in_the_middle_of_it_offers_no_undo():
     for so_far in (READY, TOUCH):
-        session = after(
-            *so_far, logged("redo", 1, reason="sneezed"), steps.StartTake(1, 2), steps.MeasureZero()
-        ).session
+        session = after(*so_far, log("redo", 1, reason="sneezed"), steps.StartTake(1, 2), steps.MeasureZero()).session
         assert not course_view(session, BenchState(), 0.0).undo.enabled

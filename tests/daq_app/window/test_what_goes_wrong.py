@@ -60,10 +60,10 @@ def test_the_subject_is_asked_for_nothing_while_no_recorder_takes_the_answer():
 
 
 def test_a_resumption_that_fails_says_why_and_can_be_tried_again():
-    refused = m.Failed("ResumeSession", "nothing answers at 192.168.1.1", "LinkLost")
+    failure = m.Failed("ResumeSession", "nothing answers at 192.168.1.1", "LinkLost")
     state = script.after(*script.SCORE, GONE, RESUME, m.Gone(True, ""))  # as the next recorder starts
     assert derive_view(state).banner is None
-    view = derive_view(script.after(refused, state=state))
+    view = derive_view(script.after(failure, state=state))
     assert "nothing answers at 192.168.1.1" in view.banner.sentence
     assert view.banner.sends == RESUME
     assert view.course.primary.sends == RESUME
@@ -102,20 +102,20 @@ def test_no_mark_of_an_ended_session_is_drawn_on_the_clock_of_the_next_stream():
 
 
 def test_a_session_that_goes_on_begins_without_the_marks_of_the_stream_before():
-    before = (script.logged("take_started", 1, take=1), script.logged("contact_onset", 1, time=1.5, noticed=1.51))
+    before = (script.log("take_started", 1, take=1), script.log("contact_onset", 1, time=1.5, noticed=1.51))
     begun = m.SessionBegun("recordings/P07", script.PLAN, "people", None, 0, 1.0, before)
     assert script.after(m.Device(script.INFO, None), begun).session.marks == ()
 
 
 def test_the_banner_of_a_session_cut_short_blames_the_transducer_only_until_it_answers_again():
-    lost = script.after(*UNPLUGGED)
-    assert "no readings" in derive_view(lost).banner.sentence
-    back = derive_view(script.after(m.LinkBack(script.INFO, True), state=lost)).banner
+    state_after = script.after(*UNPLUGGED)
+    assert "no readings" in derive_view(state_after).banner.sentence
+    back = derive_view(script.after(m.LinkBack(script.INFO, True), state=state_after)).banner
     assert "no readings" not in back.sentence
     assert "answers again" in back.sentence
     assert back.sends == RESUME
     other = m.LinkBack(replace(script.INFO, serial="FT2"), False)
-    assert "FT2" in derive_view(script.after(other, state=lost)).banner.sentence
+    assert "FT2" in derive_view(script.after(other, state=state_after)).banner.sentence
 
 
 def test_a_session_that_its_transducer_ended_never_says_that_it_answers_before_it_does():
@@ -135,7 +135,7 @@ def test_the_subject_reads_what_to_do_on_the_surface_only_when_it_is_time_to_do_
 
 # ---- which trial is done again
 
-KEPT = (*script.SCORE, script.logged("scored", 1, score=38.2), script.logged("take_kept", 1, take=1))
+KEPT = (*script.SCORE, script.log("scored", 1, score=38.2), script.log("take_kept", 1, take=1))
 LAST = script.PLAN.trials[-1]
 
 
@@ -150,7 +150,7 @@ LAST = script.PLAN.trials[-1]
         (
             (
                 *script.READY,
-                script.logged("take_discarded", 1, take=1, reason="a pause"),
+                script.log("take_discarded", 1, take=1, reason="a pause"),
                 steps.AskMount(script.PLAN.trials[0]),
             ),
             None,
@@ -180,14 +180,14 @@ def test_a_flaw_is_the_reason_to_redo_only_the_trial_it_was_found_in():
     flawed = (
         *script.SCORE,
         Judged(1, 1, script.BAD),
-        script.logged("take_kept", 1, take=1),
+        script.log("take_kept", 1, take=1),
         steps.AskMount(script.SECOND),
     )
     assert derive_view(script.after(*flawed)).course.redo.sends == steps.Redo("no steady window")
     third = (
         *flawed,
         steps.StartTake(2, 1),
-        script.logged("take_kept", 2, take=1),
+        script.log("take_kept", 2, take=1),
         steps.AskMount(script.PLAN.trials[2]),
     )
     redo = derive_view(script.after(*third)).course.redo

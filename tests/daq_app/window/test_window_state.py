@@ -23,7 +23,7 @@ from session_messages import (
     TARE,
     TOUCH,
     after,
-    logged,
+    log,
     status,
 )
 
@@ -39,7 +39,7 @@ CUT_SHORT = (*MOUNT, m.SessionEnded("recordings/P07", LOST, True))
 RESUME = m.ResumeSession("recordings/P07")
 
 
-def loaded(load, peak=None):
+def health_report(load, peak=None):
     return m.HealthReport(Health(), 7000.0, load, peak or load, 0)
 
 
@@ -75,8 +75,8 @@ def test_the_plan_shows_what_is_done_in_hand_and_coming():
     messages = (
         *SCORE,
         Judged(1, 1, GOOD),
-        logged("scored", 1, score=38.2),
-        logged("take_kept", 1, take=1),
+        log("scored", 1, score=38.2),
+        log("take_kept", 1, take=1),
         steps.AskMount(SECOND),
     )
     rows = derive_view(after(*messages)).course.rows
@@ -87,10 +87,10 @@ def test_the_plan_shows_what_is_done_in_hand_and_coming():
 
 
 def test_a_skipped_and_an_unanswered_trial_are_told_apart():
-    skipped = (*READY, logged("skip", 1, reason="torn"), logged("take_discarded", 1, take=1, reason="skipped: torn"))
+    skipped = (*READY, log("skip", 1, reason="torn"), log("take_discarded", 1, take=1, reason="skipped: torn"))
     rows = derive_view(after(*skipped, steps.AskMount(SECOND))).course.rows
     assert (rows[1].kind, rows[1].outcome) == ("skipped", "skipped")
-    unanswered = (*SCORE, logged("scored", 1, score=None), logged("take_kept", 1, take=1), steps.AskMount(SECOND))
+    unanswered = (*SCORE, log("scored", 1, score=None), log("take_kept", 1, take=1), steps.AskMount(SECOND))
     rows = derive_view(after(*unanswered)).course.rows
     assert (rows[1].kind, rows[1].outcome) == ("done", "no answer")
 
@@ -98,8 +98,8 @@ def test_a_skipped_and_an_unanswered_trial_are_told_apart():
 def test_a_redone_trial_loses_its_score_and_says_which_take_it_is():
     again = (
         *SCORE,
-        logged("redo", 1, reason="slipped"),
-        logged("take_discarded", 1, take=1, reason="slipped"),
+        log("redo", 1, reason="slipped"),
+        log("take_discarded", 1, take=1, reason="slipped"),
         steps.StartTake(1, 2),
         steps.MeasureZero(),
     )
@@ -184,7 +184,7 @@ def test_a_session_that_has_ended_shows_no_recording():
             Dismissed(),
         ),
         (
-            (m.Device(INFO, None), loaded((0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.9))),
+            (m.Device(INFO, None), health_report((0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.9))),
             "wrong",
             "Fz",
             m.AcknowledgeOverloads(),
@@ -208,10 +208,10 @@ def test_a_calm_bench_shows_no_banner():
 
 
 def test_a_banner_of_a_lost_link_goes_when_the_same_transducer_is_back_and_stays_for_another():
-    lost = after(*MOUNT, m.LinkDown("silent"))
-    assert derive_view(after(m.LinkBack(INFO, True), state=lost)).banner is None
+    link_down = after(*MOUNT, m.LinkDown("silent"))
+    assert derive_view(after(m.LinkBack(INFO, True), state=link_down)).banner is None
     other = replace(INFO, serial="FT2")
-    assert "FT2" in derive_view(after(m.LinkBack(other, False), state=lost)).banner.sentence
+    assert "FT2" in derive_view(after(m.LinkBack(other, False), state=link_down)).banner.sentence
 
 
 def test_an_error_while_saving_ends_the_course_and_puts_the_lamp_to_wrong():
@@ -238,7 +238,7 @@ def test_the_health_lamp_names_what_was_lost():
 
 def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_still_come_back():
     def shown(silence, *session):
-        report = structs.replace(loaded((0.1,) * 7), silence=silence)
+        report = structs.replace(health_report((0.1,) * 7), silence=silence)
         return derive_view(after(m.Device(INFO, None), *session, report))
 
     quiet, silent = shown(0.9, *TOUCH), shown(2.2, *TOUCH)
@@ -253,7 +253,7 @@ def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_st
 
 
 def test_an_overload_stays_until_somebody_acknowledges_it():
-    state = after(m.Device(INFO, None), loaded((0.1,) * 6 + (0.2,), (0.1, 0.1, 0.4, 0.1, 0.1, 0.9, 1.3)))
+    state = after(m.Device(INFO, None), health_report((0.1,) * 6 + (0.2,), (0.1, 0.1, 0.4, 0.1, 0.1, 0.9, 1.3)))
     bench = derive_view(state).bench
     [combined] = [bar for bar in bench.bars if bar.name == "combined"]
     assert (combined.share, combined.peak, combined.over) == (0.2, 1.3, True)
@@ -265,7 +265,11 @@ def test_an_overload_stays_until_somebody_acknowledges_it():
 
 def test_what_was_acknowledged_does_not_come_back_with_a_report_that_was_on_its_way():
     state = after(
-        m.Device(INFO, None), loaded((1.4,) * 7), m.AcknowledgeOverloads(), loaded((1.4,) * 7), loaded((0.2,) * 7)
+        m.Device(INFO, None),
+        health_report((1.4,) * 7),
+        m.AcknowledgeOverloads(),
+        health_report((1.4,) * 7),
+        health_report((0.2,) * 7),
     )
     assert not derive_view(state).bench.can_acknowledge
 
@@ -287,7 +291,7 @@ def test_a_tare_shows_its_figures_in_newtons_and_how_far_the_zero_has_moved_sinc
     assert bench.drift == "first zero"
     assert bench.bars[0].noise == "4.0 mN"
     assert bench.bars[3].noise == "0.050 N mm"
-    second = logged("zeroed", 1, mean=[14e3, -7e3, -1e3, 0.0, 0.0, 0.0], spread=[4e3] * 6, readings=100, duration=0.5)
+    second = log("zeroed", 1, mean=[14e3, -7e3, -1e3, 0.0, 0.0, 0.0], spread=[4e3] * 6, readings=100, duration=0.5)
     assert derive_view(after(m.Device(INFO, None), first, second)).bench.drift == "6 mN since the first"
 
 
@@ -310,11 +314,11 @@ def test_a_simulated_bench_is_said_to_be_simulated_before_a_session_begins():
 
 @pytest.mark.parametrize("messages", [BEGUN, MOUNT, TARE, READY, TOUCH, SCORE, PAUSED, CLOSING])
 def test_nothing_the_subject_sees_gives_the_stimulus_away(messages):
-    shown = repr(derive_view(after(*messages)).subject)
+    text = repr(derive_view(after(*messages)).subject)
     for trial in PLAN.trials:
-        assert trial.stimulus.code not in shown
+        assert trial.stimulus.code not in text
     indices = {str(trial.stimulus.index) for trial in PLAN.trials} - {"0"}
-    assert not any(word.strip("(),'") in indices for word in shown.replace("=", " ").split())
+    assert not any(word.strip("(),'") in indices for word in text.replace("=", " ").split())
 
 
 def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
@@ -328,17 +332,17 @@ def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
 def test_the_subject_sees_how_hard_it_presses_only_where_the_protocol_says_so():
     assert not derive_view(after(*READY)).subject.force
     plan = replace(PLAN, shown=Visibility(subject=("instruction", "forces")))
-    told = [structs.replace(said, plan=plan) if isinstance(said, m.SessionBegun) else said for said in READY]
-    assert derive_view(after(*told)).subject.force
+    messages = [structs.replace(r, plan=plan) if isinstance(r, m.SessionBegun) else r for r in READY]
+    assert derive_view(after(*messages)).subject.force
 
 
 def test_a_session_that_goes_on_shows_what_was_done_before():
     before = (
-        logged("take_started", 1, take=1),
-        logged("scored", 1, score=40.0),
-        logged("take_kept", 1, take=1),
-        logged("take_started", 2, take=1),
-        logged("take_discarded", 2, take=1, reason="cut short"),
+        log("take_started", 1, take=1),
+        log("scored", 1, score=40.0),
+        log("take_kept", 1, take=1),
+        log("take_started", 2, take=1),
+        log("take_discarded", 2, take=1, reason="cut short"),
     )
     begun = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
     rows = derive_view(after(m.Device(INFO, None), begun, steps.AskMount(SECOND))).course.rows

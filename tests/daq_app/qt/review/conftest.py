@@ -12,10 +12,10 @@ from tests.sessions.report_example import example
 
 @pytest.fixture(scope="module")
 def one_window(application):
-    made = AnalystWindow(SESSION, LIGHT, Nobody())
-    made.show()
-    yield made
-    made.close()
+    window = AnalystWindow(SESSION, LIGHT, Nobody())
+    window.show()
+    yield window
+    window.close()
     application.processEvents()
 
 
@@ -27,5 +27,5 @@ def window(one_window):
     one_window.model.tabs.setCurrentIndex(0)
     one_window.take(m.ReportReady("predicted", example()))
     one_window.take(m.Idle())
-    one_window._work.asked.clear()
+    one_window._work.requests.clear()
     return one_window

@@ -19,13 +19,13 @@ class Nobody:
     """Work that is never done; what was asked for is kept."""
 
     def __init__(self):
-        self.asked = []
+        self.requests = []
 
     def poll(self):
         return ()
 
-    def ask(self, asked):
-        self.asked.append(asked)
+    def ask(self, request):
+        self.requests.append(request)
 
     def close(self):
         """Do nothing."""
@@ -49,8 +49,8 @@ PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]),
 
 
 def film(**more):
-    told = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 1.0, 0.1, 3, i) for i in range(4)]
-    return Film(PARTS, tuple(frame(0.001 * i) for i in range(4)), tuple(told), ARCS, **more)
+    instants = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 1.0, 0.1, 3, i) for i in range(4)]
+    return Film(PARTS, tuple(frame(0.001 * i) for i in range(4)), tuple(instants), ARCS, **more)
 
 
 def raw(stroke, n=50):
@@ -60,8 +60,8 @@ def raw(stroke, n=50):
     return RawReadings("here", "counts", block, time_s, time_s, "zero")
 
 
-def drag(application, widget, begin, end, held=Qt.KeyboardModifier.NoModifier):
-    QTest.mousePress(widget, Qt.MouseButton.LeftButton, held, begin)
+def drag(application, widget, begin, end, modifier=Qt.KeyboardModifier.NoModifier):
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, modifier, begin)
     QTest.mouseMove(widget, end)
     application.processEvents()
-    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, held, end)
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, modifier, end)

@@ -40,7 +40,7 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(w
     window.trials._point_clicked(None, [spot])
     assert window.trials.list.currentRow() == point.row
     assert window.stroke.stroke.accessibleName().endswith(f"stroke {selected_row(window.state).stroke.number}")
-    assert m.Choose(point.row) in window._work.asked
+    assert m.Choose(point.row) in window._work.requests
 
 
 def test_a_session_without_strokes_says_so_and_where_its_answers_are(window):
@@ -54,24 +54,24 @@ def test_a_session_without_strokes_says_so_and_where_its_answers_are(window):
 
 def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_among_the_numbers(window):
     report = example()
-    pressures = {said.stroke: -0.001 * at for at, said in enumerate(report.predictions, 1)}  # [MPa]
-    told = (replace(said, responses={"pressure": (pressures[said.stroke], 2e-7)}) for said in report.predictions)
-    window.take(m.ReportReady("predicted", replace(report, predictions=tuple(told))))
+    pressures = {prediction.stroke: -0.001 * at for at, prediction in enumerate(report.predictions, 1)}  # [MPa]
+    predictions = (replace(p, responses={"pressure": (pressures[p.stroke], 2e-7)}) for p in report.predictions)
+    window.take(m.ReportReady("predicted", replace(report, predictions=tuple(predictions))))
     responses = window.trials.responses
     responses.setCurrentText("pressure [kPa]")
     responses.activated.emit(responses.currentIndex())
-    listed = rows(window.state)
+    table = rows(window.state)
     assert [point.response for point in points(window.state)] == pytest.approx(
-        [1e3 * pressures[listed[point.row].stroke.number] for point in points(window.state)]
+        [1e3 * pressures[table[point.row].stroke.number] for point in points(window.state)]
     )
     assert sorted(spot.pos().y() for spot in window.trials.points.points()) == sorted(
         point.response for point in points(window.state)
     )
-    row = next(at for at, line in enumerate(listed) if line.stroke is not None and line.stroke.number in pressures)
+    row = next(at for at, line in enumerate(table) if line.stroke is not None and line.stroke.number in pressures)
     window.take(m.Choose(row))
-    shown = f"{abs(1e3 * pressures[listed[row].stroke.number]):.3f}"
-    name = f"pressure {condition(report, listed[row].prediction)}, averaged over the ending"
-    assert dict(numbers(window.state))[name].startswith(f"−{shown} kPa ± ")
+    text = f"{abs(1e3 * pressures[table[row].stroke.number]):.3f}"
+    name = f"pressure {condition(report, table[row].prediction)}, averaged over the ending"
+    assert dict(numbers(window.state))[name].startswith(f"−{text} kPa ± ")
     assert dict(numbers(window.state))[name].endswith(" % by the mesh; model: no estimate")
     responses.setCurrentIndex(0)
     responses.activated.emit(0)
@@ -83,17 +83,17 @@ def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_m
     assert len(texts(table)) == len(window.state.report.strokes)
     table.go_to(3)
     assert window.state.row == 3
-    said = selected_row(window.state).prediction
+    prediction = selected_row(window.state).prediction
     cells = {name: value for name, value, _ in texts(window.model.scene)}
-    assert cells["µ of this trial"] == f"{said.mu:.4f}"
-    assert cells["indentation"] == f"{said.indentation:.3g} mm"
+    assert cells["µ of this trial"] == f"{prediction.mu:.4f}"
+    assert cells["indentation"] == f"{prediction.indentation:.3g} mm"
 
 
 def test_a_click_on_the_head_sorts_by_value_and_a_line_still_chooses_its_trial(window):
     table = window.stroke.friction
     table.sortByColumn(2, Qt.SortOrder.AscendingOrder)
-    shown = [float(line[2]) for line in texts(table)]
-    assert shown == sorted(shown)
+    values = [float(line[2]) for line in texts(table)]
+    assert values == sorted(values)
     least = min(window.state.report.strokes, key=lambda stroke: stroke.mu_dynamic)
     table.setCurrentIndex(table.model().index(0, 0))
     assert selected_row(window.state).stroke.number == least.number
@@ -116,10 +116,10 @@ def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model
     effects = (Fact("viscosity", "below 0.01 to 4 % of the SED"), Fact("warning", "99 mm"), Fact("bone", "2 %"))
     report = replace(example(), model="small strain, settled sliding, τ max mean", left_out=effects)
     window.take(m.ReportReady("predicted", report))
-    [said] = [row.prediction for row in rows(window.state)[:1]]
-    condition = f"SED at {said.indentation:.3g} mm, small strain"
-    error = f"{1000 * said.sed:.3f} kPa ± 0.1 % by the mesh; model: viscosity below 0.01 to 4 % of the SED"
-    assert said.error_estimate == pytest.approx(0.001)
+    [prediction] = [row.prediction for row in rows(window.state)[:1]]
+    condition = f"SED at {prediction.indentation:.3g} mm, small strain"
+    error = f"{1000 * prediction.sed:.3f} kPa ± 0.1 % by the mesh; model: viscosity below 0.01 to 4 % of the SED"
+    assert prediction.error_estimate == pytest.approx(0.001)
     assert f"{condition} {error}" in finger_words(window.state)
     assert dict(numbers(window.state))[f"{condition}, averaged over the ending"] == error
     assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
@@ -144,28 +144,28 @@ def test_the_wheel_zooms_a_stroke_and_home_or_a_double_click_shows_all_of_it_aga
     plot = view._plots[0]
     whole = plot.getPlotItem().getViewBox().viewRange()[0]
 
-    def shown():
+    def view_range():
         application.processEvents()
         return plot.getPlotItem().getViewBox().viewRange()[0]
 
     def zoom():
         plot.getPlotItem().getViewBox().scaleBy((0.2, 0.2))
-        assert shown() != pytest.approx(whole)
+        assert view_range() != pytest.approx(whole)
 
     zoom()
     window.take(m.Idle())
-    assert shown() != pytest.approx(whole)  # news of something else leaves the zoom
+    assert view_range() != pytest.approx(whole)  # news of something else leaves the zoom
     QTest.keyClick(window, Qt.Key.Key_Home)
-    assert shown() == pytest.approx(whole)
+    assert view_range() == pytest.approx(whole)
     zoom()
     QTest.mouseDClick(plot.viewport(), Qt.MouseButton.LeftButton)
-    assert shown() == pytest.approx(whole)
+    assert view_range() == pytest.approx(whole)
 
 
 def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
     window.take(m.Step(0.5, "predicting"))
     window.stop.click()
-    assert window._work.asked[-1] == m.Stop()
+    assert window._work.requests[-1] == m.Stop()
     window.take(m.Cancelled())
     assert "kept" in window.state.outcome
     assert window.trials.list.count() == len(rows(window.state))
@@ -179,11 +179,11 @@ def test_an_edge_is_moved_by_keys_and_recorded_with_enter(window):
     handle.setFocus()
     QTest.keyClick(handle, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
     QTest.keyClick(handle, Qt.Key.Key_Left)
-    assert not any(isinstance(asked, m.Move) for asked in window._work.asked)
+    assert not any(isinstance(request, m.Move) for request in window._work.requests)
     QTest.keyClick(handle, Qt.Key.Key_Return)
-    moved = window._work.asked[-1]
-    assert (moved.stroke, moved.edge, moved.by, moved.why) == (stroke.number, "steady begin", "E02", "a ramp")
-    assert moved.time == pytest.approx(stroke.steady[0] + 0.045)
+    move = window._work.requests[-1]
+    assert (move.stroke, move.edge, move.by, move.why) == (stroke.number, "steady begin", "E02", "a ramp")
+    assert move.time == pytest.approx(stroke.steady[0] + 0.045)
 
 
 def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes_a_key_back(
@@ -205,11 +205,11 @@ def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes
     for place in places[1:]:
         QTest.mouseMove(mouse, place)
         application.processEvents()
-    assert not any(isinstance(asked, m.Move) for asked in window._work.asked)
+    assert not any(isinstance(request, m.Move) for request in window._work.requests)
     QTest.mouseRelease(mouse, Qt.MouseButton.LeftButton, pos=places[-1])
-    moved = window._work.asked[-1]
+    move = window._work.requests[-1]
     pixel = box.viewPixelSize()[0]
-    assert (moved.edge, moved.time) == ("steady begin", pytest.approx(stroke.steady[0] + 0.2, abs=2 * pixel))
+    assert (move.edge, move.time) == ("steady begin", pytest.approx(stroke.steady[0] + 0.2, abs=2 * pixel))
     window.take(m.Problem("The disk is full."))  # it was not recorded: the edge goes back
     assert line.value() == pytest.approx(stroke.steady[0] - stroke.trace.origin)
     handle = view.handles["onset"]
@@ -242,23 +242,23 @@ def test_the_words_of_edges_that_are_close_together_are_read_as_those_of_edges_a
 
 
 def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
-    held, bar = Qt.KeyboardModifier.ControlModifier, window.stroke.decisions
+    control, bar = Qt.KeyboardModifier.ControlModifier, window.stroke.decisions
     assert not bar.undo.isEnabled()
-    QTest.keyClick(window, Qt.Key.Key_Z, held)
-    assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
+    QTest.keyClick(window, Qt.Key.Key_Z, control)
+    assert not any(isinstance(request, m.Undo) for request in window._work.requests)
     window.take(
         m.ReportReady(
             "predicted", example(), m.History(("onset of trial 1", "lift of trial 2"), ("steady of trial 3",))
         )
     )
-    assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
+    assert not any(isinstance(request, m.Undo) for request in window._work.requests)
     assert bar.undo.accessibleName() == "undo lift of trial 2, Ctrl+Z"
     assert bar.redo.accessibleName() == "redo steady of trial 3, Ctrl+Shift+Z"
-    QTest.keyClick(window, Qt.Key.Key_Z, held)
+    QTest.keyClick(window, Qt.Key.Key_Z, control)
     window.take(m.ReportReady("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
     assert bar.redo.accessibleName() == "redo lift of trial 2, Ctrl+Shift+Z"
-    QTest.keyClick(window, Qt.Key.Key_Z, held | Qt.KeyboardModifier.ShiftModifier)
-    assert [asked.again for asked in window._work.asked if isinstance(asked, m.Undo)] == [False, True]
+    QTest.keyClick(window, Qt.Key.Key_Z, control | Qt.KeyboardModifier.ShiftModifier)
+    assert [request.again for request in window._work.requests if isinstance(request, m.Undo)] == [False, True]
 
 
 def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, window):
@@ -305,13 +305,13 @@ def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
     way.activateWindow()
     way.setFocus()
     application.processEvents()
-    followed = []
-    way.followed.connect(followed.append)
+    links = []
+    way.followed.connect(links.append)
     for _ in range(6):
         QTest.keyClick(way, Qt.Key.Key_Tab)
         QTest.keyClick(way, Qt.Key.Key_Return)
     way.close()
-    assert followed == ["session", "trial", "prediction", "friction", "window", "readings"]
+    assert links == ["session", "trial", "prediction", "friction", "window", "readings"]
 
 
 def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window):
@@ -329,17 +329,17 @@ def test_a_second_session_is_shown_beside_the_first(window):
     table = window.model.compared.table
     assert len(texts(table)) == len({(p.experiment, p.index) for p in window.state.report.predictions})
     assert {line[3] for line in texts(table)} == {"+0.000"}
-    assert m.Draw("compared") in window._work.asked
+    assert m.Draw("compared") in window._work.requests
 
 
 def test_the_comparison_follows_a_decision_that_changes_the_first_session(window):
     report = example()
     window.take(m.Compared("other", report))
-    asked = window._work.asked.count(m.Draw("compared"))
-    moved = tuple(replace(said, mu=said.mu + 0.1) for said in report.predictions)
-    window.take(m.ReportReady("predicted", replace(report, predictions=moved)))
+    count = window._work.requests.count(m.Draw("compared"))
+    predictions = tuple(replace(prediction, mu=prediction.mu + 0.1) for prediction in report.predictions)
+    window.take(m.ReportReady("predicted", replace(report, predictions=predictions)))
     assert {line[3] for line in texts(window.model.compared.table)} == {"−0.100"}
-    assert window._work.asked.count(m.Draw("compared")) == asked + 1
+    assert window._work.requests.count(m.Draw("compared")) == count + 1
 
 
 def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(window):
@@ -353,23 +353,23 @@ def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(windo
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):
     window.take(m.Filmed(selected_row(window.state).key, film()))
-    found = [w for kind in CONTROLS for w in window.findChildren(kind)]
-    controls = [w for w in found if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
+    widgets = [w for kind in CONTROLS for w in window.findChildren(kind)]
+    controls = [w for w in widgets if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
     ours = [w for w in controls if w.parent().metaObject().className() != "QTabBar"]
     assert [w for w in ours if not w.accessibleName().strip()] == []
     window.activateWindow()
     window.trials.list.setFocus()
-    seen = set()
+    reached = set()
     for _ in range(80):
         focused = window.focusWidget()
-        seen.add(focused)
+        reached.add(focused)
         window.focusNextChild()
     QTest.keyClick(window, Qt.Key.Key_F1)
     assert window.keys.isVisible()
     QTest.keyClick(window, Qt.Key.Key_Escape)
     assert not window.keys.isVisible()
     reachable = [w for w in ours if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus]
-    assert [w.accessibleName() for w in reachable if w not in seen] == []
+    assert [w.accessibleName() for w in reachable if w not in reached] == []
 
 
 def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(application, window):

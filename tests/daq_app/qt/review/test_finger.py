@@ -24,7 +24,7 @@ from tests.sessions.report_example import example
 def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     key = selected_row(window.state).key
     window.model.history.click()
-    assert window._work.asked[-1] == m.ShowHistory(key)
+    assert window._work.requests[-1] == m.ShowHistory(key)
     window.take(m.Filmed(key, film()))
     player, canvas = window.model.player, window.model.finger
     assert "Step 4 of 4" in canvas.accessibleName()
@@ -86,7 +86,7 @@ def test_a_drag_moves_the_finger_and_the_next_step_of_its_history_leaves_it_ther
 
 def test_a_line_is_drawn_moved_and_taken_away_by_keys(application, window):
     canvas, _ = small_finger(application, window)
-    view, press = canvas.view(), lambda key, held: QTest.keyClick(canvas, key, held)
+    view, press = canvas.view(), lambda key, modifier: QTest.keyClick(canvas, key, modifier)
     for _ in range(5):
         press(Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
     press(Qt.Key.Key_Up, Qt.KeyboardModifier.ControlModifier)
@@ -180,20 +180,20 @@ def test_how_far_a_failed_solve_came_is_asked_for_without_being_told(window):
     window.take(m.ReportReady("predicted", replace(report, predictions=(first, *report.predictions[1:]))))
     at = next(i for i, row in enumerate(rows(window.state)) if row.prediction is first)
     window.ask(m.Choose(at))
-    assert m.ShowHistory(rows(window.state)[at].key) in window._work.asked
+    assert m.ShowHistory(rows(window.state)[at].key) in window._work.requests
     assert "It wedges." in window.model.finger.accessibleName()
 
 
 def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_formats(window, monkeypatch):
-    assert not any(isinstance(asked, m.Draw) for asked in window._work.asked)
+    assert not any(isinstance(request, m.Draw) for request in window._work.requests)
     window.model.tabs.setCurrentIndex(1)
-    assert [asked.name for asked in window._work.asked if isinstance(asked, m.Draw)] == ["course"]
+    assert [request.name for request in window._work.requests if isinstance(request, m.Draw)] == ["course"]
     window.take(m.Drawn("course", "forces", window.grab().toImage() and b"\x89PNG"))
     monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: ("out/picture", ""))
-    for made in window.model.picture.save.buttons:
-        made.click()
-    written = [asked for asked in window._work.asked if isinstance(asked, m.Write)]
-    assert [(one.what, one.path) for one in written] == [
+    for button in window.model.picture.save.buttons:
+        button.click()
+    requests = [request for request in window._work.requests if isinstance(request, m.Write)]
+    assert [(write.what, write.path) for write in requests] == [
         ("picture course", f"out/picture.{ending}") for ending in ("svg", "png", "csv")
     ]
 
@@ -203,21 +203,21 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
     window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
     field, canvas = FIELD_CHOICES[-1], window.model.finger
     monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
-    for made in window.model.save.buttons:
-        made.click()
+    for button in window.model.save.buttons:
+        button.click()
         assert window._words.accessibleName().startswith("Saved: ")
-    assert not any(isinstance(asked, m.Write) for asked in window._work.asked)
-    with Image.open(tmp_path / "u.png") as written:
-        assert written.size == (2 * canvas.width(), 2 * canvas.size_with(window.model._head()).height())
-        assert written.height > 2 * canvas.height() + 2 * canvas.fontMetrics().height()
+    assert not any(isinstance(request, m.Write) for request in window._work.requests)
+    with Image.open(tmp_path / "u.png") as image:
+        assert image.size == (2 * canvas.width(), 2 * canvas.size_with(window.model._head()).height())
+        assert image.height > 2 * canvas.height() + 2 * canvas.fontMetrics().height()
     assert "SIMULATED" in (tmp_path / "u.svg").read_text()
     head, errors, words, names, *numbers = (tmp_path / "u.csv").read_text().splitlines()
     assert (head[:11], names) == ("# SIMULATED", f"x [mm],y [mm],{field.axis}")
     assert errors == f"# {FIELD_ERRORS}"
     assert "at small strain; mesh, model: no estimate" in words
-    shown = canvas.frame
+    state = canvas.frame
     table = np.array([line.split(",") for line in numbers], float)
-    np.testing.assert_allclose(table, np.column_stack([shown.nodes, field.of(shown)]), rtol=1e-8)
+    np.testing.assert_allclose(table, np.column_stack([state.nodes, field.of(state)]), rtol=1e-8)
     monkeypatch.setattr(
         "daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "none" / "u"), "")
     )
@@ -235,9 +235,9 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     window.model.write_film(tmp_path / "film.gif")
     until(application, lambda: "Saved" in window._words.accessibleName())
     window.model._show_step = show
-    with Image.open(tmp_path / "film.gif") as written:
-        assert (written.n_frames, written.info["duration"]) == (4, 100)
-        assert written.size == window.model.finger.size_with(window.model._head()).toTuple()
+    with Image.open(tmp_path / "film.gif") as image:
+        assert (image.n_frames, image.info["duration"]) == (4, 100)
+        assert image.size == window.model.finger.size_with(window.model._head()).toTuple()
     assert len(ranges) == 1
     assert "Step 4 of 4" in window.model.finger.accessibleName()
 
@@ -247,7 +247,7 @@ def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, wind
     window.model.write_film(tmp_path / "film.mp4")
     until(application, lambda: "Saved" in window._words.accessibleName())
     width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._head()).toTuple())
-    read = [
+    command = [
         imageio_ffmpeg.get_ffmpeg_exe(),
         "-i",
         str(tmp_path / "film.mp4"),
@@ -257,9 +257,9 @@ def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, wind
         "rgb24",
         "-",
     ]
-    done = subprocess.run(read, capture_output=True, check=True)
-    assert re.search(rf"Video: h264.*{width}x{height}.* 10 fps", done.stderr.decode())
-    pictures = np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
+    process = subprocess.run(command, capture_output=True, check=True)
+    assert re.search(rf"Video: h264.*{width}x{height}.* 10 fps", process.stderr.decode())
+    pictures = np.frombuffer(process.stdout, np.uint8).reshape(-1, height, width, 3)
     assert len(pictures) == 4
     assert np.std(pictures[-1]) > 10.0  # there is something to see
 
@@ -298,8 +298,8 @@ def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(a
     assert abs(first.width() - second.width()) <= 1
     assert second.accessibleName().startswith("B  later")
     wheel(application, second.viewport(), QPoint(60, 90), 2)
-    shown = [(canvas.view().x, canvas.view().y, canvas.view().per_mm) for canvas in (first, second)]
-    assert shown[0] == pytest.approx(shown[1], rel=0.01)  # one may be a pixel wider
+    views = [(canvas.view().x, canvas.view().y, canvas.view().per_mm) for canvas in (first, second)]
+    assert views[0] == pytest.approx(views[1], rel=0.01)  # one may be a pixel wider
     assert first.look.range == second.look.range
     drag(application, first.viewport(), QPoint(60, 90), QPoint(90, 90), Qt.KeyboardModifier.ShiftModifier)
     assert second.sight.line == first.sight.line is not None
@@ -314,25 +314,25 @@ def test_the_pointer_over_one_finger_reads_both(application, window):
     inside = QPointF(*first.view().to_screen(np.array([[0.2, 0.2]]))[0]).toPoint()
     QTest.mouseMove(first.viewport(), inside)
     application.processEvents()
-    said = window.model.probe.accessibleName().split("  |  ")
-    assert [words.split(" · ")[0] for words in said] == ["SED 2 kPa", "SED 3 kPa"]
+    readings = window.model.probe.accessibleName().split("  |  ")
+    assert [words.split(" · ")[0] for words in readings] == ["SED 2 kPa", "SED 3 kPa"]
 
 
 def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
     two_fingers(application, window)
     plot = window.model.plot
     plot.source.setCurrentIndex(0)
-    (_, own), (_, others) = plot.values
-    np.testing.assert_allclose(others, 1.5 * own)
+    (_, own), (_, second) = plot.values
+    np.testing.assert_allclose(second, 1.5 * own)
     assert plot._read(1.0) == "1.000 mm · A 2 kPa   1.000 mm · B 3 kPa"
 
 
 def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
     row = selected_row(window.state)
     window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
-    gone = row.prediction.experiment, row.prediction.index
-    rest = tuple(p for p in example().predictions if (p.experiment, p.index) != gone)
-    window.take(m.Compared("other", replace(example(), session="later", predictions=rest)))
+    missing = row.prediction.experiment, row.prediction.index
+    remaining = tuple(p for p in example().predictions if (p.experiment, p.index) != missing)
+    window.take(m.Compared("other", replace(example(), session="later", predictions=remaining)))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
     assert window.model.other.accessibleName() == "B  later has no answer to this stimulus."

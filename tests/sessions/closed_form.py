@@ -9,6 +9,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.bootstrap import BootstrapSettings
 from sessions.strokes.settings import AnalysisSettings
 
 HEIGHT = 12.0  # [mm]
@@ -17,6 +18,7 @@ CALIBRATION = Calibration("made", "N, N mm", np.eye(6), np.array([36.0] * 3 + [5
 COUNTS = Calibration("made", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([36.0] * 3 + [500.0] * 3), "made")
 INFO = TransducerInfo("made:", "made", "closed form", "made", True, 200.0, 7000.0, CALIBRATION, {})
 SETTINGS = AnalysisSettings()
+GAINS_ALONE = BootstrapSettings(repeats=20000, gain_error=0.02, cross_talk=0.0, tilt_error=(0.0, 0.0))
 
 
 def times(duration=4.0, rate=200.0):
@@ -35,7 +37,7 @@ def wrench(t, normal, ratio, along, *, direction=1, across=0.0, height=HEIGHT):
     return np.column_stack([fx, fy, fz, across * fz - height * fy, height * fx - along * fz, along * fy - across * fx])
 
 
-def stroke(t, *, mu=0.5, newtons=2.0, speed=25.0, direction=1, begin=1.0, end=3.0):
+def slide(t, *, mu=0.5, newtons=2.0, speed=25.0, direction=1, begin=1.0, end=3.0):
     """Return the wrench of one plain stroke: touch, slide at once, lift."""
     along = direction * (speed * (np.clip(t, begin, end) - begin) - speed * (end - begin) / 2)
     return wrench(t, trapezium(t, begin, end, 0.1, newtons), mu * np.ones_like(t), along, direction=direction)
@@ -56,10 +58,10 @@ def to_and_fro(t, *, mu=0.5, newtons=2.0, speed=25.0, begin=1.0, end=7.0, ways=4
     return wrench(t, trapezium(t, begin, end, 0.1, newtons), ratio, along)
 
 
-def felt(clean, seed=0, offset=None):
+def noisy(clean, seed=0, offset=None):
     """Return a wrench with white noise of the usual size, and an offset (6,)."""
-    noisy = clean + np.random.default_rng(seed).standard_normal(clean.shape) * NOISE
-    return noisy if offset is None else noisy + offset
+    with_noise = clean + np.random.default_rng(seed).standard_normal(clean.shape) * NOISE
+    return with_noise if offset is None else with_noise + offset
 
 
 def block(t, raw, *, sequence=None, status=None):
@@ -79,7 +81,7 @@ def plan(trials=(), frame=None):
     return SessionPlan("made", "S1", 0, "given", blocks, forces=True, frame=frame)
 
 
-def analysed(readings, *, of=None, frame=None, info=INFO, settings=SETTINGS):
+def analyse(readings, *, of=None, frame=None, info=INFO, settings=SETTINGS):
     """Return the analysis of a block: of a trial, or of a recording without trials."""
     return analyse_blocks([(of, readings)], plan([of] if of else [], frame), info, settings)
 
@@ -94,4 +96,4 @@ def with_info(**changes):
 
 T = times()  # [s]
 N = trapezium(T, 1.0, 3.0, 0.1, 2.0)  # [N] of the plain stroke
-PLAIN = stroke(T)
+PLAIN = slide(T)

@@ -12,27 +12,27 @@ from solver import Friction, Loading, Material, Materials, Scene, Solve, solve_m
 LAYERS = ("epidermis", "dermis", "fat")
 PUBLISHED = np.array([0.136, 0.08, 0.034])  # [MPa], the paper's Table 3
 SPREAD = float(np.log(2.0))  # standard deviation of each log stiffness in the prior
-TAKEN = np.geomspace(0.05, 1.8, 20)  # depths at which a planted finger is solved [mm]
+DEPTHS = np.geomspace(0.05, 1.8, 20)  # depths at which a planted finger is solved [mm]
 
 
 def published():
     return Scene(friction=Friction(0.0), loading=Loading(1.0))
 
 
-def law(stiffness, mu=0.0, depths=TAKEN):
+def law(stiffness, mu=0.0, depths=DEPTHS):
     """Return N(depth) [N] of a finger with layers of a stiffness (3,) [MPa], as the solver has it."""
-    made = {name: Material(float(e), 0.48) for name, e in zip(LAYERS, stiffness, strict=True)}
+    layers = {name: Material(float(e), 0.48) for name, e in zip(LAYERS, stiffness, strict=True)}
     scenes = [
         replace(
             published(),
-            materials=replace(Materials(), **made),
+            materials=replace(Materials(), **layers),
             friction=Friction(mu),
             loading=Loading(float(depth), "none" if mu else "+x"),
             solve=Solve(tolerance=0.0005, evidence="quick"),
         )
         for depth in depths
     ]
-    force = [15.0 * one.normal_force for one in solve_many(scenes)]
+    force = [15.0 * prediction.normal_force for prediction in solve_many(scenes)]
     line = CubicSpline(np.log(depths), np.log(force))
     return lambda depth: np.where(depth > 0.01, np.exp(line(np.log(np.maximum(depth, 0.01)))), 0.0)
 

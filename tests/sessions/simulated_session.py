@@ -33,8 +33,8 @@ class Session:
 
 def once(*events):
     """Answer with `events` the first time, as usual afterwards."""
-    left = [list(events)]
-    return lambda _: left.pop() if left else None
+    queue = [list(events)]
+    return lambda _: queue.pop() if queue else None
 
 
 def resume(folder, **transducer):
@@ -44,10 +44,10 @@ def resume(folder, **transducer):
     last = recording.last_block()
     now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
     clock, gap = continue_clock(recording, last, SimulatedClock(5_000), now.astimezone(UTC))
-    told = SimulatedClock(clock.now_ns())
-    device = StandIn(told, **transducer)
+    simulated_clock = SimulatedClock(clock.now_ns())
+    device = StandIn(simulated_clock, **transducer)
     at = resumption(recording.plan, recording.events)
-    writer = SessionWriter.open(folder, told)
+    writer = SessionWriter.open(folder, simulated_clock)
     resumed = Continuation(at, resumed_data(gap, device.info, {}), last)
-    end = run_session(recording.plan, writer, Hands(told, device), device, resumed=resumed)
+    end = run_session(recording.plan, writer, Hands(simulated_clock, device), device, resumed=resumed)
     return end, Recording.open(folder)
