@@ -273,10 +273,8 @@ def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     """Raise NoSteadyState where the branch ends far below the friction of `load`.
 
     For a coarse mesh without a state, or with folded skin: a failing fine mesh costs more than following the branch.
-    Nothing is raised where the branch ends so near that another mesh may have the state, or where friction is steep.
+    Nothing is raised where the branch ends so near that another mesh may have the state.
     """
-    if load.mu > STEEP:
-        return
     with suppress(NotConverged):
         proof = _reach_towards(scene, load)
         if proof.limited and not proof.lost and proof.value < PROOF.far * load.mu:
