@@ -13,9 +13,7 @@ from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallM
 from solver.verification.request import LeftOut, Request, clock, median_time, repetitions, rows_within
 from solver.verification.truth import JUDGED, Truth, cases, known_truths
 
-MESHES: dict[
-    Kinematics, tuple[float, ...]
-] = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,480 to 11,000 where meshes follow the contact
+MESHES: dict[Kinematics, tuple[float, ...]] = {  # elements to a tip radius
     "small": (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
     "finite": (5.5, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
 }
