@@ -53,7 +53,8 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     )
     lines = row.words.text().split("\n")
     assert lines[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
-    assert lines[2].startswith(f"Noise: {1000 * max(zero.noise[:3]):.2g} mN")
+    shown, unit = lines[2].removeprefix("Noise: ").split(",")[0].split()
+    assert (float(shown), unit) == (float(f"{1000 * max(zero.noise[:3]):.2g}"), "mN")
     assert lines[3].startswith("Life: ")
     row.connect_button.click()
     driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
