@@ -108,10 +108,8 @@ def test_nothing_on_the_page_is_fetched_from_anywhere(page_text):
 def test_every_link_and_clip_of_the_page_leads_to_exactly_one_place(page_text):
     words = Words(page_text)
     assert len(words.ids) == len(set(words.ids))
-    targets = {address[1:] for address in words.fetched if address[0] == "#"} | set(
-        re.findall(r"url\(#([^)]*)\)", page_text)
-    )
-    assert targets <= set(words.ids)
+    targets = {address[1:] for address in words.fetched if address[0] == "#"}
+    assert targets | set(re.findall(r"url\(#([^)]*)\)", page_text)) <= set(words.ids)
 
 
 def test_the_same_report_gives_the_same_bytes(report):
@@ -384,9 +382,7 @@ def test_nothing_is_cut_where_there_is_room_and_on_paper_nothing_at_all(browser_
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(
-    CHROMIUM is None or PDFTOTEXT is None, reason="no Chromium to print with, or no pdftotext to read it"
-)
+@pytest.mark.skipif(CHROMIUM is None or PDFTOTEXT is None, reason="no Chromium to print with, or no pdftotext")
 def test_every_word_of_every_table_is_on_the_printed_a4_pages(text, tmp_path):
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     target = f"--print-to-pdf={tmp_path / 'page.pdf'}"
