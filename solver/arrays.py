@@ -12,7 +12,7 @@ Indices = NDArray[np.int64]
 Narrow = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
-_LARGEST, _MOST = 32 << 20, 64 << 20  # bytes of one array, the largest that glibc allows, and of all
+_LARGEST, _MOST = 32 << 20, 64 << 20  # bytes of one array, the most of the manual of mallopt, and of all
 
 
 def _keep_freed_memory() -> None:
