@@ -228,7 +228,8 @@ class Exponent:
     subjects: int
     trials: int
     plain: Term | None  # slope of the mixed model, the magnitude taken as exact
-    deming: tuple[float, float, float] | None = None  # Deming's slope through the surfaces, and its 95 % interval
+    # Deming's slope through the surfaces, and its 95 % interval; None of subjects who are all alike
+    deming: tuple[float, float | None, float | None] | None = None
     error_ratio: float | None = None  # variance of a surface's log answer by that of its log magnitude [-]
     reason: str = ""
 
@@ -259,7 +260,8 @@ def stevens_exponent(
     if len(slopes) < len(cells):
         return Exponent(len(people), len(y), plain, reason=reason or "without one of the subjects nothing varies")
     low, high, _ = map(float, jackknife(here[0], np.array(slopes)))
-    return Exponent(len(people), len(y), plain, (here[0], low, high), here[1], reason)
+    slope = (here[0], low, high) if math.isfinite(low) else (here[0], None, None)
+    return Exponent(len(people), len(y), plain, slope, here[1] if math.isfinite(here[1]) else None, reason)
 
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sessions.file_access import json_text
 from sessions.statistics.scales import stevens_exponent
 
 MU = np.array([0.24, 0.36, 0.44, 0.52, 0.62])
@@ -40,6 +41,13 @@ def test_magnitudes_that_are_the_same_for_all_leave_the_plain_slope():
     exact = np.tile(MU, 3)
     exponent = stevens_exponent(people, surfaces, answers, exact)
     assert exponent.deming[0] == pytest.approx(np.polyfit(np.log(exact), np.log(answers), 1)[0], rel=1e-9)
+
+
+def test_subjects_who_are_all_alike_give_no_interval():
+    people, surfaces = np.repeat(["a", "b", "c"], 5).tolist(), np.tile(range(5), 3).tolist()
+    exponent = stevens_exponent(people, surfaces, np.tile([2.0, 3.1, 5.0, 6.2, 8.5], 3).tolist(), np.tile(MU, 3))
+    assert exponent.deming[1:] == (None, None)
+    json_text({"error_ratio": exponent.error_ratio, "deming": exponent.deming})  # raises for what JSON has not
 
 
 @pytest.mark.parametrize("subjects", [4, pytest.param(12, marks=pytest.mark.slow)])

@@ -91,7 +91,10 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
         words = f"{digits(plain.estimate, 2)} ({digits(plain.low, 2)} to {digits(plain.high, 2)}) with µ taken as exact"
         if exponent.deming is not None:
             value, low, high = exponent.deming
-            words += f", {digits(value, 2)} ({digits(low, 2)} to {digits(high, 2)}) with errors in both"
+            ends = "no interval: all subjects are alike"
+            if low is not None and high is not None:
+                ends = f"{digits(low, 2)} to {digits(high, 2)}"
+            words += f", {digits(value, 2)} ({ends}) with errors in both"
         sentences.append(f"{name}: if estimates are a power of µ, its exponent is {words}.")
     elif exponent is not None and exponent.reason:
         sentences.append(f"{name}: no exponent of the estimates by µ: {exponent.reason}.")
