@@ -306,12 +306,9 @@ class TrialsColumn(QWidget):
         self.relation.addItem(self.points)
         self.none = label("", wrap=True)
         self.none.setAlignment(Qt.AlignmentFlag.AlignTop)
-        head, self._below = (
-            label(tr("Trials"), "section"),
-            label(tr("At the plan's depth, against the score"), "section"),
-        )
+        self._below = label(tr("At the plan's depth, against the score"), "section")
         plot = (self.relation, 2), (self.none, 2)
-        vbox(head, (self.list, 3), self._below, self.responses, self.errors, *plot, on=self)
+        vbox(label(tr("Trials"), "section"), (self.list, 3), self._below, self.responses, self.errors, *plot, on=self)
 
     def show_state(self, state: AnalystState) -> None:
         listed = tuple(words_of(row) for row in rows(state))
