@@ -38,8 +38,7 @@ def command_line() -> str:
     lines = ["# Command line", "", "`daq-app VERB --help` prints the same.", ""]
     parsers = [("window", "open the window, which `daq-app` alone does too", start.command_line())]
     for name, does in main.VERBS.items():
-        verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
-        parsers.append((name, does, main._parser(name, verb)))  # noqa: SLF001 - the one place that makes a verb's parser
+        parsers.append((name, does, main.parser_of(name, main.verb_module(name))))
     for name, does, parser in parsers:
         lines += [
             f"## {name}",

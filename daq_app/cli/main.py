@@ -6,7 +6,7 @@ import sys
 import traceback
 from types import ModuleType
 
-from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, Parser, WrongValue, takes_all
+from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, Parser, takes_all
 
 HELP = frozenset({"-h", "--help"})
 LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
@@ -38,32 +38,15 @@ VERBS = {
 }
 
 
-# Where each failure a person can act on is defined.
+# Failures that come of the command line or of a value in a file; every other exception of our own could not be done.
 _WRONG = (
+    "daq_app.console.WrongValue",
     "drivers.address.AddressError",
     "sessions.strokes.decisions.DecisionError",
     "sessions.toml_file.SettingsError",
     "simulators.serving.TimetableError",
     "solver.scene.tables.SceneError",
 )
-_FAILED = (
-    "daq_app.batch.pool.SchedulerError",
-    "daq_app.console.NotWritten",
-    "daq_app.batch.sensitivity.TooFewAnswers",
-    "drivers.transducer.DeviceFault",
-    "drivers.transducer.LinkLost",
-    "drivers.transducer.SetupError",
-    "sessions.exchange.ExportError",
-    "sessions.report.pages.ReportError",
-    "sessions.exchange.csv_text.ImportRefused",
-    "sessions.plan.plan.Blinded",
-    "sessions.prediction.press_model.FitError",
-    "sessions.recording.schema.RecordingError",
-    "sessions.plan.study.StudyError",
-    "solver.failures.SolveFailure",
-)
-
-
 _OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")
 
 
@@ -93,8 +76,8 @@ def _dispatch(arguments: list[str]) -> int:
         return DONE
     if name not in VERBS:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
-    verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
-    parser = _parser(name, verb)
+    verb = verb_module(name)
+    parser = parser_of(name, verb)
     if HELP & {*rest}:
         parser.print_help()
         return DONE
@@ -129,7 +112,13 @@ def _overview() -> argparse.ArgumentParser:
     )
 
 
-def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
+def verb_module(name: str) -> ModuleType:
+    """Return the module of a verb."""
+    return importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
+
+
+def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
+    """Return what reads the command line of a verb."""
     parser = Parser(
         prog=f"daq-app {name}",
         description=verb.__doc__,
@@ -145,10 +134,13 @@ def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 def _failure(error: Exception) -> tuple[str, int]:
     """Return the sentence and the exit code for what went wrong."""
-    sentence = _shorten(" ".join(str(error).split()))
-    if isinstance(error, (WrongValue, *_exceptions(_WRONG))):
+    sentence = " ".join(str(error).split())
+    if len(sentence) > LONGEST:  # a damaged file put the middle into it
+        sentence = f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"
+    kinds = [f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__]
+    if any(kind in _WRONG for kind in kinds):
         return sentence, WRONG
-    if isinstance(error, _exceptions(_FAILED)):
+    if sentence and kinds[0].partition(".")[0] in _OUR_OWN:
         return sentence, FAILED
     if isinstance(error, OSError):
         from sessions.file_access import failure_sentence  # here: a verb that is well needs none
@@ -161,17 +153,6 @@ def _failure(error: Exception) -> tuple[str, int]:
         package = error.name.partition(".")[0]
         return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
-
-
-def _shorten(sentence: str) -> str:
-    """Return a sentence without the middle of what a damaged file put into it."""
-    return sentence if len(sentence) <= LONGEST else f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"
-
-
-def _exceptions(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
-    """Return those of the exceptions whose module was imported: no other can have been raised, nor need be imported."""
-    pairs = [name.rsplit(".", 1) for name in names]
-    return tuple(getattr(sys.modules[module], name) for module, name in pairs if module in sys.modules)
 
 
 def _report(sentence: str, code: int) -> int:
