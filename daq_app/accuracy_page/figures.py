@@ -3,8 +3,9 @@
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
+from typing import Literal, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,14 +27,25 @@ PARTS = (
     style.GREEN, style.VERMILLION, style.SKY, style.PURPLE, "#E69F00", "#0072B2", "#F0E442", style.GREY, style.PALE,
     "#8C564B", style.INK,
 )  # of a solve  # fmt: skip
+R = TypeVar("R", Speed, GuaranteedCost, Estimate, Growth)
+
+
+def _by_strain(rows: Sequence[R]) -> dict[str, list[R]]:
+    return {kind: [row for row in rows if row.kinematics == kind] for kind in dict.fromkeys(r.kinematics for r in rows)}
+
+
+def _strain_legend(axes: Axes, kinds: Iterable[str], place: Literal["upper right", "lower right"]) -> None:
+    for kind in kinds:
+        axes.plot([], [], MARKS[kind], color=COLOURS[kind], markersize=4, label=f"{kind} strain")
+    axes.legend(frameon=False, loc=place)
 
 
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
-    for kinematics in dict.fromkeys(row.kinematics for row in rows):
-        timed = [(r.judged_error, getattr(r, time), r) for r in rows if r.kinematics == kinematics]
+    for kinematics, mine in _by_strain(rows).items():
+        timed = [(r.judged_error, getattr(r, time), r) for r in mine]
         known = [(error, 1e3 * span, r) for error, span, r in timed if error is not None and span is not None]
         if not known:
             continue
@@ -66,23 +78,21 @@ def _curve(drawn: style.Sheet, kinematics: str, points: Sequence[tuple[float, fl
         axes.plot(100 * error, span, MARKS[kinematics], color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
 
 
-def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
-    if not rows:
-        return None
+def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
-    for kinematics in dict.fromkeys(row.kinematics for row in rows):
+    by_strain = _by_strain(rows)
+    for kinematics, mine in by_strain.items():
         for error_of, words in (("worst_estimate", "guaranteed"), ("worst_error", "true")):
             points = [
                 (error, 1e3 * r.took_s / r.surfaces, words == "true",
                  f"{r.surfaces} surfaces, {r.dofs} unknowns: {words} ", " each")
-                for r in rows
-                if r.kinematics == kinematics and (error := getattr(r, error_of))
+                for r in mine
+                if (error := getattr(r, error_of))
             ]  # fmt: skip
             _curve(drawn, kinematics, points)
-        axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
     _logarithmic(axes)
-    axes.legend(frameon=False, loc="upper right")
+    _strain_legend(axes, by_strain, "upper right")
     title = "surfaces solved to a tolerance"
     axes.set(xlabel="guaranteed, and true, error of the SED [%]", ylabel="time for a surface [ms]", title=title)
     header = (
@@ -97,9 +107,7 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
     return drawn.panel("speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
 
 
-def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel | None:
-    if not rows:
-        return None
+def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
     drawn = style.sheet(*WIDE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
@@ -138,9 +146,7 @@ def _mark(problem: str) -> str:
     return marks.get(problem.split(",")[0], "x")
 
 
-def _estimate_panel(every: Sequence[Estimate], number: str) -> style.Panel | None:
-    if not (rows := [row for row in every if row.number == number]):
-        return None
+def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for row in rows:
@@ -156,9 +162,8 @@ def _estimate_panel(every: Sequence[Estimate], number: str) -> style.Panel | Non
     axes.plot(line, line, color=style.GREY, linewidth=0.8)
     axes.plot(line, 10 * np.maximum(line, 0.02), "--", color=style.GREY, linewidth=0.8)
     axes.set_xlim(low, high)
-    for kinematics in dict.fromkeys(row.kinematics for row in rows):
-        axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
-    axes.legend(frameon=False, loc="lower right")
+    _strain_legend(axes, _by_strain(rows), "lower right")
+    number = rows[0].number
     axes.set(xlabel="true error [%]", ylabel="estimated error [%]", title=number)
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
     table = [(r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows]
@@ -166,9 +171,7 @@ def _estimate_panel(every: Sequence[Estimate], number: str) -> style.Panel | Non
     return drawn.panel(name, f"Estimated against true error of the {number}", header, table)
 
 
-def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
-    if not rows:
-        return None
+def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
     drawn = style.sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
     axes = drawn.axes[0]
     parts = dict.fromkeys(name for row in rows for name in row.parts)
@@ -193,13 +196,10 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
     return drawn.panel("costs", "Where the time of a solve goes", header, table)
 
 
-def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
-    if not rows:
-        return None
+def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
-    for kinematics in dict.fromkeys(row.kinematics for row in rows):
-        mine = [row for row in rows if row.kinematics == kinematics]
+    for kinematics, mine in _by_strain(rows).items():
         power = exponent(mine)
         words = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
         axes.plot(
@@ -217,66 +217,50 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
     return drawn.panel("growth", "Growth of the time with the unknowns", header, table)
 
 
-def _speed_panels(measured: RunResults) -> tuple[style.Panel | None, ...]:
-    rows, truths = measured.of(Speed), [truth for truth in measured.of(Truth) if truth.case in JUDGED and truth.doubt]
-    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
-    return (
-        _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
-        _speed_panel(rows, doubt, "next_s", "each further surface"),
-        _guaranteed_panel(measured.of(GuaranteedCost)),
-    )
-
-
-# Name, caption, and what draws the panels.
-PLATES: tuple[tuple[str, str, Callable[[RunResults], Iterable[style.Panel | None]]], ...] = (
-    (
-        "speed",
+CAPTIONS = {
+    "speed":
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
         "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
         "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
         "and estimate included: filled by the largest estimate, hollow by the largest true error.",
-        _speed_panels,
-    ),
-    (
-        "benchmarks",
+    "benchmarks":
         "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
         "half-plane under a round body, and the finger at its ending. The table of orders names every point.",
-        lambda measured: [_order_panel(measured.of(Order), timed=True)],
-    ),
-    (
-        "estimates",
+    "estimates":
         "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
         "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
         "the truth is too doubtful to tell.",
-        lambda measured: [_estimate_panel(measured.of(Estimate), name) for name in NUMBERS],
-    ),
-    (
-        "orders",
+    "orders":
         "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
         "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size.",
-        lambda measured: [_order_panel(measured.of(Order), timed=False)],
-    ),
-    (
-        "costs",
-        "Where the time of one solve through the front door goes, mesh and error estimate included.",
-        lambda measured: [_cost_panel(measured.of(Cost))],
-    ),
-    (
-        "growth",
+    "costs": "Where the time of one solve through the front door goes, mesh and error estimate included.",
+    "growth":
         "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
         f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5.",
-        lambda measured: [_growth_panel(measured.of(Growth))],
-    ),
-)
+}  # fmt: skip
 
 
 def plates(measured: RunResults) -> dict[str, style.Plate]:
     """Return the figures that there are numbers for, by name."""
+    speeds, guaranteed, orders = measured.of(Speed), measured.of(GuaranteedCost), measured.of(Order)
+    costs, growth = measured.of(Cost), measured.of(Growth)
+    truths = [truth for truth in measured.of(Truth) if truth.case in JUDGED and truth.doubt]
+    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
+    estimates = [[row for row in measured.of(Estimate) if row.number == number] for number in NUMBERS]
     with style.look():
-        drawn = {
-            name: style.Plate(name, caption, tuple(panel for panel in draw(measured) if panel is not None))
-            for name, caption, draw in PLATES
+        panels: dict[str, list[style.Panel | None]] = {
+            "speed": [
+                _speed_panel(speeds, doubt, "first_s", "one surface from undeformed"),
+                _speed_panel(speeds, doubt, "next_s", "each further surface"),
+                _guaranteed_panel(guaranteed) if guaranteed else None,
+            ],
+            "benchmarks": [_order_panel(orders, timed=True) if orders else None],
+            "estimates": [_estimate_panel(rows) for rows in estimates if rows],
+            "orders": [_order_panel(orders, timed=False) if orders else None],
+            "costs": [_cost_panel(costs) if costs else None],
+            "growth": [_growth_panel(growth) if growth else None],
         }
+    drawn = {name: style.plate(name, CAPTIONS[name], parts) for name, parts in panels.items()}
     return {name: plate for name, plate in drawn.items() if plate.panels}
 
 
