@@ -1,6 +1,5 @@
 """Start of the program."""
 
-import _thread
 import gc
 import os
 import signal
@@ -40,20 +39,11 @@ def _repeat_stop(unraisable: "sys.UnraisableHookArgs") -> None:
         return
     import threading
 
-    again = threading.Timer(0.01, _press_ctrl_c)  # at once, it would be raised in here, and end here too
+    from daq_app.child_process import press_ctrl_c
+
+    again = threading.Timer(0.01, press_ctrl_c)  # at once, it would be raised in here, and end here too
     again.daemon = True
     again.start()
-
-
-def _press_ctrl_c() -> None:
-    """Send the main thread what Ctrl-C sends it, which also ends its sleep where the system can."""
-    import threading
-
-    main_thread = threading.main_thread().ident
-    if hasattr(signal, "pthread_kill") and main_thread is not None:
-        signal.pthread_kill(main_thread, signal.SIGINT)
-    else:
-        _thread.interrupt_main()
 
 
 def _open_streams() -> None:
@@ -67,18 +57,13 @@ def _leave(code: int) -> None:
     """Leave with an exit code; at once where the user asked to stop and nothing is left to be ended."""
     from daq_app.console import STOPPED
 
-    if code == STOPPED and not _children():
+    started = sys.modules.get("multiprocessing")  # which takes a while to import, and most verbs start none
+    if code == STOPPED and not (started and started.active_children()):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)  # taking the loaded libraries apart first takes longer than Ctrl-C may
     gc.freeze()  # what is left goes with the process: to look for cycles in it first takes a tenth of a cold solve
     sys.exit(code)
-
-
-def _children() -> bool:
-    """Return whether processes that this one has started are running."""
-    started = sys.modules.get("multiprocessing")  # which takes a while to import, and most verbs start none
-    return started is not None and bool(started.active_children())
 
 
 if __name__ == "__main__":

@@ -102,6 +102,15 @@ def _end_with_parent() -> None:
         os._exit(1)  # nobody is left to hand anything to
 
 
+def press_ctrl_c() -> None:
+    """Send the main thread what Ctrl-C sends it, which also ends its sleep."""
+    main_thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main_thread is not None:
+        signal.pthread_kill(main_thread, signal.SIGINT)
+    else:
+        signal.raise_signal(signal.SIGINT)
+
+
 def give_way() -> None:
     """Let this process go behind recorder and window; where the system refuses, nothing happens."""
     if sys.platform == "win32":
