@@ -3,6 +3,7 @@
 import sys
 import threading
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TextIO
 
@@ -11,7 +12,6 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
 from daq_app.wording import typed_number
 from drivers.transducer import LinkLost, SetupError
-from sessions.plan.plan import Trial
 from sessions.recording import RecordingError
 from sessions.run import steps
 from sessions.run.interruptions import Interruptions, interruptions
@@ -29,6 +29,15 @@ CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
 WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
 
 
+@dataclass(frozen=True, slots=True)
+class Prompt:
+    """What a command asks for, and what is meant by Enter alone and by a number (None: no answer)."""
+
+    question: str
+    enter: steps.Event | None = None
+    answer: Callable[[float | None], steps.Event | None] = lambda _: None
+
+
 class Terminal:
     """Reads lines in a thread of its own, so that nobody's slowness holds up the recording."""
 
@@ -36,7 +45,7 @@ class Terminal:
         """Talk on stderr and listen on stdin; `forces` is False where no transducer tells when a stroke is done."""
         self._forces = forces
         self._print = console.note
-        self._command: steps.Command | None = None
+        self._prompt: Prompt | None = None
         self._paused = False
         self._lines: deque[str] = deque()
         self.closed = False  # nobody can type any more
@@ -46,10 +55,10 @@ class Terminal:
 
     def show(self, command: steps.Command) -> None:
         """Print what is to be done, and remember what was asked."""
-        question = self._question(command)
-        if question is not None:
-            self._command = command
-            self._print(question)
+        prompt = self._prompt_of(command)
+        if prompt is not None:
+            self._prompt = prompt
+            self._print(prompt.question)
             return
         match command:
             case steps.ShowInstruction(block):
@@ -69,29 +78,37 @@ class Terminal:
         if self._paused and not before:
             self._print(PAUSED)
 
-    def _question(self, command: steps.Command) -> str | None:
-        """Return what a command asks for in words; None for one that asks for nothing."""
+    def _prompt_of(self, command: steps.Command) -> Prompt | None:
+        """Return what a command asks for; None for one that asks for nothing."""
         match command:
             case steps.AskBegin():
-                return "Press Enter to begin."
+                return Prompt("Press Enter to begin.", steps.Begin())
             case steps.AskMount(trial):
-                return f"{_announcement(trial)}: mount {trial.stimulus.code}, then press Enter."
+                kind = "Trial" if trial.phase == "main" else trial.phase.capitalize() + " trial"
+                code = trial.stimulus.code
+                return Prompt(f"{kind} {trial.number}: mount {code}, then press Enter.", steps.StimulusMounted(code))
             case steps.AskStroke(trial, allowed):
-                after = "" if self._forces else " Press Enter when it is done."
                 often = "once" if allowed == 1 else f"up to {allowed} times"
-                return f"Stroke {often}, {WAYS[trial.direction]}.{after}"
+                stroke = f"Stroke {often}, {WAYS[trial.direction]}."
+                return (
+                    Prompt(stroke)
+                    if self._forces
+                    else Prompt(f"{stroke} Press Enter when it is done.", steps.StrokeDone())
+                )
             case steps.AskScore(_, (low, high), question=question):
-                return f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
+                words = f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
+                return Prompt(words, answer=lambda number: steps.Scored(number, input_device=KEYBOARD))
             case steps.AskNumber(_, question):
-                return f"{question} A number above 0, on the subject's own scale:"
+                words = f"{question} A number above 0, on the subject's own scale:"
+                return Prompt(words, answer=lambda number: steps.MagnitudeEstimate(number, input_device=KEYBOARD))
             case steps.AskChoice(first, second, question):
                 which = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
-                return f"{question} {which}"
+                return Prompt(f"{question} {which}", answer=_choice)
             case steps.AskRest(duration):
                 long = "" if duration is None else f" It goes on by itself after {duration:g} s."
-                return f"The subject rests. Press Enter to go on.{long}"
+                return Prompt(f"The subject rests. Press Enter to go on.{long}", steps.Resume())
             case steps.AskFinish():
-                return "Every trial is done. Press Enter to end the session."
+                return Prompt("Every trial is done. Press Enter to end the session.", steps.Finish())
             case _:
                 return None
 
@@ -116,42 +133,15 @@ class Terminal:
             return None
         if word in orders:
             return orders[word]
-        event = self._parse_enter() if line == "" else self._parse_answer(line)
+        event, number = None, typed_number(line)
+        if self._prompt is not None and line == "":
+            event = None if self._paused else self._prompt.enter
+        elif self._prompt is not None and (number is not None or line == "-"):
+            event = self._prompt.answer(number)
         if event is None:
-            due = PAUSED if self._paused else (self._command and self._question(self._command)) or HELP
+            due = PAUSED if self._paused else HELP if self._prompt is None else self._prompt.question
             self._print(f"'{line}' means nothing now. {due}" if line else f"Nothing is waiting for Enter now. {due}")
         return event
-
-    def _parse_enter(self) -> steps.Event | None:
-        """Return what Enter alone means."""
-        match None if self._paused else self._command:
-            case steps.AskBegin():
-                return steps.Begin()
-            case steps.AskMount(trial):
-                return steps.StimulusMounted(trial.stimulus.code)
-            case steps.AskStroke() if not self._forces:
-                return steps.StrokeDone()
-            case steps.AskRest():
-                return steps.Resume()
-            case steps.AskFinish():
-                return steps.Finish()
-            case _:
-                return None
-
-    def _parse_answer(self, line: str) -> steps.Event | None:
-        """Return the answer that was typed; what a keyboard cannot tell stays open."""
-        number = typed_number(line)
-        if number is None and line != "-":
-            return None
-        match self._command:
-            case steps.AskScore():
-                return steps.Scored(number, input_device=KEYBOARD)
-            case steps.AskNumber():
-                return steps.MagnitudeEstimate(number, input_device=KEYBOARD)
-            case steps.AskChoice() if number is None or number in CHOICES:
-                return steps.PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
-            case _:
-                return None
 
     def _read(self, lines: TextIO) -> None:
         for line in lines:
@@ -159,10 +149,11 @@ class Terminal:
         self.closed = True
 
 
-def _announcement(trial: Trial) -> str:
-    """Return how a trial is announced."""
-    kind = "Trial" if trial.phase == "main" else trial.phase.capitalize() + " trial"
-    return f"{kind} {trial.number}"
+def _choice(number: float | None) -> steps.Event | None:
+    """Return the choice of 1, 2 or neither; None for any other number."""
+    if number is not None and number not in CHOICES:
+        return None
+    return steps.PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
 
 
 SILENCE = 3.0  # after which a recorder that should answer ten times a second is wondered about [s]
@@ -263,7 +254,9 @@ class _Attendance:
         """Take a report, and return the outcome when it is the last."""
         match report:
             case m.SessionBegun():
-                self._begin(report)
+                self._begun = report
+                people, forces = report.people == "people", report.plan.forces
+                self._terminal = Terminal(self._console, forces=forces) if people else None
             case Status():
                 self._show_status(report)
             case m.SessionEnded(folder, end, resumable):
@@ -286,11 +279,6 @@ class _Attendance:
             case _:
                 pass
         return None
-
-    def _begin(self, begun: m.SessionBegun) -> None:
-        self._begun = begun
-        if begun.people == "people":
-            self._terminal = Terminal(self._console, forces=begun.plan.forces)
 
     def _show_status(self, status: Status) -> None:
         if self._terminal is not None:
