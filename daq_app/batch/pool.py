@@ -113,10 +113,47 @@ def by_cluster(
 ) -> Generator[tuple[str, A | Lost]]:
     """Yield each job's name and what `work` makes of it, as it comes from the workers of a cluster.
 
-    `prepare` turns a job's arguments into those that are sent, when its turn comes. Raises SchedulerError.
+    `prepare` turns a job's arguments into those that are sent, when its turn comes. What is under way when nobody takes
+    answers any more ends with the client. Raises SchedulerError.
     """
     with cluster_client(address) as client:
-        yield from _by_client(client, work, jobs, prepare, address)
+        answers: Any = importlib.import_module("distributed").as_completed(loop=client.loop)
+        waiting = list(jobs)[::-1]
+        under_way: dict[Any, str] = {}  # by the key of the cluster
+        checked = set[str]()  # workers whose versions are ours
+        seen = time.monotonic()  # when a worker was last there
+        while waiting or under_way:
+            there: dict[str, int] = client.nthreads()
+            threads = sum(there.values())
+            joined = [worker for worker in there if worker not in checked]
+            if joined:  # before it is given anything to compute, also where it comes later
+                refuse_other_workers(client, joined, address)
+                checked.update(joined)
+            seen = time.monotonic() if threads else seen
+            if time.monotonic() - seen > WITHOUT_WORKERS:
+                raise SchedulerError(
+                    f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
+                    "again: what is done is kept"
+                )
+            # Files are read and sent as workers come free: never those of a thousand sessions at once.
+            while waiting and threads and len(under_way) < 2 * threads:
+                name = waiting.pop()
+                try:
+                    arguments = prepare(*jobs[name])
+                except RecordingError as error:
+                    yield name, Lost(str(error))
+                    continue
+                future = client.submit(work, *arguments, pure=False, retries=1)
+                under_way[future.key] = name
+                answers.add(future)
+            if not answers.has_ready():
+                time.sleep(LOOK)
+                continue
+            future = next(answers)
+            if future.cancelled():  # nobody cancels but a client that has lost its scheduler
+                raise ConnectionError("the connection was lost")
+            name, done = under_way.pop(future.key), future.status == "finished"
+            yield name, future.result() if done else Lost(f"no worker could compute it ({future.exception()})")
 
 
 def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> None:  # noqa: ANN401
@@ -158,58 +195,6 @@ async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: 
         raise SchedulerError(
             f"{address}: no Dask scheduler answers there ({why}); start one, or give no address"
         ) from error
-
-
-def _by_client(
-    client: Any,  # noqa: ANN401
-    work: Callable[..., A],
-    jobs: Jobs,
-    prepare: Callable[..., tuple[Any, ...]],
-    address: str,
-) -> Generator[tuple[str, A | Lost]]:
-    """Yield names and answers as they come to a client of the cluster."""
-    answers: Any = importlib.import_module("distributed").as_completed(loop=client.loop)
-    waiting = list(jobs)[::-1]
-    under_way: dict[Any, tuple[str, Any]] = {}  # by the key of the cluster
-    checked = set[str]()  # workers whose versions are ours
-    seen = time.monotonic()  # when a worker was last there
-    try:
-        while waiting or under_way:
-            there: dict[str, int] = client.nthreads()
-            threads = sum(there.values())
-            joined = [worker for worker in there if worker not in checked]
-            if joined:  # before it is given anything to compute, also where it comes later
-                refuse_other_workers(client, joined, address)
-                checked.update(joined)
-            seen = time.monotonic() if threads else seen
-            if time.monotonic() - seen > WITHOUT_WORKERS:
-                raise SchedulerError(
-                    f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
-                    "again: what is done is kept"
-                )
-            # Files are read and sent as workers come free: never those of a thousand sessions at once.
-            while waiting and threads and len(under_way) < 2 * threads:
-                name = waiting.pop()
-                try:
-                    arguments = prepare(*jobs[name])
-                except RecordingError as error:
-                    yield name, Lost(str(error))
-                    continue
-                future = client.submit(work, *arguments, pure=False, retries=1)
-                under_way[future.key] = name, future
-                answers.add(future)
-            if not answers.has_ready():
-                time.sleep(LOOK)
-                continue
-            future = next(answers)
-            if future.cancelled():  # nobody cancels but a client that has lost its scheduler
-                raise ConnectionError("the connection was lost")
-            name, _ = under_way.pop(future.key)
-            done = future.status == "finished"
-            yield name, future.result() if done else Lost(f"no worker could compute it ({future.exception()})")
-    finally:
-        with suppress(OSError, TimeoutError):  # the scheduler may be gone
-            client.cancel([future for _, future in under_way.values()])
 
 
 KILLED = 0.1  # that killed processes and their pool may take to end [s]
