@@ -43,29 +43,21 @@ def awake() -> Generator[bool]:
 
     What is asked for ends with this process, however it ends. A lid that is closed or an empty battery wins.
     """
-    if sys.platform == "win32":
-        try:
-            yield _windows(CONTINUOUS | SYSTEM_REQUIRED)
-        finally:
-            _windows(CONTINUOUS)
-        return
+    process = None
     command = holder(os.getpid(), sys.platform)
-    if command is None or shutil.which(command[0]) is None:
-        yield False
-        return
+    if command is not None and shutil.which(command[0]) is not None:
+        with suppress(OSError):
+            process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
     try:
-        process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-    except OSError:
-        yield False
-        return
-    try:
-        yield True
+        yield process is not None or _windows(CONTINUOUS | SYSTEM_REQUIRED)
     finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(1.0)
+        _windows(CONTINUOUS)
+        if process is not None:
+            process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(1.0)
 
 
 def holder(pid: int, system: str) -> Sequence[str] | None:
@@ -83,6 +75,7 @@ def holder(pid: int, system: str) -> Sequence[str] | None:
 
 
 def _windows(state: int) -> bool:
+    """Ask Windows to stay on, or no longer; False on other systems, and where it refuses."""
     import ctypes
 
     windows = getattr(ctypes, "windll", None)
@@ -174,12 +167,9 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
     operator = _Operator(prepared, bench, display, inbox, send)
     writer.safe = operator.take_safe
     simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
-    kind, offset_ns = prepared.people.kind, prepared.clock_offset_ns
-    send(
-        m.SessionBegun(
-            str(writer.folder), prepared.plan, kind, simulated, offset_ns, prepared.clock.factor, prepared.before
-        )
-    )
+    folder, kind = str(writer.folder), prepared.people.kind
+    offset_ns, factor = prepared.clock_offset_ns, prepared.clock.factor
+    send(m.SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, factor, prepared.before))
     with awake():
         end = run_session(
             prepared.plan,
@@ -290,6 +280,7 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
     if people.kind == "people":
         return None
     subject, known = SimulatedSubject(people.seed), _index_of(prepared.plan, prepared.writer.folder)
+
     if people.kind == "simulated people":
         return SimulatedPeople(
             subject, prepared.clock, connected, lambda trial: planted_surface(known(trial), people.planted)

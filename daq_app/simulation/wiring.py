@@ -1,7 +1,7 @@
 """Builds real or simulated parts. Whoever runs a session reaches the simulators through here alone."""
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -64,31 +64,23 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
     """
     if uri.startswith(REPLAY):
         recording = Recording.open(Path(uri.removeprefix(REPLAY)))
-        replayed = ReplayTransducer(recording, clock, uri)
-        try:
+        with closing(ReplayTransducer(recording, clock, uri)) as replayed:
             yield Connection(replayed, recorded_frame=recording.plan.frame)
-        finally:
-            replayed.close()
         return
     address = parse_address(uri)
     if address.scheme != SIMULATED:
-        transducer = open_transducer(uri, clock)
-        try:
+        with closing(open_transducer(uri, clock)) as transducer:
             yield Connection(transducer)
-        finally:
-            transducer.close()
         return
     check_options(address, _OPTIONS)
     without_tool(address)  # refused in terms of this address
     bench = Bench(address.number("seed", 0, 0, 2**31 - 1))
     box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))
     box.start()
-    try:
+    with closing(box):
         tool = f"&tool={address.options['tool']}" if "tool" in address.options else ""
         with connect(box.uri + tool, clock) as inner:
             yield Connection(inner.transducer, bench, box.now)
-    finally:
-        box.close()
 
 
 def planted_surface(trial: Trial, planted: Sequence[tuple[str, int, float]] = ()) -> Surface:
