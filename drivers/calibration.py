@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from drivers.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

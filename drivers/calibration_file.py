@@ -15,13 +15,11 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.calibration import Calibration, wrench_transform
 from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
 from drivers.transducer import SetupError
-
-Array = NDArray[np.float64]
 
 LONGEST = 64 * 1024  # a longer file is refused [bytes]; the maker's have about 3 kB
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")

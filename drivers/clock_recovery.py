@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+
+from drivers.arrays import Array, Indices
 
 WINDOW = 1.0  # of the records that arrive within, the one that waited least is taken [real s]
 COARSE, FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
@@ -138,8 +139,8 @@ SPREAD = 0.05  # how far the true rate may lie from the stated or measured one [
 class Placement:
     """Where n records lie."""
 
-    sequence: NDArray[np.int64]  # (n,) from 1; a missing number is a lost or broken record
-    time: NDArray[np.float64]  # (n,) [s] from 0, strictly rising
+    sequence: Indices  # (n,) from 1; a missing number is a lost or broken record
+    time: Array  # (n,) [s] from 0, strictly rising
 
 
 class ClockRecovery:
@@ -165,12 +166,12 @@ class ClockRecovery:
         self._sequence = 0
         self._time = 0.0
         self._zero_ns: int | None = None  # when the session clock stood at time 0
-        self._held_damaged: list[NDArray[np.int64]] = []
+        self._held_damaged: list[Indices] = []
         self._held_since_ns = 0
         self._held_until_ns = 0
         self._looked_ns, self._held_late = 0, 0.0  # how late they were when that was last looked at [s]
 
-    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
+    def take(self, damaged: Indices, received_ns: int) -> Placement:
         """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
         if len(damaged) == 0:
             return _NONE
@@ -223,13 +224,13 @@ class ClockRecovery:
         self._time += missing * self._period
         self.lost += missing
 
-    def _lateness(self, damaged: NDArray[np.int64], received_ns: int) -> float:
+    def _lateness(self, damaged: Indices, received_ns: int) -> float:
         """Return how much later than at a steady rate the last of these records came [s]."""
         assert self._zero_ns is not None
         steady = self._time + (int(damaged.sum()) + len(damaged)) * self._period
         return (received_ns - self._zero_ns) * 1e-9 - steady
 
-    def _place(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
+    def _place(self, damaged: Indices, received_ns: int) -> Placement:
         """Place records whose numbers follow on, and let the clock lead."""
         slots = np.cumsum(damaged + 1)
         count = int(slots[-1])
@@ -238,7 +239,7 @@ class ClockRecovery:
         share = min(_LEAD * span, 0.5)
         step = (span + max(-0.3 * span, min(0.3 * span, 2.0 * share * late))) / count
         sequence = self._sequence + slots
-        time: NDArray[np.float64] = self._time + slots * np.float64(step)
+        time: Array = self._time + slots * np.float64(step)
         if self._sequence == 0:
             time -= time[0]
         self._sequence, self._time = int(sequence[-1]), float(time[-1])
@@ -271,7 +272,7 @@ class ScanCount:
         self._sequence = 0
         self._behind: float | None = None  # arrival minus time of the last scan before [s]
 
-    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
+    def take(self, damaged: Indices, received_ns: int) -> Placement:
         """Place n scans that arrived together, with those lost before each (n,)."""
         if not len(damaged):
             return _NONE

@@ -5,19 +5,20 @@ from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from drivers.arrays import Array, Indices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReadingBlock:
     """Consecutive readings of one transducer; n of them, possibly none. Arrays are read-only."""
 
-    sequence: NDArray[np.int64]  # (n,) record number given by the device, unwrapped; missing numbers are lost readings
-    counter: NDArray[np.int64]  # (n,) the device's own clock ticks, unwrapped (its rate: `TransducerInfo.counter_rate`)
-    status: NDArray[np.int64]  # (n,) status word as the device sent it, 0 = healthy
-    time: NDArray[np.float64]  # (n,) [s] on the device's clock, 0 at the first reading of the stream
-    received_ns: NDArray[np.int64]  # (n,) [ns] session clock when the reading's bytes arrived
-    raw: NDArray[np.float64]  # (n, 6) six raw numbers: counts or volts (`Calibration.raw_unit`), exactly representable
+    sequence: Indices  # (n,) record number given by the device, unwrapped; missing numbers are lost readings
+    counter: Indices  # (n,) the device's own clock ticks, unwrapped (its rate: `TransducerInfo.counter_rate`)
+    status: Indices  # (n,) status word as the device sent it, 0 = healthy
+    time: Array  # (n,) [s] on the device's clock, 0 at the first reading of the stream
+    received_ns: Indices  # (n,) [ns] session clock when the reading's bytes arrived
+    raw: Array  # (n, 6) six raw numbers: counts or volts (`Calibration.raw_unit`), exactly representable
 
     def __post_init__(self) -> None:
         """Check that the columns belong together and make them read-only views."""
@@ -59,9 +60,9 @@ class ReadingBlock:
 class Records:
     """Whole records in the order they came; n of them, possibly none."""
 
-    raw: NDArray[np.float64]  # (n, 6) six raw numbers
-    status: NDArray[np.int64]  # (n,) as the device sent it, 0 = healthy
-    damaged: NDArray[np.int64]  # (n,) records that came broken between the one before and this one
+    raw: Array  # (n, 6) six raw numbers
+    status: Indices  # (n,) as the device sent it, 0 = healthy
+    damaged: Indices  # (n,) records that came broken between the one before and this one
 
     @staticmethod
     def of(raw: list[tuple[int, ...]], status: list[int], damaged: list[int]) -> "Records":

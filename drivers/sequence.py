@@ -13,6 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Indices
+
 WRAP = 2**32
 NEAR = 10_000  # a rejected record at most so many numbers behind was late; further off it was garbage
 
@@ -24,8 +26,8 @@ class Accounting:
     """The verdict on a batch of records: k of them are kept."""
 
     kept: NDArray[np.intp]  # (k,) their positions in the batch
-    sequence: NDArray[np.int64]  # (k,) their numbers, unwrapped; a missing number is a lost record
-    counter: NDArray[np.int64]  # (k,) the device's counter, unwrapped and never running backwards
+    sequence: Indices  # (k,) their numbers, unwrapped; a missing number is a lost record
+    counter: Indices  # (k,) the device's counter, unwrapped and never running backwards
     undecided: bool  # the batch's last record: put it at the head of the next batch
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Indices
 from drivers.clock import Clock
 from drivers.clock_recovery import Placement, RateWatch, rate_of_least_late, rate_words
 from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link
@@ -42,7 +42,7 @@ class Numbering(Protocol):
         """What has been found of the stream's rate."""
         ...
 
-    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
+    def take(self, damaged: Indices, received_ns: int) -> Placement:
         """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
         ...
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, fields
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Indices, Mask
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 
@@ -62,15 +62,15 @@ class StatusTable:
         verdicts = {entry.verdict for entry in self.entries(status)}
         return next((one for one in ("saturated", "doubtful", "note") if one in verdicts), None)
 
-    def doubtful(self, status: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def doubtful(self, status: Indices) -> Mask:
         """Tell of each status (n,) whether it speaks against the reading's six values."""
         return self._mask(status, ("saturated", "doubtful"))
 
-    def faulty(self, status: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def faulty(self, status: Indices) -> Mask:
         """Tell of each status (n,) whether it speaks of a fault of the device, and not of values out of range."""
         return self._mask(status, ("doubtful",))
 
-    def _mask(self, status: NDArray[np.int64], verdicts: tuple[Verdict, ...]) -> NDArray[np.bool_]:
+    def _mask(self, status: Indices, verdicts: tuple[Verdict, ...]) -> Mask:
         if not status.any():
             return np.zeros(len(status), np.bool_)
         kinds, which = np.unique(status, return_inverse=True)
@@ -90,7 +90,7 @@ class StatusCount:
     verdicts: Counter[Verdict] = field(default_factory=Counter[Verdict])
     flagged: Counter[str] = field(default_factory=Counter[str])  # by the words of each entry
 
-    def take(self, status: NDArray[np.int64]) -> None:
+    def take(self, status: Indices) -> None:
         """Count readings of these statuses (n,)."""
         if not status.any():
             return

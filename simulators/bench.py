@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, TransducerInfo
 from simulators.stroke import CONTACT_AREA, PRESS, RELEASE, Course, Stroke, Surface
-
-Array = NDArray[np.float64]
 
 
 def _white_noise(seed: int, times: Array, channels: int = 6) -> Array:

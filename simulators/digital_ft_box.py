@@ -7,14 +7,12 @@ here and nowhere else. How long a jam must be, and how long the transducer is de
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench
 from simulators.faults import Faults
 from simulators.simulator import ROOM, LineBox, PseudoTerminal, Simulator, serve_on_ports
-
-Array = NDArray[np.float64]
 
 RATE = 7000  # packets a second
 COUNTS_PER_VOLT = 3000.0  # of a gauge

@@ -6,11 +6,9 @@ from typing import Annotated, Literal, get_args
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Mask
 from simulators.bench import Bench
-
-Array = NDArray[np.float64]
 
 Kind = Literal[
     "lose", "repeat", "reorder", "corrupt", "shorten", "delay", "stall", "saturate", "status", "units", "drift",
@@ -88,7 +86,7 @@ class Faults:
         """Return when (n,) [s] the device's own clock has come as far as `ages` (n,) [s]."""
         return ages if self._clock is None else _through(ages, *reversed(self._clock))
 
-    def during(self, kind: Kind, times: Array) -> NDArray[np.bool_]:
+    def during(self, kind: Kind, times: Array) -> Mask:
         """Tell of `times` (n,) [s] whether a fault of the box itself is on."""
         return np.array([self.active(kind, time) for time in times.tolist()], np.bool_)
 

@@ -14,15 +14,13 @@ from typing import Any, cast
 import numpy as np
 import usb.backend  # pyright: ignore[reportMissingTypeStubs]
 import usb.core  # pyright: ignore[reportMissingTypeStubs]
-from numpy.typing import NDArray
 
 from drivers import usb_link
+from drivers.arrays import Array, Indices
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
 from simulators.simulator import RunningSimulator, Simulator, unplug
-
-Array = NDArray[np.float64]
 
 ROOM = 984  # readings the converter keeps for a computer that is late
 _NAP = 0.0005  # [real s]
@@ -188,7 +186,7 @@ class LabJackU6Box:
         self._sent += 1
         self._leaving += self._faults.route(self.now(), [(self.now(), _long(0xC0, data, 0xF9))])
 
-    def _codes(self, times: Array) -> NDArray[np.int64]:
+    def _codes(self, times: Array) -> Indices:
         """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
         volts = self._faults.sensed_wrench(self.bench, times) @ self._gauges.T + _OFFSETS
         volts[self._faults.during("saturate", times), 2] = 11.0

@@ -9,12 +9,10 @@ from urllib.parse import parse_qsl, urlsplit
 from xml.sax.saxutils import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from simulators.bench import Bench
 from simulators.faults import Faults
-
-Array = NDArray[np.float64]
 
 COUNTS = 1_000_000  # counts in one unit of force, and in one of torque
 
@@ -268,7 +266,7 @@ class Electronics:
         head = f"HTTP/1.0 {code} {_REASONS[code]}\r\nContent-Type: text/xml\r\nContent-Length: {len(body)}\r\n"
         return (head + ("Location: /index.htm\r\n" if code == 302 else "") + "\r\n").encode() + body
 
-    def _status_and_counts(self, times: Array) -> tuple[list[int], NDArray[np.int64]]:
+    def _status_and_counts(self, times: Array) -> tuple[list[int], Indices]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
         wrench = self._faults.sensed_wrench(self._bench, times)
         forced = self._faults.during("saturate", times)

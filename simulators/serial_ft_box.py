@@ -7,14 +7,12 @@ nowhere else. The wording of the banner and of refusals, and the error digit of 
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.simulator import LineBox, PseudoTerminal, Simulator, serve_on_ports
-
-Array = NDArray[np.float64]
 
 COUNTS_PER_N = 800.0
 COUNTS_PER_NM = 60_000.0

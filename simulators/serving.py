@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 import simulators
+from drivers.arrays import Array
 from drivers.clock import clock_at
 from drivers.transducer import SetupError
 from simulators.bench import Bench, BenchSettings
@@ -64,7 +63,7 @@ class ScriptedBench(Bench):
         self._subject = SimulatedSubject(seed)
         self._begun = 0  # strokes so far
 
-    def wrench(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def wrench(self, times: Array) -> Array:
         """Return what the transducer feels (n, 6) at `times` (n,) [s], after beginning the strokes due by then."""
         strokes = self._timetable.strokes
         while len(times) and strokes:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
+
+from drivers.arrays import Array
 
 CONTACT_AREA = 100.0  # [mm2] 1 cm², over which the paper spreads the greatest tangential force
 
@@ -75,8 +76,6 @@ def paper_surfaces() -> Mapping[tuple[str, int], Surface]:
     }
     return MappingProxyType(sticky | slippery)
 
-
-Array = NDArray[np.float64]
 
 PRESS = 0.10  # from touch to full normal force [s]
 RELEASE = 0.12  # from full normal force to lift [s]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Indices, Mask
 from drivers.calibration import Calibration
 from drivers.notation import FORCE, TORQUE
 from drivers.readings import Records
@@ -190,7 +191,7 @@ class StreamDecoder:
         """Take what arrived and return every packet it completes."""
         self._buffer += data
         batches: list[NDArray[np.uint8]] = []
-        damaged: list[NDArray[np.int64]] = []
+        damaged: list[Indices] = []
         while (count := len(self._buffer) // PACKET_SIZE) >= (needed := 2 if self._in_step else _PROOF):
             packets = np.frombuffer(self._buffer, np.uint8, count * PACKET_SIZE).reshape(count, PACKET_SIZE)
             sound = _sound(packets)
@@ -219,12 +220,12 @@ class StreamDecoder:
         self._buffer = self._buffer[skip:]
 
 
-def _sound(packets: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def _sound(packets: NDArray[np.uint8]) -> Mask:
     """Tell which of packets (n, 13) have the checksum they state."""
     return packets[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F == packets[:, 12] & 0x7F
 
 
-def _records(batches: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]], flagged: int) -> Records:
+def _records(batches: list[NDArray[np.uint8]], damaged: list[Indices], flagged: int) -> Records:
     """Return sound packets as records: gauges in the order G0 to G5, `flagged` as status where the flag is set."""
     if not batches:
         return Records.of([], [], [])

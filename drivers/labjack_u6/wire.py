@@ -11,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.readings import Records
 from drivers.transducer import DeviceFault, StatusBit, StatusTable, bit
-
-Array = NDArray[np.float64]
 
 GAUGES = 6
 SCANS = 4  # in a stream packet: whole scans, so that a lost packet does not mix the gauges up

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.calibration import Calibration
 from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT
 from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
@@ -38,7 +38,7 @@ class Configuration:
         """Return what turns its counts into N and N mm."""
         units = np.repeat([self.newtons, self.newton_millimetres], 3)
         counts = np.repeat([self.counts_per_force, self.counts_per_torque], 3)
-        rated: NDArray[np.float64] = np.array(self.rated) * units if self.rated else np.full(6, np.nan)
+        rated: Array = np.array(self.rated) * units if self.rated else np.full(6, np.nan)
         source = f"counts per unit read from {self.product}"
         return Calibration(self.serial, "counts", np.diag(units / counts), rated, source)
 

@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Indices
 from drivers.clock import Clock
 from drivers.clock_recovery import RateWatch, rate_words
 from drivers.deadline import ENDING, Deadline, Link
@@ -272,7 +272,7 @@ class NetFtTransducer(ThreadedTransducer):
             )
         )
 
-    def _compare_clocks(self, counter: NDArray[np.int64], received_ns: NDArray[np.int64]) -> None:
+    def _compare_clocks(self, counter: Indices, received_ns: Indices) -> None:
         """Hold the box's counter against the session's clock."""
         breaks = self._account.restarted + self._account.frozen
         if breaks != self._breaks:  # it stood still, or began anew

@@ -7,8 +7,9 @@ digits mean beyond 0 (good), and the exact text of the start-up banner, is not v
 import re
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from drivers.arrays import Array, Indices
 from drivers.readings import Records
 from drivers.transducer import StatusBit, StatusTable
 
@@ -101,7 +102,7 @@ class BinaryDecoder:
         self._at = 0  # where the next record is expected in it
         self._doubt = 0  # records to come that are so near behind a break that they must prove themselves
         self._skipped = 0  # bytes since the last good record that belong to none
-        self._last: NDArray[np.int64] | None = None  # values of the last good record
+        self._last: Indices | None = None  # values of the last good record
 
     def feed(self, data: bytes) -> Records:
         """Take what arrived and return every record that can be judged: one that three to eight more follow."""
@@ -145,7 +146,7 @@ class BinaryDecoder:
             return 0
         return _best_shift(self._gains(window)) if len(window) == _WINDOW else None
 
-    def _is_doubtful(self, values: NDArray[np.int64]) -> bool:
+    def _is_doubtful(self, values: Indices) -> bool:
         """Tell whether a record behind a break may be pieced together from two: the first, and what is too far off."""
         away = 0 if self._last is None else int(np.abs(values - self._last).sum())
         return self._doubt == _DOUBT or (self._doubt > 0 and away > _AWAY)
@@ -158,7 +159,7 @@ class BinaryDecoder:
         return np.where(bytes_[:, 0] <= _MOST_ERROR, _gain(away), -np.inf).tolist()
 
 
-def _gain(away: ArrayLike) -> NDArray[np.float64]:
+def _gain(away: ArrayLike) -> Array:
     """Return what a record is worth that lies so far from the last good one [counts]: 3 at the very least."""
     return 16.0 - np.log2(1.0 + np.asarray(away, np.float64) / 64.0)
 
