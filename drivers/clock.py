@@ -100,11 +100,11 @@ class StillClock:
     factor = 1.0
 
     def __init__(self, at_ns: int) -> None:
-        self._at_ns = at_ns
+        self.at_ns = at_ns  # where it stands [ns]
 
     def now_ns(self) -> int:
         """Return where it stands [ns]."""
-        return self._at_ns
+        return self.at_ns
 
     def sleep(self, seconds: float) -> None:
         """Pass no time: there is nothing to wait for."""

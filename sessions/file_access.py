@@ -10,6 +10,7 @@ import shutil
 import sqlite3
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn, TypeVar, cast
 
@@ -74,13 +75,9 @@ def gzip_lines(path: Path) -> Iterator[str]:
 def limit_values(connection: sqlite3.Connection) -> sqlite3.Connection:
     """Limit the size of a connection's values, let it return texts that are no UTF-8, and return it."""
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_DOCUMENT)
-    connection.text_factory = _text
+    # A text whose bytes are damaged fits no check sum, instead of failing with its whole table.
+    connection.text_factory = partial(str, encoding="utf-8", errors="surrogateescape")
     return connection
-
-
-def _text(content: bytes) -> str:
-    """Return a text that no check sum fits where its bytes are damaged, instead of failing with its whole table."""
-    return content.decode(errors="surrogateescape")
 
 
 def remedy(error: Exception, *, new: bool = False) -> str:

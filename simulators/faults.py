@@ -134,37 +134,38 @@ class Faults:
 
     def _hurt(self, time: float, datagram: bytes) -> list[bytes]:
         """Return what becomes of one datagram, in the order it leaves."""
+        leaving = [datagram]
         for kind in _ON_THE_WAY:
             fault = self._at(kind, time)
             if fault is None:
                 continue
             draw = np.random.default_rng([self._seed, round(time * 1e6), KINDS.index(kind)])
             if draw.uniform() < fault.share:
-                return self._carry_out(fault, time, datagram, draw)
-        return [datagram, *self._take_swapped_datagram()]
+                leaving = self._carry_out(fault, time, datagram, draw)
+                break
+        if leaving and self._swapped is not None:
+            leaving.append(self._swapped)
+            self._swapped = None
+        return leaving
 
     def _carry_out(self, fault: Fault, time: float, datagram: bytes, draw: np.random.Generator) -> list[bytes]:
         match fault.kind:
             case "repeat":
-                return [datagram, datagram, *self._take_swapped_datagram()]
+                return [datagram, datagram]
             case "reorder" if self._swapped is None:
                 self._swapped = datagram
                 return []
             case "corrupt":
-                return [draw.bytes(len(datagram)), *self._take_swapped_datagram()]
+                return [draw.bytes(len(datagram))]
             case "shorten":
-                return [datagram[: int(draw.integers(0, len(datagram)))], *self._take_swapped_datagram()]
+                return [datagram[: int(draw.integers(0, len(datagram)))]]
             case "delay":
                 heapq.heappush(self._delayed, (time + fault.delay, datagram))
                 return []
             case "lose":
                 return []
             case _:
-                return [datagram, *self._take_swapped_datagram()]
-
-    def _take_swapped_datagram(self) -> list[bytes]:
-        swapped, self._swapped = self._swapped, None
-        return [] if swapped is None else [swapped]
+                return [datagram]
 
     def _at(self, kind: Kind, time: float) -> Fault | None:
         local = time % self._repeat if self._repeat > 0.0 else time

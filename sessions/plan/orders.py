@@ -46,11 +46,8 @@ def draw(
     The rule: the order `shuffle` gives for `name`, or else for "name~1", "name~2", and so on. Every order that meets
     the constraint is equally likely over seeds.
     """
-    for draw in range(DRAWS):
-        order = shuffle(items, seed, f"{name}~{draw}" if draw else name)
-        if meets(order):
-            return order
-    return None
+    orders = (shuffle(items, seed, f"{name}~{draw}" if draw else name) for draw in range(DRAWS))
+    return next(filter(meets, orders), None)
 
 
 def williams(count: int) -> tuple[tuple[int, ...], ...]:
@@ -158,7 +155,7 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
     return plan.with_trials(choose)
 
 
-def with_mounted_stimuli(plan: SessionPlan, codes: Mapping[int, str]) -> SessionPlan:
+def with_mounted_stimuli(plan: SessionPlan, codes: Mapping[int | None, str]) -> SessionPlan:
     """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` go by trial number."""
     stimuli = {(block.name, one.code): one for block in plan.blocks for one in block.candidates}
 

@@ -51,11 +51,6 @@ class TrialRecord:
     choice: Choice | None = None  # of the two compared; None unless outcome is "chosen"
 
     @property
-    def answered(self) -> bool:
-        """Say whether the subject gave an answer."""
-        return self.outcome in ("scored", "numbered", "chosen")
-
-    @property
     def start_ns(self) -> int | None:
         """Return when the take that counts began [ns, session clock]."""
         return self.take.start_ns if self.take else None

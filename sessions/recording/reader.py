@@ -4,7 +4,7 @@ import errno
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -80,7 +80,8 @@ class Recording:
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
-            plan = with_mounted_stimuli(as_type(head["plan"], SessionPlan), _mounted_codes(events))
+            mounted = {e.trial: e.data["code"] for e in events if e.kind == "stimulus_mounted"}  # last of each trial
+            plan = with_mounted_stimuli(as_type(head["plan"], SessionPlan), mounted)
             info = info_from_dict(head["transducer"]) if head["transducer"] else None
             as_type(head["provenance"], Provenance)
             simulated = None if head["simulated"] == "no" else head["simulated"]
@@ -140,10 +141,10 @@ class Recording:
 
     def trial(self, number: int) -> TrialRecord:
         """Return the record of the trial with this number. Raises KeyError when the plan has none."""
-        for record in self.trials:
-            if record.trial.number == number:
-                return record
-        raise KeyError(f"the plan of {self.folder} has no trial {number}")
+        record = next((record for record in self.trials if record.trial.number == number), None)
+        if record is None:
+            raise KeyError(f"the plan of {self.folder} has no trial {number}")
+        return record
 
     def readings(self, trial: int | None = None) -> ReadingBlock:
         """Return all readings, or those of the take of `trial` that counts (none where no take does)."""
@@ -223,15 +224,10 @@ def _copy_of(folder: Path) -> str:
     return f", or make it again of its sealed copy: 'daq-app import {copy}'" if copy.is_file() else ""
 
 
-def _end(events: Iterable[LoggedEvent]) -> Mapping[str, Any] | None:
+def _end(events: Sequence[LoggedEvent]) -> Mapping[str, Any] | None:
     """Return what the last `ended` tells, unless the session was resumed after it."""
-    end = None
-    for event in events:
-        if event.kind == "ended":
-            end = event.data
-        elif event.kind == "resumed":
-            end = None
-    return end
+    last = next((event for event in reversed(events) if event.kind in ("ended", "resumed")), None)
+    return None if last is None or last.kind == "resumed" else last.data
 
 
 def _blocks(
@@ -285,12 +281,6 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     except ValueError as error:
         raise RecordingError(f"{path}: {error}: use a later program") from error
     return head
-
-
-def _mounted_codes(events: Sequence[LoggedEvent]) -> Mapping[int, str]:
-    """Return the code of the stimulus that was mounted last in each trial."""
-    kind = "stimulus_mounted"
-    return {event.trial: event.data["code"] for event in events if event.kind == kind and event.trial is not None}
 
 
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:

@@ -194,10 +194,8 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
             connection.execute("COMMIT")
             connection.execute("PRAGMA journal_mode=DELETE")
     except sqlite3.Error as error:
-        if error.sqlite_errorcode & 0xFF not in (
-            sqlite3.SQLITE_BUSY,
-            sqlite3.SQLITE_LOCKED,
-        ):  # the low byte is the kind
+        kind = error.sqlite_errorcode & 0xFF  # the low byte
+        if kind not in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
             raise RecordingError(f"{live} cannot take its log in ({error}); {remedy(error)}") from error
         raise RecordingError(
             f"{live} is in use ({error}); end the program that still writes it, or reads it"

@@ -10,7 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
@@ -134,7 +134,10 @@ class Mount(NamedTuple):
 def unsafe(folder: Path) -> str | None:
     """Return a sentence why a session must not be recorded in `folder`, which need not be there yet; None: it may."""
     place = folder.resolve()
-    return _on_a_network(place) or _sync_warning(place, os.environ)
+    if (network := _on_a_network(place)) is not None:
+        return network
+    program = sync_folder_above(place) or _program_by_mark(place) or _sync_service(place)
+    return None if program is None else f"{place} is kept in step with a cloud by {program}; {MOVE}"
 
 
 def file_system(folder: Path) -> str | None:
@@ -162,11 +165,8 @@ def network_mount(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
 
 def sync_folder_above(place: PurePath) -> str | None:
     """Return the program whose folder `place` lies in, by the names of the folders above and itself; None: none."""
-    for part in place.parts:
-        for pattern, program in SYNC_FOLDERS:
-            if re.fullmatch(pattern, part, re.IGNORECASE):
-                return program
-    return None
+    named = ((part, pattern, program) for part in place.parts for pattern, program in SYNC_FOLDERS)
+    return next((program for part, pattern, program in named if re.fullmatch(pattern, part, re.IGNORECASE)), None)
 
 
 def linux_mounts(table: str) -> tuple[Mount, ...]:
@@ -212,11 +212,6 @@ def _windows_network(place: Path) -> bool:
     return windows is not None and windows.kernel32.GetDriveTypeW(f"{place.drive}\\") == 4
 
 
-def _sync_warning(place: Path, environment: Mapping[str, str]) -> str | None:
-    program = sync_folder_above(place) or _program_by_mark(place) or _sync_service(place, environment)
-    return None if program is None else f"{place} is kept in step with a cloud by {program}; {MOVE}"
-
-
 def _program_by_mark(place: Path) -> str | None:
     """Return the synchronising program whose marker file lies in `place` or above it; None where there is none."""
     for folder in (place, *place.parents):
@@ -232,9 +227,6 @@ def _program_by_mark(place: Path) -> str | None:
     return None
 
 
-def _sync_service(place: Path, environment: Mapping[str, str]) -> str | None:
-    for variable in SYNC_VARIABLES:
-        root = environment.get(variable)
-        if root and place.is_relative_to(Path(root)):
-            return "OneDrive"
-    return None
+def _sync_service(place: Path) -> str | None:
+    roots = [root for variable in SYNC_VARIABLES if (root := os.environ.get(variable))]
+    return "OneDrive" if any(place.is_relative_to(root) for root in roots) else None

@@ -52,7 +52,7 @@ class SessionWriter:
         self._block_rows = 0
         self._readings = 0
         self._event_count = 0
-        self._acknowledged = Acknowledged(time_ns=clock.now_ns())
+        self.acknowledged = Acknowledged(time_ns=clock.now_ns())  # how much is safe
         self._failure: str | None = None
         self._has_reserve = False
         self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # called with events once they are safe
@@ -142,7 +142,7 @@ class SessionWriter:
             connection.close()
             release_reserve(folder)
             raise RecordingError(f"{path} cannot be gone on with ({error}); {remedy(error)}") from error
-        writer._acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
+        writer.acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
         writer._has_reserve = bool(reserve)
         return writer
 
@@ -152,14 +152,9 @@ class SessionWriter:
         return self._path.parent
 
     @property
-    def acknowledged(self) -> Acknowledged:
-        """Return how much is safe."""
-        return self._acknowledged
-
-    @property
     def waiting(self) -> int:
         """Return how many readings were handed over and are not safe yet."""
-        return self._readings - self._acknowledged.readings
+        return self._readings - self.acknowledged.readings
 
     def limit(self, size: int) -> None:
         """Let the file grow to so many bytes, as on a disk that has no more room."""
@@ -172,7 +167,7 @@ class SessionWriter:
         if len(block):
             self._blocks.append(block)
             self._readings += len(block)
-        if self.clock.now_ns() - self._acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
+        if self.clock.now_ns() - self.acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
             self.commit()
 
     def event(
@@ -220,10 +215,10 @@ class SessionWriter:
         self._block_rows = rows
         self._blocks.clear()
         safe, self._events = self._events, []
-        self._acknowledged = Acknowledged(self._readings, self._event_count, now_ns)
+        self.acknowledged = Acknowledged(self._readings, self._event_count, now_ns)
         if safe:
             self.safe(safe)
-        return self._acknowledged
+        return self.acknowledged
 
     def close(self) -> None:
         """Commit, fold the write-ahead log into the file and let go of it. Harmless when repeated."""
@@ -308,7 +303,7 @@ class SessionWriter:
         return rows
 
     def _fail(self, error: sqlite3.Error) -> NoReturn:
-        safe = self._acknowledged
+        safe = self.acknowledged
         self._failure = (
             f"the disk took no more ({error}): the first {safe.readings} readings and {safe.events} events are safe; "
             f"{remedy(error)} and resume"

@@ -42,8 +42,9 @@ class TakeWatch:
             return ()
         if self._detector is not None:
             return self._touches(self._detector, block)
-        self._stretch = ReadingBlock.concatenate([self._stretch, block])
-        self._stretch = self._stretch.between(_last(self._stretch.time, self.zero_duration), len(self._stretch))
+        stretch = ReadingBlock.concatenate([self._stretch, block])
+        early = int(np.count_nonzero(stretch.time < stretch.time[-1] - self.zero_duration))
+        self._stretch = stretch.between(early, len(stretch))
         zero = self._zero()
         if zero is None:
             return ()
@@ -89,7 +90,3 @@ class TakeWatch:
 
     def _normal_force(self, block: ReadingBlock) -> Array:
         return normal_force(self.info.calibration.wrench(block.raw, np.zeros(6)), self.frame)
-
-
-def _last(time: Array, duration: float) -> int:
-    return int(np.count_nonzero(time < time[-1] - duration))

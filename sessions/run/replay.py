@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.plan.plan import SessionPlan
@@ -133,22 +134,16 @@ class _Again(Exception):
     """An error of the program that the recording tells of, raised where it was raised."""
 
 
-class _RecordedClock:
+class _RecordedClock(StillClock):
     """The session clock of the recording: it stands where the last step was, and nobody waits for it."""
 
     def __init__(self, recording: Recording) -> None:
+        super().__init__(recording.events[0].time_ns if recording.events else 0)
         self.factor = float(recording.provenance.get("clock", {}).get("factor", 1.0))
-        self._now_ns = recording.events[0].time_ns if recording.events else 0
-
-    def now_ns(self) -> int:
-        return self._now_ns
 
     def move(self, instant_ns: int) -> None:
         """Go on to an instant; never back."""
-        self._now_ns = max(self._now_ns, instant_ns)
-
-    def sleep(self, seconds: float) -> None:
-        """Pass no time: the steps do."""
+        self.at_ns = max(self.at_ns, instant_ns)
 
 
 @dataclass(eq=False)
@@ -222,8 +217,7 @@ class _Player:
 
     @property
     def info(self) -> TransducerInfo:
-        if self.transducer is None:
-            raise AssertionError("a visit without a transducer has none to ask")
+        assert self.transducer is not None, "a visit without a transducer has none to ask"
         return self.transducer
 
     @property

@@ -1,8 +1,8 @@
 """Runs a session: carries out the machine's commands with a transducer, a writer and a clock, and feeds events back."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import asdict, dataclass, field, fields
+from contextlib import closing, suppress
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, Protocol
 
 from drivers.clock import Clock
@@ -253,13 +253,9 @@ class _Run:
         self._due_ns["status"] = self.clock.now_ns()
 
     def _begin_watch(self) -> None:
-        transducer = self.transducer
-        if transducer is None:
-            raise AssertionError("a zero is measured only where there is a transducer")
-        settings = self.settings
-        self._watch = TakeWatch(
-            transducer.info, self.plan.frame, settings.zero_duration, settings.detection, settings.after_lift
-        )
+        assert self.transducer is not None, "a zero is measured only where there is a transducer"
+        settings, info = self.settings, self.transducer.info
+        self._watch = TakeWatch(info, self.plan.frame, settings.zero_duration, settings.detection, settings.after_lift)
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 
     def _report_losses(self, *, now: bool = False) -> None:
@@ -323,21 +319,16 @@ class _Run:
         if self.transducer is None:
             return Health()
         self.transducer.stop()
-        try:
+        with suppress(LinkLost, DeviceFault):  # all that had arrived was handed over before it says so
             while len(block := self._going_on(self.transducer.read(0.0))):
                 self._keep(block)
-        except (LinkLost, DeviceFault):
-            pass  # all that had arrived was handed over before it says so
         return self.transducer.health
 
 
 def _with_origin(settings: RunnerSettings) -> dict[str, Any]:
     """Return the settings as plain data, each marked as set or as the default."""
-    default, values = asdict(RunnerSettings()), asdict(settings)
+    default = asdict(RunnerSettings())
     return {
-        setting.name: {
-            "value": values[setting.name],
-            "origin": "default" if values[setting.name] == default[setting.name] else "set",
-        }
-        for setting in fields(settings)
+        name: {"value": value, "origin": "default" if value == default[name] else "set"}
+        for name, value in asdict(settings).items()
     }

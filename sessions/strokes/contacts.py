@@ -64,20 +64,10 @@ class ContactDetector:
         self._above: float | None = None  # first reading of the present run above the onset threshold
         self._below: float | None = None  # first reading of the present run below the lift threshold
         self._pulling: float | None = None  # first reading of the present run far below zero
-        self._baseline: Baseline | None = None
+        self._has_zero = False  # zero and noise are known
         self._level = self._noise_band = self._threshold = self._lift = 0.0
         if baseline is not None:
             self._take(baseline)
-
-    @property
-    def baseline(self) -> Baseline | None:
-        """Zero and noise in force; None until an unloaded stretch was seen."""
-        return self._baseline
-
-    @property
-    def touching(self) -> bool:
-        """True between an onset and its lift."""
-        return self._touching
 
     def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
         """Take readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return what they tell."""
@@ -85,40 +75,32 @@ class ContactDetector:
         return tuple(event for event in events if event is not None)
 
     def _take_reading(self, t: float, force: float) -> ContactEvent | None:
-        if self._baseline is None:
-            self._gather(t, force)
-            return None
-        return self._still_touching(t, force) if self._touching else self._not_touching(t, force)
-
-    def _not_touching(self, t: float, force: float) -> ContactEvent | None:
-        above = force - self._level
-        if above <= self._noise_band:
-            self._left = None
-        elif self._left is None:
-            self._left = t
-        if above <= self._threshold:
-            self._above = None
-            self._notice_pull(t, above)
+        if self._touching:
+            return self._still_touching(t, force)
+        if self._has_zero:
+            above = force - self._level
+            self._left = _since(self._left, t, on=above > self._noise_band)
+            self._above = _since(self._above, t, on=above > self._threshold)
+            if self._above is not None:
+                return self._touch(self._above, t)
             if self._follows:
-                self._gather(t, force)
+                self._notice_pull(t, above)
+        if self._follows:
+            self._gather(t, force)
+        return None
+
+    def _touch(self, began: float, t: float) -> ContactEvent | None:
+        """Return the onset once the force has exceeded the threshold for long enough."""
+        if t - began < self._settings.onset_hold - _ROUNDING:
             return None
-        if self._above is None:
-            self._above = t
-        if t - self._above < self._settings.onset_hold - _ROUNDING:
-            return None
-        onset = Onset(self._above if self._left is None else self._left, t)
+        onset = Onset(began if self._left is None else self._left, t)
         self._touching = True
-        self._above = self._below = self._left = None
+        self._above = self._left = None
         return onset
 
     def _still_touching(self, t: float, force: float) -> ContactEvent | None:
-        above = force - self._level
-        if above >= self._lift:
-            self._below = None
-            return None
-        if self._below is None:
-            self._below = t
-        if t - self._below < self._settings.lift_hold - _ROUNDING:
+        self._below = _since(self._below, t, on=force - self._level < self._lift)
+        if self._below is None or t - self._below < self._settings.lift_hold - _ROUNDING:
             return None
         lift = Lift(self._below, t)
         self._touching = False
@@ -128,12 +110,9 @@ class ContactDetector:
 
     def _notice_pull(self, t: float, above: float) -> None:
         """Forget a zero that was taken in contact."""
-        if above >= -self._threshold or not self._follows:
-            self._pulling = None
-        elif self._pulling is None:
-            self._pulling = t
-        elif t - self._pulling >= self._settings.baseline / 2:
-            self._pulling = self._baseline = None
+        self._pulling = _since(self._pulling, t, on=above < -self._threshold)
+        if self._pulling is not None and t - self._pulling >= self._settings.baseline / 2:
+            self._pulling, self._has_zero = None, False
             self._start_gathering()
 
     def _start_gathering(self) -> None:
@@ -154,7 +133,7 @@ class ContactDetector:
         self._bin.append(force)
 
     def _take(self, baseline: Baseline) -> None:
-        self._baseline = baseline
+        self._has_zero = True
         self._level = baseline.level
         self._noise_band = self._settings.leave_noise * baseline.noise
         self._threshold = onset_threshold(baseline.noise, self._settings)
@@ -162,6 +141,11 @@ class ContactDetector:
 
 
 _ROUNDING = 1e-9  # times are sums of ticks [s]
+
+
+def _since(began: float | None, t: float, *, on: bool) -> float | None:
+    """Return since when something has been so without a break, None where it is not so at `t` [s]."""
+    return None if not on else t if began is None else began
 
 
 def onset_threshold(noise: float, settings: DetectorSettings) -> float:

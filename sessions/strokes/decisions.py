@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 import msgspec
 from msgspec import Meta
 
-from sessions.file_access import as_type, json_object, remedy
+from sessions.file_access import as_type, json_object, name_failure
 from sessions.recording.derived import bytes_of
 from sessions.recording.head import compact_json
 from sessions.recording.schema import RecordingError, text_crc
@@ -212,12 +212,8 @@ class Decisions:
         Raises DecisionError where it cannot be.
         """
         _check(decision, self)
-        numbered = replace(decision, number=self._next)
-        return replace(self, lines=(*self.lines, numbered))
-
-    @property
-    def _next(self) -> int:
-        return max((line.number for line in self.lines), default=0) + 1
+        last = max((line.number for line in self.lines), default=0)
+        return replace(self, lines=(*self.lines, replace(decision, number=last + 1)))
 
 
 def read(folder: Path) -> Decisions:
@@ -256,27 +252,17 @@ def append(recording: "Recording", decision: Decision) -> Decision:
     """
     path = recording.folder / DECISIONS
     content = bytes_of(path)
-    before = parse(content)
-    _check(decision, before)
-    try:
-        torn = bool(content) and not content.endswith(b"\n")
-        number = max(before.with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
-        recorded = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
-        ending = b"\n" if torn else b""  # a torn line stays, as a line of its own
-        with path.open("ab") as file:
-            file.write(ending + _line(recorded, recording.simulated_sentence))
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be written ({error.strerror}); {remedy(error)}") from error
+    torn = bool(content) and not content.endswith(b"\n")
+    number = max(parse(content).with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
+    recorded = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
+    # A line is compact JSON whose last name, crc32, is that of the JSON text without it.
+    text = compact_json({**recording.mark, **recorded.to_dict()})
+    ending = "\n" if torn else ""  # a torn line stays, as a line of its own
+    with name_failure(RecordingError, f"{path} cannot be written"), path.open("ab") as file:
+        file.write(f'{ending}{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode())
+        file.flush()
+        os.fsync(file.fileno())
     return recorded
-
-
-def _line(decision: Decision, simulated: str | None) -> bytes:
-    """Return a line: compact JSON whose last name, crc32, is that of the JSON text without it."""
-    head: dict[str, Any] = {"SIMULATED": simulated} if simulated else {}
-    text = compact_json({**head, **decision.to_dict()})
-    return f'{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode()
 
 
 def _decision(line: bytes) -> Decision | str | None:
