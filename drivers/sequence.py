@@ -39,6 +39,10 @@ class _Record:
     counter: int
     received_ns: int
 
+    def since(self, before: "_Record") -> tuple[int, int]:
+        """Return how many numbers and ticks it lies ahead of one before."""
+        return _signed_difference(self.number - before.number), _signed_difference(self.counter - before.counter)
+
 
 class SequenceAccount:
     """Judges the records of one stream in the order in which they arrived."""
@@ -136,8 +140,7 @@ class SequenceAccount:
 
     def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
         """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""
-        ahead = _signed_difference(record.number - before.number)
-        ticks = _signed_difference(record.counter - before.counter)
+        ahead, ticks = record.since(before)
         on_line = self.step is not None and ticks == _signed_difference(ahead * self.step)
         if ahead == 0:
             return "same" if ticks == 0 else "off"
@@ -156,19 +159,15 @@ class SequenceAccount:
         else:
             assert self._last is not None
             self.frozen += relation == "frozen"
-            self._go(
-                record,
-                _signed_difference(record.number - self._last.number),
-                _signed_difference(record.counter - self._last.counter),
-            )
+            self._go(record, *record.since(self._last))
             return True
         return False
 
     def _learn(self, record: _Record) -> None:
         """Take the step from a record that comes right after the one just adopted."""
         assert self._last is not None
-        ticks = _signed_difference(record.counter - self._last.counter)
-        if _signed_difference(record.number - self._last.number) == 1 and ticks > 0:
+        ahead, ticks = record.since(self._last)
+        if ahead == 1 and ticks > 0:
             self.changed += self.step not in (None, ticks)
             self.step = ticks
 
@@ -179,10 +178,7 @@ class SequenceAccount:
             self._sequence = self._first - 1
             self._go(record, max(_signed_difference(record.number - self._first), 0) + 1, record.counter)
             return
-        ahead, ticks = (
-            _signed_difference(record.number - last.number),
-            _signed_difference(record.counter - last.counter),
-        )
+        ahead, ticks = record.since(last)
         step = self.step or 1
         # A device that had only just been switched on before it rebooted looks here as if it had gone on.
         if ticks <= 0:  # the counter began anew: only the host's clock knows for how long the device was away
@@ -203,8 +199,8 @@ class SequenceAccount:
 
     def _reject(self, record: _Record) -> None:
         """Count a record that nothing went on from."""
-        behind = 0 if self._last is None else -_signed_difference(record.number - self._last.number)
-        if 0 < behind <= NEAR:
+        ahead, _ = (0, 0) if self._last is None else record.since(self._last)
+        if -NEAR <= ahead < 0:
             self.late += 1
         else:
             self.garbage += 1

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from drivers.arrays import Array
+from sessions.prediction.options import BY_NAME
 from sessions.prediction.stored import Ends, SessionPrediction, TrialPrediction
-from solver.quantities import NAMES, QUANTITIES, SED, Quantity
+from solver.quantities import NAMES, QUANTITIES, SED
 
 STEP = 1e-3  # [s]
 ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"
@@ -185,7 +186,7 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
     """Return the firing in each trial as plain data, with what it is and every parameter."""
     reference, firings = session_firing(prediction, settings)
     return {
-        "about": ABOUT.format(label=_quantity_of(settings).label),
+        "about": ABOUT.format(label=BY_NAME[settings.quantity].label),
         "quantity": settings.quantity,
         "reference": reference,
         "reference_sed": reference if settings.quantity == SED.name else None,  # its name before; for one release
@@ -201,7 +202,7 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
     `reference` is kept with them where it is given, in the unit of the quantity.
     """
     rows: list[dict[str, Any]] = []
-    quantity, usual = _quantity_of(settings), usual_settings(settings.quantity)
+    quantity, usual = BY_NAME[settings.quantity], usual_settings(settings.quantity)
     if reference is not None:
         basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
         of_reference = {"name": "reference", "value": reference, "unit": quantity.unit}
@@ -236,7 +237,3 @@ def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = S
         if not least <= value <= most:
             raise ValueError(f"{name} = {value:g} is not allowed: {least:g} to {most:g}")
     return replace(usual_settings(quantity), seed=seed, **changes)
-
-
-def _quantity_of(settings: AfferentSettings) -> Quantity:
-    return QUANTITIES[NAMES.index(settings.quantity)]

@@ -48,9 +48,7 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
         if recording.plan.blocks
         else [(None, recording.readings())]
     )
-    presses: list[LoadingCurve] = []
-    names: list[str] = []
-    holds: list[HoldCurve | None] = []
+    presses: list[tuple[LoadingCurve, str, HoldCurve | None]] = []
     left_out: list[str] = []
     for trial, block in parts:
         analysis = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
@@ -69,10 +67,9 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
             if isinstance(loading, str):
                 left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loading}.")
             else:
-                holds.append(_hold(stroke, when, log.displacement))
-                presses.append(loading)
-                names.append(name)
-    return PressCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
+                presses.append((loading, name, _hold(stroke, when, log.displacement)))
+    curves, names, holds = zip(*presses, strict=True) if presses else ((), (), ())
+    return PressCurves(curves, names, holds, tuple(left_out))
 
 
 def _loading(stroke: Stroke, when: Array, log: DisplacementLog) -> LoadingCurve | str:

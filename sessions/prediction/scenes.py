@@ -243,11 +243,6 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
     }
 
 
-def greatest_traction(prediction: Prediction) -> float:
-    """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
-    return float(abs(prediction.skin.traction).max())
-
-
 def doubt_of(prediction: Prediction) -> str:
     """Return why numbers are not to be believed where the model was driven beyond its range, else ""."""
     return inside_out(prediction.audits)

@@ -101,13 +101,7 @@ def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
     mu, index = (np.array(column)[known] for column in zip(*((s.mu, float(s.index)) for s in series), strict=True))
     slope = (mu - mu.mean()) @ (values - values.mean(axis=0)) / np.sum((mu - mu.mean()) ** 2)
     change = slope * np.ptp(mu) / np.abs(values).mean(axis=0)
-    return Slopes(count, _correlation(index, values), change)
-
-
-def _correlation(x: Array, values: Array) -> Array:
-    """Return Pearson's correlation of x (n,) with each column of values (n, q)."""
-    apart, off = x - x.mean(), values - values.mean(axis=0)
-    return apart @ off / np.sqrt(np.sum(apart**2) * np.sum(off**2, axis=0))
+    return Slopes(count, np.corrcoef(index, values, rowvar=False)[0, 1:], change)
 
 
 PERSON, STROKE = 0.08, 0.05  # standard deviation of ln mu between people, and from stroke to stroke [-]

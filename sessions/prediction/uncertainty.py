@@ -21,7 +21,6 @@ from sessions.prediction.scenes import (
     Progress,
     derivatives_by,
     doubt_of,
-    greatest_traction,
     part_of,
     predict_scenes,
     scene_along,
@@ -295,7 +294,7 @@ def _alternative(
         tau_max,
         answer.indentation,
         **settled_numbers(answer),
-        traction=greatest_traction(answer),
+        traction=float(abs(answer.skin.traction).max()),  # any tau_max beyond it has the same solution
         indentation_error=known_error(answer, answer.indentation_error),
         doubt=doubt_of(answer),
     )

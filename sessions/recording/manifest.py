@@ -2,8 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -76,12 +76,8 @@ def description(recording: Recording) -> dict[str, Any]:
 
 def _trial(record: TrialRecord) -> dict[str, Any]:
     return {
-        "number": record.trial.number,
-        "block": record.trial.block,
-        "phase": record.trial.phase,
-        "descriptor": record.trial.stimulus.descriptor,
-        "index": record.trial.stimulus.index,
-        "code": record.trial.stimulus.code,
+        **{name: getattr(record.trial, name) for name in ("number", "block", "phase")},
+        **asdict(record.trial.stimulus),
         "outcome": record.outcome,
         "score": record.score,
         "free_number": record.number,
@@ -122,24 +118,21 @@ def list_in_manifest(folder: Path, names: Iterable[str], head: dict[str, Any] | 
         write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def changed_files(recording: Recording) -> tuple[str, ...]:
-    """Return a sentence for each listed file that is gone or not what it was, and one for a damaged manifest."""
-    problems: list[str] = []
+def changed_files(recording: Recording) -> Iterator[str]:
+    """Yield a sentence for each listed file that is gone or not what it was, and one for a damaged manifest."""
     try:
         document = _manifest(recording.folder)
     except RecordingError as damaged:
-        return (str(damaged),)
+        yield str(damaged)
+        return
     for name, digest in document.pop("files").items():
         path = recording.folder / name
         if not path.is_file():
-            problems.append(f"{name} is listed in {MANIFEST_FILE} and missing")
+            yield f"{name} is listed in {MANIFEST_FILE} and missing"
         elif file_sha256(path) != digest["sha256"] or path.stat().st_size != digest["bytes"]:
-            problems.append(
-                f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
-            )
+            yield f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
     if document != head_of_manifest(recording):
-        problems.append(f"the head of {MANIFEST_FILE} differs from the live file")
-    return tuple(problems)
+        yield f"the head of {MANIFEST_FILE} differs from the live file"
 
 
 class _ListedFile(msgspec.Struct):

@@ -188,34 +188,31 @@ class _Repeats:
 
     def all(self) -> dict[str, Array]:
         """Return the numbers (repeats,) of each repeat, by name."""
-        numbers: dict[str, Array] = {}
-        if self._stroke.tau_max is not None and self._stroke.peak_tangential:
-            area = self._stroke.contact_area or self._stroke.peak_tangential / self._stroke.tau_max
-            curve = self._curve
-            at = int(np.nanargmax(curve.tangential if curve.crests is None else curve.crests))
-            of_normal, _ = self._shared.shares(drag_direction(self._curve.force[at : at + 1]))
-            top = self._top(curve.tangential, self._noise_t) if curve.crests is None else self._crest(curve.crests)
+        numbers, stroke, curve = dict[str, Array](), self._stroke, self._curve
+        if stroke.tau_max is not None and stroke.peak_tangential:
+            area = stroke.contact_area or stroke.peak_tangential / stroke.tau_max
+            if curve.crests is None:
+                at, top = int(np.nanargmax(curve.tangential)), self._top(curve.tangential, self._noise_t)
+            else:
+                missed = curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
+                at = int(np.nanargmax(curve.crests))
+                top = self._top(curve.crests, curve.crest_noise, filtered=False) + missed
+            of_normal, _ = self._shared.shares(drag_direction(curve.force[at : at + 1]))
             shift = self._zero_t + top + of_normal * curve.normal[at]
-            peak = self._stroke.tau_max * area * self._gain_t + shift
-            numbers["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
-            numbers["peak_tangential"] = self._stroke.peak_tangential * self._gain_t + shift
+            peak = stroke.tau_max * area * self._gain_t + shift
+            numbers["tau_max"] = peak / (area * self._gain_n**stroke.area_exponent)
+            numbers["peak_tangential"] = stroke.peak_tangential * self._gain_t + shift
         for name in ("mu_static", "mu_max"):
-            value = getattr(self._stroke, name)
+            value = getattr(stroke, name)
             if value is not None:
                 numbers[name] = self._single(value)
         numbers |= self._window()
-        if self._stroke.peak_normal is not None:
-            top = self._top(self._curve.normal, self._noise_n)
-            at = int(np.nanargmax(self._curve.normal))
-            _, of_drag = self._shared.shares(drag_direction(self._curve.force[at : at + 1]))
-            shift = self._zero_n + of_drag * self._curve.tangential[at]
-            numbers["peak_normal"] = self._stroke.peak_normal * self._gain_n + shift + top
+        if stroke.peak_normal is not None:
+            top, at = self._top(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
+            _, of_drag = self._shared.shares(drag_direction(curve.force[at : at + 1]))
+            shift = self._zero_n + of_drag * curve.tangential[at]
+            numbers["peak_normal"] = stroke.peak_normal * self._gain_n + shift + top
         return numbers | self._instants(numbers.get("speed")) | self._onset()
-
-    def _crest(self, force: Array) -> Array:
-        """Return how far the true greatest unfiltered force may lie from the reported one (repeats,) [N]."""
-        missed = self._curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
-        return self._top(force, self._curve.crest_noise, filtered=False) + missed
 
     def _top(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
         """Return how far the true greatest force may lie from the reported one (repeats,) [N].
