@@ -1,10 +1,13 @@
 """Links over the network. Only this, `serial_link` and `usb_link` open ports."""
 
 import contextlib
+import io
+import re
 import socket
 import threading
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 from drivers.deadline import TICK, Deadline
 from drivers.transducer import LinkLost, SetupError
@@ -76,44 +79,41 @@ def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Dea
     Raises LinkLost when nothing answers at the IP address, or not all by the deadline.
     """
     where = f"{address}, TCP port {port}"
-    answer = b""
     with (
         _name_failures(where, "no whole answer", "check the address and the tcp port", deadline),
         _Call(address, port, deadline) as call,
     ):
-        call.send(request)
-        while len(answer) < size and (more := call.receive(size - len(answer))):
-            answer += more
-    return answer
+        return call.ask(request).read(size)
 
 
-class _Call:
-    """A connection to a port of an IP address, whose every wait ends by a deadline."""
+class _Call(io.RawIOBase):
+    """A connection to a port of an IP address, whose every wait ends by a deadline. Reading raises OSError."""
 
     def __init__(self, address: str, port: int, deadline: Deadline) -> None:
         """Connect. Raises OSError."""
         self._deadline = deadline
         self._socket = socket.create_connection((address, port), timeout=self._remaining())
 
-    def __enter__(self) -> "_Call":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._socket.close()
-
-    def send(self, data: bytes) -> None:
-        """Send all of `data`. Raises OSError."""
+    def ask(self, request: bytes) -> io.BufferedReader:
+        """Send all of a request, and return what its answer is read from. Raises OSError."""
         self._socket.settimeout(self._remaining())
-        self._socket.sendall(data)
+        self._socket.sendall(request)
+        return io.BufferedReader(self)
 
-    def receive(self, most: int) -> bytes:
-        """Return what comes next, at most so many bytes; none at the end of the connection. Raises OSError."""
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any, /) -> int:  # noqa: ANN401  whatever has a buffer
         while True:
             self._socket.settimeout(min(self._remaining(), TICK))
             try:
-                return self._socket.recv(most)
+                return self._socket.recv_into(buffer)
             except TimeoutError:
                 continue  # a stop may be wanted, and the deadline may be over
+
+    def close(self) -> None:
+        self._socket.close()
+        super().close()
 
     def _remaining(self) -> float:
         """Return the time that remains [real s]. Raises TimeoutError, Stopped."""
@@ -142,44 +142,26 @@ def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnsw
         _name_failures(where, "no answer", "check power, cable and address", deadline),
         _Call(address, port, deadline) as call,
     ):
-        call.send(f"GET {path} HTTP/1.0\r\nHost: {address}\r\nConnection: close\r\n\r\n".encode("ascii"))
-        return _answer(call, where)
+        return _answer(call.ask(f"GET {path} HTTP/1.0\r\nHost: {address}\r\nConnection: close\r\n\r\n".encode()), where)
 
 
-def _answer(call: _Call, where: str) -> HttpAnswer:
+def _answer(reader: io.BufferedReader, where: str) -> HttpAnswer:
     """Read one HTTP/1.0 answer: to its stated length, or else to the end of the connection."""
-    received = bytearray()
-    head, body_at, length = b"", -1, None
-    while length is None or len(received) < body_at + length:
-        chunk = call.receive(16384)
-        if not chunk:
-            break
-        received += chunk
-        if body_at < 0:
-            end = received.find(b"\r\n\r\n")
-            if end < 0 and len(received) <= MOST_HEAD:
-                continue
-            if end < 0:
-                raise LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
-            head, body_at = bytes(received[:end]), end + 4
-            length = _stated_length(head)
-        if len(received) - body_at > MOST_BODY or (length or 0) > MOST_BODY:
-            raise LinkLost(f"{where} sends more than {MOST_BODY} bytes; check that it is the address of the box")
-    words = head.split(b"\r\n", 1)[0].split(None, 2)
-    if body_at < 0 or len(words) < 2 or not words[0].startswith(b"HTTP/") or not words[1].isdigit():
+    head, line = b"", b""
+    while line != b"\r\n" and len(head) <= MOST_HEAD and (line := reader.readline(MOST_HEAD)):
+        head += line
+    status = re.match(rb"HTTP/\S*[ \t]+(\d+)(?!\S)", head)
+    if status is None or line != b"\r\n":
         raise LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
-    if length is not None and len(received) < body_at + length:
-        raise LinkLost(f"{where} broke off after {len(received) - body_at} of {length} bytes; try again")
-    return HttpAnswer(int(words[1][:4]), bytes(received[body_at:]))
-
-
-def _stated_length(head: bytes) -> int | None:
-    """Return the Content-Length of an HTTP head, or None where it states none that can be read."""
-    for line in head.split(b"\r\n")[1:]:
-        name, _, value = line.partition(b":")
-        if name.strip().lower() == b"content-length" and value.strip().isdigit():
-            return min(int(value.strip()[:12]), MOST_BODY + 1)
-    return None
+    stated = re.search(rb"\n[ \t]*content-length[ \t]*:[ \t]*(\d+)[ \t]*\r\n", head, re.IGNORECASE)
+    length = None if stated is None else int(stated[1][:12])
+    too_long = (length or 0) > MOST_BODY
+    body = b"" if too_long else reader.read(MOST_BODY + 1 if length is None else length)
+    if too_long or len(body) > MOST_BODY:
+        raise LinkLost(f"{where} sends more than {MOST_BODY} bytes; check that it is the address of the box")
+    if length is not None and len(body) < length:
+        raise LinkLost(f"{where} broke off after {len(body)} of {length} bytes; try again")
+    return HttpAnswer(int(status[1][:4]), body)
 
 
 def resolve(host: str, deadline: Deadline) -> str:

@@ -10,9 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from drivers.arrays import Indices
 from drivers.clock import Clock
-from drivers.clock_recovery import Placement, RateWatch, rate_of_least_late, rate_words
+from drivers.clock_recovery import ClockRecovery, Placement, ScanCount, rate_of_least_late, rate_words
 from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link
 from drivers.readings import ReadingBlock, RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
@@ -27,32 +26,6 @@ _SILENCE = 5.0  # without a whole record, after which it is given up
 _LOOKS = 12  # at a rate that is to be measured, until two running say the same
 _ALIKE = 0.03  # rates that differ by less are said to be the same [-]
 _BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the last one again and again
-
-
-class Numbering(Protocol):
-    """Gives records their numbers and times; `ClockRecovery` does it from the host's clock."""
-
-    @property
-    def lost(self) -> int:
-        """Numbers that no record has."""
-        ...
-
-    @property
-    def watch(self) -> RateWatch:
-        """What has been found of the stream's rate."""
-        ...
-
-    def take(self, damaged: Indices, received_ns: int) -> Placement:
-        """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
-        ...
-
-    def release(self) -> Placement:
-        """Place what was kept back, as at the end of the stream."""
-        ...
-
-    def bridge(self, received_ns: int) -> None:
-        """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one record."""
-        ...
 
 
 class Conversation(Protocol):
@@ -73,7 +46,7 @@ class Conversation(Protocol):
         """Return a decoder for a stream about to begin."""
         ...
 
-    def numbering(self, rate: float, factor: float) -> Numbering:
+    def numbering(self, rate: float, factor: float) -> ClockRecovery | ScanCount:
         """Return what numbers a stream of `rate` [Hz] by a session clock that runs `factor` times real time."""
         ...
 
