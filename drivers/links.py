@@ -147,12 +147,16 @@ def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnsw
 
 def _answer(reader: io.BufferedReader, where: str) -> HttpAnswer:
     """Read one HTTP/1.0 answer: to its stated length, or else to the end of the connection."""
-    head, line = b"", b""
-    while line != b"\r\n" and len(head) <= MOST_HEAD and (line := reader.readline(MOST_HEAD)):
+    no_page = LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
+    head = b""
+    while not head.endswith(b"\r\n\r\n"):
+        line = reader.readline(MOST_HEAD)
         head += line
+        if not line or len(head) > MOST_HEAD:
+            raise no_page
     status = re.match(rb"HTTP/\S*[ \t]+(\d+)(?!\S)", head)
-    if status is None or line != b"\r\n":
-        raise LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
+    if status is None:
+        raise no_page
     stated = re.search(rb"\n[ \t]*content-length[ \t]*:[ \t]*(\d+)[ \t]*\r\n", head, re.IGNORECASE)
     length = None if stated is None else int(stated[1][:12])
     too_long = (length or 0) > MOST_BODY
