@@ -7,10 +7,9 @@ newer files (1.1) also print the product as UserAxis, to five decimals, which se
 
 import hashlib
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import date
+from datetime import datetime
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -198,11 +197,7 @@ def _day(text: str) -> str:
     >>> _day("3/5/2014"), _day("spring 2014")
     ('2014-03-05', 'spring 2014')
     """
-    parts = re.fullmatch(r"(\d{1,2})/(\d{1,2})/(\d{4})", text, re.ASCII)
-    if parts is None:
-        return text
-    month, day, year = (int(part) for part in parts.groups())
     try:
-        return date(year, month, day).isoformat()
+        return datetime.strptime(text, "%m/%d/%Y").date().isoformat()
     except ValueError:
         return text

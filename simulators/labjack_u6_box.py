@@ -252,34 +252,28 @@ class SimulatedBus(_Backend):
         return len(self._claims)
 
     def enumerate_devices(self) -> Iterator[int]:
-        """Return the places at which something is plugged in."""
         return iter([place for place, box in enumerate(self._boxes) if box.is_plugged])
 
     def get_device_descriptor(self, dev: int) -> SimpleNamespace:
-        """Return what a U6 tells of itself."""
         values = 18, 1, 0x0200, 0xFF, 0, 0, 64, 0x0CD5, 0x0006, 0x0100, 0, 0, 0, 1
         return _descriptor(
             _DEVICE, values, address=dev + 1, bus=1, port_number=dev + 1, port_numbers=(dev + 1,), speed=2
         )
 
     def get_configuration_descriptor(self, dev: int, config: int) -> SimpleNamespace:
-        """Return the only configuration."""
         if config:
             raise IndexError(config)
         return _descriptor(_CONFIGURATION, (9, 2, 39, 1, 1, 0, 0x80, 250))
 
     def get_interface_descriptor(self, dev: int, intf: int, alt: int, config: int) -> SimpleNamespace:
-        """Return the only interface."""
         if intf or alt or config:
             raise IndexError(alt)
         return _descriptor(_INTERFACE, (9, 4, 0, 0, len(_ENDPOINTS), 0xFF, 0, 0, 0))
 
     def get_endpoint_descriptor(self, dev: int, ep: int, intf: int, alt: int, config: int) -> SimpleNamespace:
-        """Return one of the three bulk endpoints."""
         return _descriptor(_ENDPOINT, (7, 5, _ENDPOINTS[ep], 2, 64, 0, 0, 0))
 
     def open_device(self, dev: int) -> SimpleNamespace:
-        """Return a handle."""
         return SimpleNamespace(place=dev)
 
     def close_device(self, dev_handle: SimpleNamespace) -> None:
@@ -291,7 +285,6 @@ class SimulatedBus(_Backend):
         """Take the only configuration."""
 
     def get_configuration(self, dev_handle: SimpleNamespace) -> int:
-        """Return the configuration that is active."""
         self._box(dev_handle)
         return 1
 
@@ -302,11 +295,9 @@ class SimulatedBus(_Backend):
             raise _core.USBError("Resource busy", -6, errno.EBUSY)
 
     def release_interface(self, dev_handle: SimpleNamespace, intf: int) -> None:
-        """Let go."""
         self.close_device(dev_handle)
 
     def bulk_write(self, dev_handle: SimpleNamespace, ep: int, intf: int, data: Any, timeout: int) -> int:  # noqa: ANN401
-        """Send a request."""
         self._box(dev_handle).command(bytes(data))
         return len(data)
 
@@ -321,7 +312,6 @@ class SimulatedBus(_Backend):
         return len(data)
 
     def is_kernel_driver_active(self, dev_handle: SimpleNamespace, intf: int) -> bool:
-        """Tell that the system has no driver for it."""
         return False
 
     def _box(self, dev_handle: SimpleNamespace) -> LabJackU6Box:

@@ -98,7 +98,7 @@ class Stroke:
     sag: float = 0.35  # how far the normal force lies below its peak, on average, away from it [-]
     wander: float = 0.12  # how far it wanders about that level [-]
     speed_wander: float = 0.05  # how far the speed wanders about its mean [-]
-    phases: tuple[float, float, float] = (0.3, 2.1, 4.4)  # of the wandering [rad]
+    phases: tuple[float, ...] = (0.3, 2.1, 4.4)  # three, of the wandering [rad]
     slant: float = 0.0  # angle of the path to the x axis [degrees]
     across: float = 0.0  # where the path crosses x = 0 [mm]
 

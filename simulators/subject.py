@@ -59,7 +59,7 @@ class SimulatedSubject:
             peak_at=float(draw.uniform(0.4, 0.7)),
             sag=float(draw.uniform(0.28, 0.4)),
             wander=float(draw.uniform(0.06, 0.14)),
-            phases=_phases(draw),
+            phases=tuple(draw.uniform(0.0, 2 * np.pi, 3).tolist()),
             slant=self._slant + float(draw.normal(0.0, 0.5)),
             across=float(draw.normal(0.0, 1.0)),
         )
@@ -109,8 +109,3 @@ class SimulatedSubject:
         """Return a source of chance of this subject, this surface and this purpose alone."""
         name = int.from_bytes(surface.descriptor.encode(), "big")
         return np.random.default_rng([self.seed, purpose, name, surface.index, repetition])
-
-
-def _phases(draw: np.random.Generator) -> tuple[float, float, float]:
-    first, second, third = draw.uniform(0.0, 2 * np.pi, 3)
-    return float(first), float(second), float(third)

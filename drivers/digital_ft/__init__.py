@@ -210,8 +210,8 @@ def _answer(link: Link, request: bytes, what: str) -> bytes:
         if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
             while link.receive(_ANSWER) is not None:
                 pass
-        if isinstance(answer, wire.Refusal):
-            raise DeviceFault(f"the transducer was asked {what} and refused: {answer.reason}")
+        if isinstance(answer, str):
+            raise DeviceFault(f"the transducer was asked {what} and refused: {answer}")
         if answer is not None:
             return answer
     raise LinkLost(f"the transducer was asked {what} and did not answer; check the cable")

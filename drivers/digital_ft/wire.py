@@ -68,13 +68,6 @@ _PROOF = 6  # packets in a row that must be sound before a new place is believed
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
-    """The transducer understood a request and will not carry it out."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
 class StoredCalibration:
     """One of the calibrations the transducer keeps."""
 
@@ -113,10 +106,11 @@ def write_registers(first: int, registers: bytes) -> bytes:
     return request(WRITE, struct.pack(">HHB", first, len(registers) // 2, len(registers)) + registers)
 
 
-def answer_in(response: bytes, request: bytes) -> bytes | Refusal | None:
+def answer_in(response: bytes, request: bytes) -> bytes | str | None:
     """Return the data of the answer to `request`, wherever it lies in `response`; None while it is not there.
 
-    For registers read that is their bytes, else what follows the function code. Raises nothing.
+    For registers read that is their bytes, else what follows the function code. Where the transducer understood and
+    will not carry it out, it is a text: why. Raises nothing.
     """
     function = request[1]
     size, head = 5, bytes([ADDRESS, function])
@@ -128,7 +122,7 @@ def answer_in(response: bytes, request: bytes) -> bytes | Refusal | None:
         if frame != request:  # an adapter may repeat what we send
             return frame[3:-2] if function == READ else frame[2:-2]
     for frame in _frames(response, bytes([ADDRESS, function | _EXCEPTION]), 5):
-        return Refusal(_REASONS.get(frame[2], f"exception {frame[2]}"))
+        return _REASONS.get(frame[2], f"exception {frame[2]}")
     return None
 
 

@@ -63,7 +63,7 @@ def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
 
 def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
     """Open the converter that the address names, and return its link and identity."""
-    fitting: dict[int, Any] = {}
+    fitting: dict[int, tuple[Any, wire.Identity]] = {}
     refused: list[SetupError] = []
     for one in devices(_VENDOR, _PRODUCT):
         try:
@@ -72,14 +72,14 @@ def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identit
             refused.append(error)
             continue
         try:
-            serial = _identity(deadline.bound(link)).serial
+            identity = _identity(deadline.bound(link))
         except (LinkLost, DeviceFault) as error:
             refused.append(SetupError(f"{place.uri}: {error}"))
             continue
         finally:
             link.close()
-        if place.serial in (0, serial):
-            fitting[serial] = one
+        if place.serial in (0, identity.serial):
+            fitting[identity.serial] = one, identity
     if len(fitting) > 1:
         raise SetupError(f"{place.uri}: several are plugged in; add serial= one of {', '.join(map(str, fitting))}")
     if not fitting:
@@ -87,13 +87,8 @@ def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identit
             raise refused[0]
         which = f"LabJack U6 {place.serial}" if place.serial else "LabJack U6"
         raise LinkLost(f"{place.uri}: no {which} is plugged in; check its USB cable")
-    (one,) = fitting.values()
-    link = UsbLink(one, _ENDPOINTS, place.uri)
-    try:
-        return link, _identity(deadline.bound(link))
-    except BaseException:
-        link.close()
-        raise
+    ((one, identity),) = fitting.values()
+    return UsbLink(one, _ENDPOINTS, place.uri), identity
 
 
 def _again(place: _Where, serial: int, deadline: Deadline) -> UsbLink:

@@ -13,7 +13,8 @@ from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT
 from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
 from drivers.transducer import SetupError, StatusTable
 
-_FILTERS = ("off", "838", "326", "152", "73", "35", "18", "8", "5", "1500", "2000", "2500", "3000")  # by code [Hz]
+_CUT_OFFS = (838, 326, 152, 73, 35, 18, 8, 5, 1500, 2000, 2500, 3000)  # of the low-pass filters, by code from 1 [Hz]
+_FILTERS = {"0": "off"} | {str(code): f"{cut_off} Hz" for code, cut_off in enumerate(_CUT_OFFS, 1)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ def parse_configuration(page: bytes) -> Configuration:
     rated = _ratings(elements)
     settings = {
         "configuration": _optional(elements, "cfgnam"),
-        "filter": _filter(_optional(elements, "setuserfilter")),
+        "filter": _FILTERS.get(code := _optional(elements, "setuserfilter"), code),  # itself where it is unknown
         "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(elements, "setbias"))),
         "tool transform": _transform(elements),
         "status at opening": _status(_optional(elements, "runstat"), status),
@@ -157,13 +158,6 @@ def _ticks(text: str) -> float:
     if text not in known:
         raise SetupError(f"the box says its converter runs at {text[:20]!r} Hz, not at one of {', '.join(known)}")
     return known[text]
-
-
-def _filter(code: str) -> str:
-    """Return the low-pass filter in force from its code, or the code itself where it is unknown."""
-    known = code.isascii() and code.isdecimal() and len(code) < 3 and int(code) < len(_FILTERS)
-    name = _FILTERS[int(code)] if known else code
-    return f"{name} Hz" if name.isdecimal() and known else name
 
 
 def _transform(elements: Mapping[str, list[str]]) -> str:

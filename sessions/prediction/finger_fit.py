@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
-from scipy.special import ndtri
+from scipy.special import ndtri, softmax
 
 from drivers.arrays import Array
 from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, at_depths
@@ -154,7 +154,7 @@ class Likelihood:
         prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
         fits = -(self.free * np.log(misfit + self.floor) + self._of_width(contrast, touch)) / 2.0
         log = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
-        return _Grid(contrast, mean, touch, misfit, variance, fits, _weights(log), _weights(fits), step)
+        return _Grid(contrast, mean, touch, misfit, variance, fits, softmax(log), softmax(fits), step)
 
     def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array, Array]:
         """Return the best mean (g,) at touches, its misfit (g,), residual (g, n) and Jacobian (g, n, 1 + presses)."""
@@ -213,11 +213,6 @@ class Likelihood:
         rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
         low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])
         return Interval(float(log[fits.argmax()]), None if rim[0] else low, None if rim[1] else high)
-
-
-def _weights(log: Array) -> Array:
-    weight = np.exp(log - log.max())
-    return np.asarray(weight / weight.sum(), np.float64)
 
 
 def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 0.0, seed: int = 0) -> FingerFit:

@@ -102,13 +102,8 @@ def segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
 
 def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:
     hole = slice(before.stop, after.start)
-    cause = FlawName.LOST_READINGS
-    if frozen[hole].any():
-        cause = FlawName.FROZEN
-    elif saturated[hole].any():
-        cause = FlawName.SATURATED
-    elif wild[hole].any():
-        cause = FlawName.WILD
+    marks = ((frozen, FlawName.FROZEN), (saturated, FlawName.SATURATED), (wild, FlawName.WILD))
+    cause = next((name for marked, name in marks if marked[hole].any()), FlawName.LOST_READINGS)
     return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
 
 

@@ -145,12 +145,9 @@ def span_of(
 
 def _least_step(torques: Array) -> float:
     """Return the least step between different readings of a torque, if steps are few enough to be seen."""
-    largest = 0.0
-    for column in torques.T:
-        levels = np.unique(column)
-        if 1 < len(levels) < len(column) / 2:  # most values come more than once: the steps are the sensor's own
-            largest = max(largest, float(np.median(np.diff(levels))))
-    return largest
+    levels = [np.unique(column) for column in torques.T]
+    # Where most values come more than once the steps are the sensor's own.
+    return max((float(np.median(np.diff(each))) for each in levels if 1 < len(each) < len(torques) / 2), default=0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

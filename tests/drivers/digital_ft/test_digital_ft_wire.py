@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.digital_ft import wire
-from drivers.digital_ft.wire import Refusal, StreamDecoder, answer_in, parse_calibration
+from drivers.digital_ft.wire import StreamDecoder, answer_in, parse_calibration
 from drivers.transducer import SetupError
 
 GOLDEN_PACKET = bytes.fromhex("0064 012C 01F4 FF38 FE70 FDA8 50")
@@ -55,7 +55,7 @@ def test_golden_answers_are_understood_wherever_they_lie():
     status_request = wire.read_registers(wire.STATUS, 1)
     assert answer_in(bytes.fromhex("0A 03 02 00 00 1D 85"), status_request) == b"\0\0"
     assert answer_in(b"\x0a\x03garbage" + bytes.fromhex("0A 03 02 00 00 1D 85 0A"), status_request) == b"\0\0"
-    assert answer_in(status_request + bytes.fromhex("0A 83 02 B1 33"), status_request) == Refusal("illegal address")
+    assert answer_in(status_request + bytes.fromhex("0A 83 02 B1 33"), status_request) == "illegal address"
     assert answer_in(bytes.fromhex("0A 03 02 00 00 1D 84"), status_request) is None
     start_request = wire.request(wire.START_STREAM, b"\x55")
     assert answer_in(start_request, start_request) is None  # an adapter that repeats what is sent is no answer
@@ -68,7 +68,7 @@ def test_no_garbage_is_an_answer_or_raises(response, function):
         function, wire.request(function, b"\x55")
     )
     answer = answer_in(response, request)
-    assert answer is None or isinstance(answer, (bytes, Refusal))
+    assert answer is None or isinstance(answer, (bytes, str))
 
 
 def test_the_golden_packet_gives_its_gauges_in_order():
