@@ -239,10 +239,7 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
             head["crc32"] = str(_check_sum(*head.values()))
             connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
             if key is not None:  # before the study counts as made: without its key it would be lost
-                document = {
-                    "what": "which stimulus bears which code; 'daq-app unblind' opens it",
-                    "sealed": key.seal(),
-                }
+                document = {"what": "which stimulus bears which code; 'daq-app unblind' opens it", "sealed": key.seal()}
                 write_whole(folder / KEY_FILE, json.dumps(document, indent=1).encode() + b"\n")
             _tell(connection, "created", "", {"protocol": protocol.name, "blinded": blinded})
     except BaseException:  # half a study would stand in the way of the next try

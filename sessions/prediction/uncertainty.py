@@ -52,11 +52,7 @@ _QUANTILES = (0.025, 0.975)
 
 
 def with_intervals(
-    analysis: Analysis,
-    prediction: SessionPrediction,
-    progress: Progress | None = None,
-    *,
-    both_ways: bool = True,
+    analysis: Analysis, prediction: SessionPrediction, progress: Progress | None = None, *, both_ways: bool = True
 ) -> SessionPrediction:
     """Return a prediction with an interval of each SED it holds, where its options ask for them.
 

@@ -61,12 +61,7 @@ def problems(folder: Path) -> tuple[str, ...]:
     if not is_sealed(folder):
         seals = "" if recording.end is None else f"; 'daq-app resume {folder} --end' seals it"
         return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}{seals}")
-    return (
-        *changed_files(recording),
-        *recording.losses,
-        *differences(recording),
-        *_contradictions(recording),
-    )
+    return (*changed_files(recording), *recording.losses, *differences(recording), *_contradictions(recording))
 
 
 def _contradictions(recording: Recording) -> Iterator[str]:

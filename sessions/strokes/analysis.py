@@ -14,14 +14,7 @@ from sessions.strokes.bootstrap import StrokeIntervals, stroke_intervals
 from sessions.strokes.decisions import OF_SESSION, Decision, DecisionError, Decisions, Value, read
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
 from sessions.strokes.stroke import Flaw, FlawName, FrictionParameters, Stroke, friction_parameters
-from sessions.strokes.trial_analysis import (
-    Press,
-    Tilt,
-    TrialContext,
-    analyse_trial,
-    strokes_for_model,
-    tilt_of,
-)
+from sessions.strokes.trial_analysis import Press, Tilt, TrialContext, analyse_trial, strokes_for_model, tilt_of
 from sessions.toml_file import SettingsError, from_table
 
 if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader

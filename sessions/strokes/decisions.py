@@ -31,6 +31,7 @@ Value = float | int | bool | Span | None
 _Instant = Annotated[float, Meta(gt=-1e9, lt=1e9)]
 _Angle = Annotated[float, Meta(ge=-MOST_TILT, le=MOST_TILT)]
 _Count = Annotated[int, Meta(ge=1)]
+_Stretch = tuple[_Instant, _Instant]
 
 
 class Kind(NamedTuple):
@@ -44,12 +45,9 @@ class Kind(NamedTuple):
 OF_STROKE: Mapping[str, Kind] = {
     "onset": Kind(_Instant, "an instant [s]"),
     "lift": Kind(_Instant, "an instant [s]"),
-    "steady": Kind(
-        tuple[_Instant, _Instant],
-        "two instants [s], the earlier first: where the mean of T/N and the speed are taken",
-    ),
+    "steady": Kind(_Stretch, "two instants [s], the earlier first: where the mean of T/N and the speed are taken"),
     "stick": Kind(
-        tuple[_Instant, _Instant],
+        _Stretch,
         "two instants [s], the earlier first: the stick phase, whose greatest T/N is mu_static and whose end the "
         "break-away",
     ),
@@ -304,4 +302,4 @@ def _fits(value: Value, form: object) -> bool:
         msgspec.convert(value, form)
     except msgspec.ValidationError:
         return False
-    return form != tuple[_Instant, _Instant] or (isinstance(value, tuple) and value[0] < value[1])
+    return form != _Stretch or (isinstance(value, tuple) and value[0] < value[1])

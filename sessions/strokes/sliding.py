@@ -139,11 +139,7 @@ def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array
 
 
 def slide(
-    findings: Findings,
-    span: Span,
-    track: Track,
-    decided: tuple[float, float] | None = None,
-    uncut: Track | None = None,
+    findings: Findings, span: Span, track: Track, decided: tuple[float, float] | None = None, uncut: Track | None = None
 ) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 

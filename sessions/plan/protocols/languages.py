@@ -34,11 +34,7 @@ def check_language(key: str, language: str) -> None:
 
 
 def check_translations(
-    translations: Sequence[Translation],
-    blocks: Mapping[str, tuple[str, str] | None],
-    own: str,
-    *,
-    pre_evaluation: bool,
+    translations: Sequence[Translation], blocks: Mapping[str, tuple[str, str] | None], own: str, *, pre_evaluation: bool
 ) -> None:
     """Raise NotAllowed unless each language has every text of a protocol once, and none that it has not.
 
