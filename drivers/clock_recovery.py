@@ -41,7 +41,8 @@ class RateWatch:
         """
         now = received_ns * 1e-9
         if self._best is None or now - self._last > self._silence:
-            self._begin(count, now)
+            self._points.clear()
+            self._best, self._ends, self._last = (now - count / self.rate, count, now), now + self._window, now
             return False
         self._last = now
         late = now - count / self.rate
@@ -56,10 +57,6 @@ class RateWatch:
     def begin_anew(self) -> None:
         """Forget what has come: what comes next does not go on from it."""
         self._best = None
-
-    def _begin(self, count: int, now: float) -> None:
-        self._points.clear()
-        self._best, self._ends, self._last = (now - count / self.rate, count, now), now + self._window, now
 
     def _judged(self) -> bool:
         """Compare two stretches, one after the other, with the rate believed."""

@@ -58,15 +58,12 @@ class SerialLink:
         """Send `data`. Raises LinkLost when the port is gone or takes nothing any more."""
         try:
             while data:
-                if not self._takes():
+                # pyserial's own time for writing runs out where this computer is busy.
+                if _POSIX and not select.select([], [self._port.fileno()], [], _WRITE_PATIENCE)[1]:
                     raise OSError
                 data = data[self._port.write(data) :]
         except (*_GONE, ValueError):  # the latter from a port that is closed
             raise LinkLost(f"{self._where} takes no bytes any more; check that its plug is in") from None
-
-    def _takes(self) -> bool:
-        """Wait until the port takes a byte; pyserial's own time for writing runs out where this computer is busy."""
-        return not _POSIX or bool(select.select([], [self._port.fileno()], [], _WRITE_PATIENCE)[1])
 
     def receive(self, timeout: float) -> bytes | None:
         """Return what has arrived, or None when nothing came within `timeout` real seconds."""

@@ -89,7 +89,8 @@ class SerialFtBox(LineBox):
         """Return how long nothing has to be sent [real s]."""
         if self._streaming_since is None:
             return _NAP
-        due = self._end_time(self._sent + 1)
+        since = self.faults.device_time(np.array([self._streaming_since]))
+        due = float(self.faults.instants(since + (self._sent + 1) * self._period)[0])  # the next record's last byte
         return min(max((due - self.now()) / self.clock.factor, _SHORTEST_NAP), _NAP)
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
@@ -99,11 +100,6 @@ class SerialFtBox(LineBox):
         times, self._sent = self.faults.due(self._streaming_since, now, 1.0 / self._period, self._sent, _BURST)
         for record in self.faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
             self._say(port, record)
-
-    def _end_time(self, record: int) -> float:
-        """Return when the last byte of a record of this stream is sent."""
-        since = self.faults.device_time(np.array([self._streaming_since or 0.0]))
-        return float(self.faults.instants(since + record * self._period)[0])
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
         if byte == 0x17:

@@ -229,16 +229,12 @@ class _Run:
             self.operator.show(refusals[0])
             return
         logged = self.writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
-        self._begin_rest(commands, logged.time_ns)
+        for command in commands:
+            if isinstance(command, AskRest):  # reckoned from the event it follows, whose instant a replay knows
+                self._rested_ns = None if command.duration is None else logged.time_ns + round(command.duration * 1e9)
         if isinstance(event, UndoRedo) or not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
             self._watch = None
         self._carry_out(commands)
-
-    def _begin_rest(self, commands: Sequence[Command], at_ns: int) -> None:
-        """Reckon a rest from the event it follows, whose instant a replay knows."""
-        for command in commands:
-            if isinstance(command, AskRest):
-                self._rested_ns = None if command.duration is None else at_ns + round(command.duration * 1e9)
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
         """Write commands down, make that safe, and only then let anybody see them."""

@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count, pairwise
+from itertools import chain, count, pairwise
 
 from sessions.plan.orders import draw, next_comparison, pairs, pairs_with, shuffle, williams
 from sessions.plan.plan import (
@@ -180,26 +180,18 @@ class _Blocks:
 
     def of(self, phases: Sequence[Phase]) -> Iterator[Block]:
         """Yield the pre-evaluation of every descriptor, then each block after its practice."""
-        if "pre-evaluation" in phases:
-            yield from (self._pre_evaluation(outline) for outline in self.outlines)
+        pre_evaluation = self.protocol.pre_evaluation
+        for outline in self.outlines if "pre-evaluation" in phases else ():
+            name = f"{outline.name}, pre-evaluation"
+            instruction = outline.instruction if pre_evaluation is None else pre_evaluation.instruction
+            yield self._block(outline, "pre-evaluation", name, [self._random_order(outline, name)], instruction)
         for outline in self.outlines:
             if "practice" in phases and outline.practice:
-                yield self._practice(outline)
+                choice = self.protocol.scale.answer == "choice"
+                order = tuple(chain.from_iterable(pairwise(outline.practice))) if choice else outline.practice
+                yield self._block(outline, "practice", f"{outline.name}, practice", [order], outline.instruction)
             if "main" in phases:
                 yield self._block(outline, "main", outline.name, self._orders(outline), outline.instruction)
-
-    def _pre_evaluation(self, outline: BlockOutline) -> Block:
-        """Return the block in which every stimulus is judged once, shuffled."""
-        name = f"{outline.name}, pre-evaluation"
-        pre_evaluation = self.protocol.pre_evaluation
-        instruction = outline.instruction if pre_evaluation is None else pre_evaluation.instruction
-        return self._block(outline, "pre-evaluation", name, [self._random_order(outline, name)], instruction)
-
-    def _practice(self, outline: BlockOutline) -> Block:
-        order = outline.practice
-        if self.protocol.scale.answer == "choice":
-            order = tuple(index for pair in pairwise(order) for index in pair)
-        return self._block(outline, "practice", f"{outline.name}, practice", [order], outline.instruction)
 
     def _orders(self, outline: BlockOutline) -> list[tuple[int, ...]]:
         orders: list[tuple[int, ...]] = []
@@ -210,7 +202,7 @@ class _Blocks:
             if self.protocol.scale.answer == "choice":
                 by_code = self._by_code(outline)
                 drawn_pairs = self._pairs(outline, tuple(by_code), repetition, name)
-                orders.append(tuple(by_code[code] for pair in drawn_pairs for code in pair))
+                orders.append(tuple(by_code[code] for code in chain.from_iterable(drawn_pairs)))
             elif self.row is not None:
                 orders.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
             else:
@@ -272,7 +264,7 @@ class _Blocks:
         answer = self.protocol.scale.answer
         times: Counter[int] = Counter()
         trials: list[Trial] = []
-        for index in (index for order in orders for index in order):
+        for index in chain.from_iterable(orders):
             times[index] += 1
             second = answer == "choice" and len(trials) % 2 == 1
             trials.append(
