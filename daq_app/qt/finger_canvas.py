@@ -4,7 +4,7 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
@@ -85,10 +85,9 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setToolTip(tr(HELP))
         self.setAccessibleName(tr("finger of the model: none"))
-        self._box, self._bar, self._item = _Box(self.sight), self._colour_bar(), _FingerItem(self)
+        self._box, self._bar = _Box(self.sight), self._colour_bar()
         self.ci.addItem(self._box, 0, 0)
         self.ci.addItem(self._bar, 1, 0)
-        self.scene().addItem(self._item)
         self._box.sigResized.connect(self._place)
         self.sight.changed.connect(self._place)
         self._place()
@@ -135,15 +134,12 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def size_with(self, head: str) -> QSize:
         return self.size() + QSize(0, ceil(self._height_of(head)))
 
-    def paint_finger(self, painter: QPainter) -> None:
-        if self.frame is not None:
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.setFont(self._font)
-            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame, self._parts)
-            picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
-
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         painter.setFont(self._font)
+        if self.frame is not None:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame, self._parts)
+            picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
         painter.setPen(QColor(self._tokens.quiet))
         words = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
         painter.drawText(words, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._words)
@@ -226,8 +222,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             part = QRectF(x0, y0, x1 - x0, y1 - y0)
         if part is not None:
             self._box.setRange(part, padding=0.0)
-        self._item.prepareGeometryChange()
-        self._item.update()
         self.viewport().update()
 
     def _plot_rect(self) -> QRectF:
@@ -284,20 +278,6 @@ class _Box(pg.ViewBox):
 
     def _tell(self, *_: object) -> None:
         self._sight.look_at(QRectF(self.viewRect()))
-
-
-class _FingerItem(pg.GraphicsObject):
-    """The finger in the scene of its canvas, over the view box."""
-
-    def __init__(self, canvas: FingerCanvas) -> None:
-        pg.GraphicsObject.__init__(self)
-        self._canvas = canvas
-
-    def boundingRect(self) -> QRectF:
-        return QRectF(QPointF(), QSizeF(self._canvas.size()))
-
-    def paint(self, painter: QPainter, *_: object) -> None:
-        self._canvas.paint_finger(painter)
 
 
 def _shades(name: str, first: float, last: float) -> list[QColor]:

@@ -27,9 +27,9 @@ from daq_app.qt.pictures import (
     FILM_SUFFIXES,
     PICTURE,
     ComparedView,
-    FilmWriter,
     PictureView,
     SaveButtons,
+    write_film,
     write_picture,
 )
 from daq_app.qt.plots import LINE, OWN, FieldBar, FieldPlot
@@ -251,19 +251,14 @@ class ModelColumn(QWidget):
         if path:
             self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 
-    def write_film(self, path: Path) -> FilmWriter:
-        """Begin to write the history that is shown as a film; `said` tells what came of it."""
+    def write_film(self, path: Path) -> None:
+        """Write the history that is shown as a film; `said` tells what came of it."""
         assert self._film is not None
         before, self._filming = self._at, True
-        writer = FilmWriter(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
-
-        def end(sentence: str) -> None:
-            self._filming, self._at = False, before
-            self._paint()
-            self.said.emit(sentence)
-
-        writer.ended.connect(end)
-        return writer
+        sentence = write_film(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
+        self._filming, self._at = False, before
+        self._paint()
+        self.said.emit(sentence)
 
     def _finger_page(self) -> QWidget:
         page = QWidget()

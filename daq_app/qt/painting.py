@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QByteArray, QDataStream, QPointF, QRectF, Qt
+from PySide6.QtCore import QByteArray, QDataStream, QPoint, QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from shiboken6 import VoidPtr
@@ -28,6 +28,18 @@ def blank(widget: QWidget, colour: str) -> QPixmap:
     pixmap.setDevicePixelRatio(ratio)
     pixmap.fill(QColor(colour))
     return pixmap
+
+
+def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
+    """Paint a picture in the middle, as large as there is room and its proportions kept; return where it is."""
+    whole, ratio = painter.window(), painter.device().devicePixelRatioF()
+    smooth = Qt.TransformationMode.SmoothTransformation
+    drawn = picture.scaled(whole.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
+    drawn.setDevicePixelRatio(ratio)
+    place = QRect(QPoint(), drawn.deviceIndependentSize().toSize())
+    place.moveCenter(whole.center())
+    painter.drawPixmap(place.topLeft(), drawn)
+    return place
 
 
 def sheer(colour: str, alpha: int) -> QColor:

@@ -3,19 +3,20 @@
 import io
 import subprocess
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
-from PySide6.QtCore import QBuffer, QObject, QPoint, QRect, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QImage, QPainter, QPaintEvent
+from PySide6.QtCore import QBuffer, QPoint, QRect, Qt
+from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPixmap
 from PySide6.QtSvg import QSvgGenerator
-from PySide6.QtWidgets import QFileDialog, QProgressDialog, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QProgressDialog, QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.finger_words import NAMES, Compared
 from daq_app.qt.finger_canvas import FingerCanvas
+from daq_app.qt.painting import paint_fitted
 from daq_app.qt.parts import button, hbox, label, say, vbox
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import GRID
@@ -27,6 +28,7 @@ Save = Callable[[str, str], object]  # name of a picture, and the path to write 
 PICTURE = "compared"  # its name
 DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
 SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
+LOOK = 0.02  # between two looks at a film that is being written [s]
 COLOURS = 256  # of a frame of a GIF: all that the format has
 FILM_SUFFIXES = (".gif", ".mp4")
 NO_MP4 = tr_noop("MP4 needs the package imageio-ffmpeg: pip install 'daq-app[film]', or save the film as GIF")
@@ -80,26 +82,21 @@ class _Canvas(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._image, self._words = QImage(), ""
+        self._picture, self._words = QPixmap(), ""
         self.setMinimumSize(160, 200)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_png(self, content: bytes, words: str) -> None:
-        self._image = QImage.fromData(content) if content else QImage()
+        self._picture.loadFromData(content)
         self._words = words
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        if self._image.isNull():
+        if self._picture.isNull():
             painter.drawText(self.rect(), self._words)
-            return
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        size = self._image.size()
-        scale = min(self.width() / size.width(), self.height() / size.height())
-        box = QRectF(0.0, 0.0, size.width() * scale, size.height() * scale)
-        box.moveCenter(QRectF(self.rect()).center())
-        painter.drawImage(box, self._image)
+        else:
+            paint_fitted(painter, self._picture)
 
 
 class ComparedView(QWidget):
@@ -167,57 +164,42 @@ def _image(canvas: FingerCanvas, density: float, head: str) -> QImage:
     return image
 
 
-class FilmWriter(QObject):
-    """Writes the states of a history as GIF or MP4, one state at each turn of the event loop."""
+def write_film(canvas: FingerCanvas, head: str, show: Callable[[int], None], count: int, path: Path) -> str:
+    """Write `count` states that `show` puts on `canvas`, with a `head` over them; return where it is, or why it is not.
 
-    ended = Signal(str)  # with a sentence: where it is, or why there is none
-
-    def __init__(self, canvas: FingerCanvas, head: str, show: Callable[[int], None], count: int, path: Path) -> None:
-        """Begin to write `count` states that `show` puts on `canvas`, with a `head` over them, to `path`.
-
-        It is an MP4 where its suffix says so; `ended` follows.
-        """
-        super().__init__(canvas)
-        self._canvas, self._head, self._show, self._count, self._path = canvas, head, show, count, path
-        self._frames: list[Image.Image] = []
-        self._pool = ThreadPoolExecutor(1)
-        self._writing: Future[None] | None = None
-        self._dialog = QProgressDialog(tr("Writing the film"), "", 0, count + 1, canvas.window())
-        cancel = QPushButton(tr("Cancel"))
-        cancel.setAccessibleName(tr("cancel the film"))
-        self._dialog.setCancelButton(cancel)
-        self._dialog.setWindowModality(Qt.WindowModality.WindowModal)
-        self._dialog.setMinimumDuration(0)
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(self._step)
-        self._timer.start(0)
-
-    def _step(self) -> None:
-        if self._dialog.wasCanceled() and self._writing is None:
-            self._end(tr("The film was cancelled: {path} was not written.", path=self._path))
-        elif len(self._frames) < self._count:
-            self._show(len(self._frames))
-            image = _image(self._canvas, 1.0, self._head)
+    It is an MP4 where the suffix says so, and else a GIF. Meanwhile the window goes on behind a dialog that can cancel.
+    """
+    dialog = QProgressDialog(tr("Writing the film"), "", 0, count + 1, canvas.window())
+    cancel = QPushButton(tr("Cancel"))
+    cancel.setAccessibleName(tr("cancel the film"))
+    dialog.setCancelButton(cancel)
+    dialog.setWindowModality(Qt.WindowModality.WindowModal)
+    dialog.setMinimumDuration(0)
+    frames: list[Image.Image] = []
+    try:
+        for at in range(count):
+            dialog.setValue(at)
+            QApplication.processEvents()
+            if dialog.wasCanceled():
+                return tr("The film was cancelled: {path} was not written.", path=path)
+            show(at)
+            image = _image(canvas, 1.0, head)
             size = (image.width(), image.height())
             whole = Image.frombytes("RGB", size, bytes(image.constBits()), "raw", "RGB", image.bytesPerLine())
-            gif = self._path.suffix.lower() != ".mp4"
-            self._frames.append(whole.quantize(COLOURS, Image.Quantize.FASTOCTREE) if gif else whole)
-            self._dialog.setValue(len(self._frames))
-        elif self._writing is None:
-            self._dialog.setCancelButton(None)
-            self._writing = self._pool.submit(_write_film, self._path, self._frames)
-        elif self._writing.done():
-            error = self._writing.exception()
-            failed = tr("The film could not be written: {error}", error=error)
-            self._end(tr("Saved: {path}", path=self._path) if error is None else failed)
-
-    def _end(self, sentence: str) -> None:
-        self._timer.stop()
-        self._pool.shutdown(wait=False)
-        self._dialog.close()
-        self._dialog.deleteLater()
-        self.ended.emit(sentence)
-        self.deleteLater()
+            gif = path.suffix.lower() != ".mp4"
+            frames.append(whole.quantize(COLOURS, Image.Quantize.FASTOCTREE) if gif else whole)
+        dialog.setValue(count)
+        dialog.setCancelButton(None)
+        with ThreadPoolExecutor(1) as pool:
+            writing = pool.submit(_write_film, path, frames)
+            while wait([writing], LOOK).not_done:
+                QApplication.processEvents()
+        if error := writing.exception():
+            return tr("The film could not be written: {error}", error=error)
+        return tr("Saved: {path}", path=path)
+    finally:
+        dialog.close()
+        dialog.deleteLater()
 
 
 def _write_film(path: Path, frames: list[Image.Image]) -> None:

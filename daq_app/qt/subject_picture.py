@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
+from daq_app.qt.painting import paint_fitted
 from daq_app.qt.parts import Openness, WrappedLabel, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, missing_glyphs, px
@@ -62,19 +63,11 @@ class SubjectPicture(QWidget):
             QTimer.singleShot(0, self, lambda: self._draw(view))
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self._picture.isNull():
-            return
-        ratio = self.devicePixelRatioF()
-        room = QSize(round(self.width() * ratio), round(self.height() * ratio))
-        smooth = Qt.TransformationMode.SmoothTransformation
-        drawn = self._picture.scaled(room, Qt.AspectRatioMode.KeepAspectRatio, smooth)
-        drawn.setDevicePixelRatio(ratio)
-        size = drawn.deviceIndependentSize().toSize()
-        at = QPoint((self.width() - size.width()) // 2, (self.height() - size.height()) // 2)
-        painter = QPainter(self)
-        painter.drawPixmap(at, drawn)
-        painter.setPen(self.palette().mid().color())
-        painter.drawRect(at.x(), at.y(), size.width() - 1, size.height() - 1)
+        if not self._picture.isNull():
+            painter = QPainter(self)
+            place = paint_fitted(painter, self._picture)
+            painter.setPen(self.palette().mid().color())
+            painter.drawRect(place.adjusted(0, 0, -1, -1))
 
 
 class Thumbnail(SubjectPicture):

@@ -9,15 +9,16 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from PySide6.QtCore import QLocale, QPoint, QPointF, Qt
+from PySide6.QtCore import QLocale, QPoint, QPointF, Qt, QTimer
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QProgressDialog
 from qt_events import wheel
 
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import rows, selected_row
 from daq_app.qt.plots import ALL_TRIALS, FIXED, FieldBar
-from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame, until
+from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame
 from tests.sessions.report_example import example
 
 
@@ -233,7 +234,7 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     ranges, show = set(), window.model._show_step
     window.model._show_step = lambda at: (show(at), ranges.add(window.model.finger.look.range))
     window.model.write_film(tmp_path / "film.gif")
-    until(application, lambda: "Saved" in window._words.accessibleName())
+    assert "Saved" in window._words.accessibleName()
     window.model._show_step = show
     with Image.open(tmp_path / "film.gif") as image:
         assert (image.n_frames, image.info["duration"]) == (4, 100)
@@ -242,21 +243,13 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     assert "Step 4 of 4" in window.model.finger.accessibleName()
 
 
-def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, window, tmp_path):
+def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(window, tmp_path):
     window.take(m.Filmed(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
-    until(application, lambda: "Saved" in window._words.accessibleName())
+    assert "Saved" in window._words.accessibleName()
     width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._head()).toTuple())
-    command = [
-        imageio_ffmpeg.get_ffmpeg_exe(),
-        "-i",
-        str(tmp_path / "film.mp4"),
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "rgb24",
-        "-",
-    ]
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(tmp_path / "film.mp4")]
+    command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     process = subprocess.run(command, capture_output=True, check=True)
     assert re.search(rf"Video: h264.*{width}x{height}.* 10 fps", process.stderr.decode())
     pictures = np.frombuffer(process.stdout, np.uint8).reshape(-1, height, width, 3)
@@ -264,19 +257,19 @@ def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, wind
     assert np.std(pictures[-1]) > 10.0  # there is something to see
 
 
-def test_a_film_as_mp4_without_its_encoder_is_one_sentence(application, window, tmp_path, monkeypatch):
+def test_a_film_as_mp4_without_its_encoder_is_one_sentence(window, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     window.take(m.Filmed(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
-    until(application, lambda: "daq-app[film]" in window._words.accessibleName())
+    assert "daq-app[film]" in window._words.accessibleName()
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_film_that_is_cancelled_leaves_no_file(application, window, tmp_path):
+def test_a_film_that_is_cancelled_leaves_no_file(window, tmp_path):
     window.take(m.Filmed(selected_row(window.state).key, film()))
-    writer = window.model.write_film(tmp_path / "film.gif")
-    writer._dialog.cancel()
-    until(application, lambda: "The film was cancelled" in window._words.accessibleName())
+    QTimer.singleShot(0, lambda: window.findChildren(QProgressDialog)[-1].cancel())
+    window.model.write_film(tmp_path / "film.gif")
+    assert "The film was cancelled" in window._words.accessibleName()
     assert list(tmp_path.iterdir()) == []
 
 
