@@ -1,5 +1,6 @@
 """The analyst's window: trials, the stroke of the chosen one, and what the model says of it."""
 
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -92,16 +93,10 @@ class AnalystWindow(QMainWindow):
         self._head = label("", "simulated")
         self.way = LineageLabel()
         self.way.followed.connect(self._follow)
-        self.trials = TrialsColumn(tokens)
-        self.stroke = StrokeColumn(tokens)
-        self.stroke.replayed.connect(self._replay_next)
         self._words = WrappedLabel("quiet", keeps_room=True)
-        self.model = ModelColumn(tokens)
-        self.model.other_wanted.connect(self._choose_comparison)
-        self.model.said.connect(self._words.show_text)
-        for column in (self.trials, self.stroke, self.model):
-            column.requested.connect(self.ask)
-        self.trials.responded.connect(self.take)  # no work: the model answers with every quantity
+        self.trials = TrialsColumn(tokens, self.ask, self.take)
+        self.stroke = StrokeColumn(tokens, self.ask, self._replay_next)
+        self.model = ModelColumn(tokens, self.ask, self._choose_comparison, self._words.show_text)
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
@@ -282,21 +277,19 @@ class AnalystWindow(QMainWindow):
 
 
 class TrialsColumn(QWidget):
-    """`requested` carries the chosen row, `responded` the quantity that is compared with the score."""
+    """The trials, and the model's answers against their scores."""
 
-    requested = Signal(object)
-    responded = Signal(object)
-
-    def __init__(self, tokens: Tokens) -> None:
+    def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], respond: Callable[[m.Respond], None]) -> None:
+        """Show no trials; `ask` takes the chosen row, `respond` the quantity that is compared with the score."""
         super().__init__()
-        self._tokens = tokens
+        self._tokens, self._ask = tokens, ask
         self.list = QListWidget()
         self.list.setAccessibleName(tr("trials"))
         self.list.currentRowChanged.connect(self._choose)
         self.responses = choice(tr("quantity that is held against the score"))
         for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
             self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
-        self.responses.activated.connect(lambda: self.responded.emit(m.Respond(self.responses.currentData())))
+        self.responses.activated.connect(lambda: respond(m.Respond(self.responses.currentData())))
         self.errors = WrappedLabel("quiet")
         self.relation = ZoomedPlot(tokens)
         self.relation.setAccessibleName(tr("prediction against score: a point chooses its trial"))
@@ -338,8 +331,8 @@ class TrialsColumn(QWidget):
 
     def _choose(self, row: int) -> None:
         if row >= 0:
-            self.requested.emit(m.Choose(row))
+            self._ask(m.Choose(row))
 
     def _point_clicked(self, _item: object, clicked: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
         if len(clicked) and clicked[0].data() is not None:
-            self.requested.emit(m.Choose(int(clicked[0].data())))
+            self._ask(m.Choose(int(clicked[0].data())))

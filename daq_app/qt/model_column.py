@@ -1,9 +1,9 @@
 """What the model says of the chosen trial: its finger, its history, the pictures of the session, another session."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QTabWidget, QWidget
 
 from daq_app.analyst import state as m
@@ -44,14 +44,14 @@ STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing 
 
 
 class ModelColumn(QWidget):
-    """Three tabs; `requested` carries orders for the worker process."""
+    """Four tabs: the finger, pictures of the session, another session, and the scene."""
 
-    requested = Signal(object)
-    other_wanted = Signal()
-    said = Signal(str)  # what came of a picture or film that was written
-
-    def __init__(self, tokens: Tokens) -> None:
+    def __init__(
+        self, tokens: Tokens, ask: Callable[[m.Ask], None], compare: Callable[[], None], say: Callable[[str], None]
+    ) -> None:
+        """Show nothing; `ask` orders work, `compare` chooses another session, `say` takes what came of a saved file."""
         super().__init__()
+        self._ask, self._say = ask, say
         self._state: AnalystState | None = None
         self._film: m.Filmed | None = None
         self._name = ""  # of the finger's pictures, after their kind
@@ -87,9 +87,9 @@ class ModelColumn(QWidget):
         self.why = WrappedLabel("value", "look")
         self.errors.show_text(tr(FIELD_ERRORS))
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
-        self.which.activated.connect(lambda: self._show_picture())
+        self.which.activated.connect(self._show_picture)
         self.session_errors = WrappedLabel("quiet")
-        self.compared = ComparedView(self.other_wanted.emit, self._save)
+        self.compared = ComparedView(compare, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
         vbox(self.which, self.session_errors, (self.picture, 1), on=session)
@@ -99,7 +99,7 @@ class ModelColumn(QWidget):
         self.tabs.addTab(session, tr("Session"))
         self.tabs.addTab(self.compared, tr("Comparison"))
         self.tabs.addTab(self.scene, tr("Scene"))
-        self.tabs.currentChanged.connect(lambda: self._show_picture())
+        self.tabs.currentChanged.connect(self._show_picture)
         vbox(self.tabs, on=self)
 
     def show_state(self, state: AnalystState) -> None:
@@ -136,7 +136,7 @@ class ModelColumn(QWidget):
                 self.tabs.setCurrentIndex(COMPARISON)
         self._show_picture()
 
-    def _show_picture(self) -> None:
+    def _show_picture(self, *_: object) -> None:
         """Show the picture of the tab; what is not drawn is asked for only when it is looked at."""
         state, tab, which = self._state, self.tabs.currentIndex(), self.which.currentIndex()
         if state is None:
@@ -156,7 +156,7 @@ class ModelColumn(QWidget):
         view.show_picture("", tr("Drawing: {words}", words=words), b"")
         if self._drawing != (name, state.version):
             self._drawing = (name, state.version)
-            self.requested.emit(m.Draw(name))
+            self._ask(m.Draw(name))
 
     def _paint(self) -> None:
         state = self._state
@@ -211,7 +211,7 @@ class ModelColumn(QWidget):
     def _ask_history(self) -> None:
         row = None if self._state is None else selected_row(self._state)
         if row is not None:
-            self.requested.emit(m.ShowHistory(row.key))
+            self._ask(m.ShowHistory(row.key))
             self.player.slider.setFocus()
 
     def _ask_where(self, row: Row | None, version: int) -> None:
@@ -221,10 +221,10 @@ class ModelColumn(QWidget):
             return
         if (row.key, version) != self._followed:
             self._followed = row.key, version
-            self.requested.emit(m.ShowHistory(row.key))
+            self._ask(m.ShowHistory(row.key))
 
     def _save(self, name: str, path: str) -> None:
-        self.requested.emit(m.Write(f"picture {name}", path))
+        self._ask(m.Write(f"picture {name}", path))
 
     def _head(self) -> str:
         """Return what every picture of a field is marked with: whether simulated, the session, and its errors."""
@@ -241,9 +241,9 @@ class ModelColumn(QWidget):
             write_picture(self.finger, self._head(), Path(path))
         except OSError as error:
             why = error.strerror
-            self.said.emit(tr("{path} could not be written ({why}): choose another folder.", path=path, why=why))
+            self._say(tr("{path} could not be written ({why}): choose another folder.", path=path, why=why))
         else:
-            self.said.emit(tr("Saved: {path}", path=path))
+            self._say(tr("Saved: {path}", path=path))
 
     def _ask_film(self) -> None:
         proposed = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
@@ -252,13 +252,13 @@ class ModelColumn(QWidget):
             self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 
     def write_film(self, path: Path) -> None:
-        """Write the history that is shown as a film; `said` tells what came of it."""
+        """Write the history that is shown as a film, and say what came of it."""
         assert self._film is not None
         before, self._filming = self._at, True
         sentence = write_film(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
         self._filming, self._at = False, before
         self._paint()
-        self.said.emit(sentence)
+        self._say(sentence)
 
     def _finger_page(self) -> QWidget:
         page = QWidget()

@@ -1,6 +1,8 @@
 """The chosen stroke: its curves and edges, its replay, what was decided about it, its numbers and its readings."""
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from collections.abc import Callable
+
+from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
@@ -25,13 +27,12 @@ DRAGGED = "dragged by hand"
 
 
 class StrokeColumn(QWidget):
-    """`requested` carries orders for the worker process."""
+    """All that is known of one stroke."""
 
-    requested = Signal(object)
-    replayed = Signal()  # to the end of the trial
-
-    def __init__(self, tokens: Tokens) -> None:
+    def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], replayed: Callable[[], None]) -> None:
+        """Show no stroke; `ask` orders work, `replayed` is called when a replay has come to its end."""
         super().__init__()
+        self._ask = ask
         self._stroke: StrokeFinding | None = None
         self._play_next = False
         self._moving = False  # an edge was let go elsewhere, and what came of it is not known yet
@@ -41,12 +42,9 @@ class StrokeColumn(QWidget):
         self.stroke.moved.connect(self._drag)
         self.player = TransportBar(tr("the recorded readings"))
         self.player.moved.connect(self._move)
-        self.player.ended.connect(self.replayed.emit)
-        self.decisions = DecisionsBar()
-        self.decisions.requested.connect(self.requested.emit)
-        self.save = SaveButtons(
-            tr("the stroke"), lambda name, path: self.requested.emit(m.Write(f"picture {name}", path))
-        )
+        self.player.ended.connect(replayed)
+        self.decisions = DecisionsBar(ask)
+        self.save = SaveButtons(tr("the stroke"), lambda name, path: ask(m.Write(f"picture {name}", path)))
         self._lines: tuple[tuple[str, str], ...] = ()
         self.readings = ReadingsTable()
         self.tabs = QTabWidget()
@@ -107,7 +105,7 @@ class StrokeColumn(QWidget):
         self._play_next = True
 
     def _choose(self, row: int) -> None:
-        self.requested.emit(m.Choose(row))
+        self._ask(m.Choose(row))
 
     def _show_readings(self, state: AnalystState) -> None:
         stroke, read = self._stroke, state.read
@@ -115,7 +113,7 @@ class StrokeColumn(QWidget):
         if wanted != self._wanted:
             self._wanted = wanted  # first, for asking comes back here
             if stroke is not None:
-                self.requested.emit(m.ShowReadings(stroke.number))
+                self._ask(m.ShowReadings(stroke.number))
         if read is not None and (stroke is None or read.stroke != stroke.number):
             read = None
         if read is self._read and not (read is None and self.player.slider.maximum()):
@@ -135,7 +133,7 @@ class StrokeColumn(QWidget):
         if self._stroke is not None:
             self._moving = True
             by, why = self.decisions.who(), self.decisions.reason()
-            self.requested.emit(m.Move(self._stroke.number, edge, time, by, why))
+            self._ask(m.Move(self._stroke.number, edge, time, by, why))
 
     def _move(self, at: int) -> None:
         self.stroke.show_moment(at)
@@ -146,9 +144,7 @@ class StrokeColumn(QWidget):
 class DecisionsBar(QWidget):
     """A code, a reason, undo and redo; under them what was decided about the chosen stroke."""
 
-    requested = Signal(object)
-
-    def __init__(self) -> None:
+    def __init__(self, ask: Callable[[m.Ask], None]) -> None:
         super().__init__()
         self.by = QLineEdit(str(settings().value(BY, "")))
         self.by.setPlaceholderText(NOBODY)
@@ -159,8 +155,8 @@ class DecisionsBar(QWidget):
         self.why.setPlaceholderText(DRAGGED)
         self.why.setMinimumWidth(QFontMetrics(font(TEXT)).horizontalAdvance(DRAGGED) + 3 * GRID)
         self.why.setAccessibleName(tr("why an edge is moved"))
-        self.undo = button(tr("Undo"), "", lambda: self.requested.emit(m.Undo(self.who())), "small")
-        self.redo = button(tr("Redo"), "", lambda: self.requested.emit(m.Undo(self.who(), again=True)), "small")
+        self.undo = button(tr("Undo"), "", lambda: ask(m.Undo(self.who())), "small")
+        self.redo = button(tr("Redo"), "", lambda: ask(m.Undo(self.who(), again=True)), "small")
         self.show_history(History())
         self.sentences_label = WrappedLabel("value", "look")
         by, why = label(tr("by"), "quiet"), label(tr("why"), "quiet")

@@ -347,7 +347,7 @@ def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(windo
     by.setText("E07")
     by.editingFinished.emit()
     assert preferences.settings().value(BY) == "E07"
-    assert DecisionsBar().by.text() == "E07"
+    assert DecisionsBar(window.ask).by.text() == "E07"
     preferences.settings().remove(BY)
 
 
