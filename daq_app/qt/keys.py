@@ -121,9 +121,9 @@ class KeysPage(Panel):
         """Show the page over everything else, or hide it; it is filled when it is first seen."""
         if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None where there is none
             self._fill()
-        self.fit()
         self.setVisible(not self.isVisible())
         self.raise_()
+        self.fit()  # once it has the window's type
 
     def fit(self) -> None:
         """Take the middle of the window, as much as there is need for."""
