@@ -116,8 +116,10 @@ class TransducerRow(QWidget):
 class ScreenFields(QWidget):
     """What stands on the card of the subject's screen, be it a second screen or a tablet."""
 
-    def __init__(self, act: Callable[[str], None]) -> None:
+    def __init__(self, act: Callable[[str], None], form: Callable[[], SessionForm]) -> None:
+        """Show nothing yet; `act` does what a button stands for, `form` is read when something has changed."""
         super().__init__()
+        self._form = form
         self.words = ""  # the length of the line, and characters that no font here has
         self.missing = ""  # why the subject's page is on no tablet, where it should be
         self._line_words = ""
@@ -139,6 +141,7 @@ class ScreenFields(QWidget):
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
         self._size = size
         self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=known.words)
+        self.show_form()
 
     def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
         """Say how the tablet is reached, or what is known of its line; `missing` is why no session can begin.
@@ -152,10 +155,11 @@ class ScreenFields(QWidget):
         self.camera.setVisible(bool(picture))
         self._ruler.hide()  # there is one on the tablet's page
         self._new_code.show()
+        self.show_form()
 
-    def offer_languages(self, form: SessionForm) -> None:
-        """Offer the languages of a form's protocol, and choose the one that was wished for where it is among them."""
-        offered, _ = subject_texts(form)
+    def offer_languages(self) -> None:
+        """Offer the languages of the form's protocol, and choose the one that was wished for where it is among them."""
+        offered, _ = subject_texts(self._form())
         if list(offered) != [self.language.itemData(at) for at in range(self.language.count())]:
             if self.language.findData(self._wish) >= 0:
                 self._wish = self.language.currentData()
@@ -164,8 +168,9 @@ class ScreenFields(QWidget):
                 self.language.addItem(name_of(code), code)
             self.language.setCurrentIndex(max(self.language.findData(self._wish), 0))
 
-    def show_form(self, form: SessionForm) -> None:
-        """Show the page of a form, and say which of its characters no font here has."""
+    def show_form(self) -> None:
+        """Show the page of the form, and say which of its characters no font here has."""
+        form = self._form()
         self.thumbnail.show_form(form, self._size)
         self.words = self._line_words
         if not self._new_code.isHidden():

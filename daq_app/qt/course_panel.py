@@ -13,7 +13,7 @@ from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.state import Message
-from daq_app.window.view_course import Button, CourseView, PlanRow
+from daq_app.window.view_course import CourseView, PlanRow
 from daq_app.wording import tr
 from sessions.run import steps
 
@@ -65,15 +65,15 @@ class CoursePanel(Panel):
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
         for name, widget in self.buttons.items():
-            shown = _button_of(view, name)
-            if before is None or shown != _button_of(before, name):
+            shown = view.buttons[name]
+            if before is None or shown != before.buttons[name]:
                 widget.setText(f"{shown.label} {tr(shown.key)}".strip())
                 widget.setAccessibleName(f"{shown.label}: {tr(WORDS.get(shown.key, WORDS['no answer']))}")
                 widget.setEnabled(shown.enabled)
 
     def ask(self, what: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
-        if self._view is None or not (shown := _button_of(self._view, what)).enabled:
+        if self._view is None or not (shown := self._view.buttons[what]).enabled:
             return
         if shown.sends is not None:
             self._send(shown.sends)
@@ -97,7 +97,7 @@ class CoursePanel(Panel):
         if not text:
             say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._asked_for))
             return
-        question = "" if self._view is None else _button_of(self._view, self._asking).question
+        question = "" if self._view is None else self._view.buttons[self._asking].question
         if question and question != self._asked_for:  # it would discard another trial than was meant
             self._asked_for = question
             say(self._question, tr("The session has gone on meanwhile. {question}", question=question))
@@ -133,8 +133,3 @@ class CoursePanel(Panel):
         """Fold the picture of the subject's page where the plan needs the room."""
         super().resizeEvent(event)
         self.mirror.open.set_room(self.height() >= self._roomy)
-
-
-def _button_of(view: CourseView, name: str) -> Button:
-    button: Button = getattr(view, name.replace(" ", "_"))
-    return button

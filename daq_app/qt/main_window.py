@@ -200,7 +200,7 @@ class MainWindow(QMainWindow):
 
     def _undo(self) -> None:
         course = self.bridge.view.course
-        if course is not None and course.undo.enabled and self.rooms.room == "run":
+        if course is not None and course.buttons["undo"].enabled and self.rooms.room == "run":
             self.bridge.send(steps.UndoRedo())
 
     def _start_session(self) -> None:
@@ -262,9 +262,9 @@ class MainWindow(QMainWindow):
 
     def _line_changed(self) -> None:
         if self.tablet is None:
-            self.page.show_line(millimetres(self.subject.screen()), self.subject.size())
+            self.page.screen_fields.show_line(millimetres(self.subject.screen()), self.subject.size())
         else:
-            self.page.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
+            self.page.screen_fields.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
             self._warn_of_tablet()
         if self.bridge.view.course is None:
             self._form_changed()

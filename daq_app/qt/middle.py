@@ -172,10 +172,10 @@ class Middle(QWidget):
             self.leave()
             return
         self.live.map.show_direction(course.direction)
-        self.redo.setEnabled(course.redo.enabled)
-        self.redo.setText(f"{course.redo.label}  {tr(course.redo.key)}")
-        self.undo.setText(f"{course.undo.label}  {tr(course.undo.key)}")
-        self.undo.setVisible(course.undo.enabled)
+        for name, push in (("redo", self.redo), ("undo", self.undo)):
+            push.setText(f"{course.buttons[name].label}  {tr(course.buttons[name].key)}")
+        self.redo.setEnabled(course.buttons["redo"].enabled)
+        self.undo.setVisible(course.buttons["undo"].enabled)
         self.strip.show_tiles(course.tiles)
         session = self._bridge.state.session
         phase = "" if session is None else session.phase

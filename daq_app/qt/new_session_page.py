@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
+from PySide6.QtCore import QEvent, QSignalBlocker, Signal
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
@@ -22,7 +22,6 @@ from daq_app.qt.parts import (
     tick,
     vbox,
 )
-from daq_app.qt.preferences import Millimetres
 from daq_app.qt.tokens import GRID, TARGET, px
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.new_session import (
@@ -84,7 +83,7 @@ class NewSessionPage(Panel):
         self.people_score, self.simulated = self._either(tr("People"), tr("Rehearse, simulated"))
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
-        self.screen_fields = ScreenFields(act)
+        self.screen_fields = ScreenFields(act, self.form)
         words = tr("pilot this protocol with simulated hand and answers")
         self._pilot = button(tr("Pilot  F5"), words, lambda: act("pilot"))
         self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
@@ -120,7 +119,7 @@ class NewSessionPage(Panel):
         for line in (self.subject, self.study, self.folder):
             line.textChanged.connect(self._show_study)
         self.protocol.currentTextChanged.connect(self._show_study)
-        for follow in (self._show_screen, self._speak, self.changed):
+        for follow in (self.screen_fields.show_form, self._speak, self.changed):
             self.screen_fields.language.currentIndexChanged.connect(follow)
         for line in (self.study, self.folder):
             line.textChanged.connect(self._place_changed)
@@ -166,18 +165,6 @@ class NewSessionPage(Panel):
         if not may and self.simulated.isChecked():
             self.people_score.setChecked(True)
 
-    def show_line(self, known: Millimetres, size: QSize) -> None:
-        """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
-        self.screen_fields.show_line(known, size)
-        self._show_screen()
-
-    def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
-        self.screen_fields.show_tablet(words, missing, picture)
-        self._show_screen()
-
-    def _show_screen(self) -> None:
-        self.screen_fields.show_form(self.form())
-
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
         """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
         checked = self.form(), bench, self.screen_fields.words
@@ -208,8 +195,8 @@ class NewSessionPage(Panel):
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
         self._enrol.setVisible(known is not None and known.may_enrol)
-        self.screen_fields.offer_languages(self.form())
-        self._show_screen()
+        self.screen_fields.offer_languages()
+        self.screen_fields.show_form()
         for widget in (self.protocol, self.seed):
             widget.setEnabled(known is None)
             widget.setToolTip("" if known is None else tr("the study's own: {protocol}", protocol=known.protocol))

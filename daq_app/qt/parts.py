@@ -16,13 +16,11 @@ from PySide6.QtWidgets import (
     QLabel,
     QLayout,
     QLineEdit,
-    QPlainTextEdit,
     QPushButton,
     QScrollArea,
     QSizePolicy,
     QSplitter,
     QStackedWidget,
-    QTextEdit,
     QVBoxLayout,
     QWidget,
 )
@@ -169,7 +167,7 @@ def is_text_field(widget: QWidget | None) -> bool:
     """Say whether keys pressed on a widget are text that is typed."""
     if isinstance(widget, QComboBox):
         return widget.isEditable()
-    return isinstance(widget, QLineEdit | QAbstractSpinBox | QTextEdit | QPlainTextEdit) and not widget.isReadOnly()
+    return isinstance(widget, QLineEdit | QAbstractSpinBox) and not widget.isReadOnly()
 
 
 def fill(layout: B, *parts: Part) -> B:

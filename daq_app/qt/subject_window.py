@@ -12,7 +12,7 @@ from daq_app.qt.preferences import LEAST, MOST, direction, millimetres, store_ru
 from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
-from daq_app.wording import tr
+from daq_app.wording import tr, typed_number
 from sessions.plan.plan import Hand
 from sessions.plan.protocols.languages import ENGLISH
 
@@ -329,19 +329,15 @@ class RulerCheck(QWidget):
             super().keyPressEvent(event)
 
     def _keep(self) -> None:
-        text = self._measured.text().strip().replace(",", ".")
-        try:
-            value = float(text)
-        except ValueError:
-            value = float("nan")
-        if self._screen is None or store_ruler_length(self._screen, value) is None:
-            words = tr(
-                "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
-                least=LEAST, most=MOST, it=text,
-            )  # fmt: skip
-            say(self._wrong, words)
+        length = typed_number(self._measured.text())
+        if self._screen is not None and length is not None and store_ruler_length(self._screen, length) is not None:
+            self.done.emit()
             return
-        self.done.emit()
+        words = tr(
+            "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
+            least=LEAST, most=MOST, it=self._measured.text().strip(),
+        )  # fmt: skip
+        say(self._wrong, words)
 
 
 def _question_of(view: SubjectView) -> tuple[object, ...]:

@@ -190,25 +190,20 @@ class _Model(QAbstractTableModel):
         r = self._readings
         if r is None:
             return None
-        at, column, block = index.row(), index.column(), r.block
-        inside = self._steady is not None and self._steady[0] <= block.time[at] <= self._steady[1]
-        if role == Qt.ItemDataRole.FontRole:
-            return self._bold if inside else None
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        if role != Qt.ItemDataRole.DisplayRole:
-            return None
-        match column:
-            case 0:
-                return tr("steady") if inside else ""
-            case 4:
-                return f"{block.time[at]:.6f}"
-            case 1 | 2 | 3 | 5:
-                return str((block.sequence, block.counter, block.status, block.time, block.received_ns)[column - 1][at])
-            case 12 | 13:
-                return f"{(r.normal, r.tangential)[column - 12][at]:.4f}"
+        at, b = index.row(), r.block
+        inside = self._steady is not None and self._steady[0] <= b.time[at] <= self._steady[1]
+        match role:
+            case Qt.ItemDataRole.FontRole:
+                return self._bold if inside else None
+            case Qt.ItemDataRole.TextAlignmentRole:
+                return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            case Qt.ItemDataRole.DisplayRole:
+                counts = (b.sequence[at], b.counter[at], b.status[at], f"{b.time[at]:.6f}", b.received_ns[at])
+                forces = (f"{r.normal[at]:.4f}", f"{r.tangential[at]:.4f}")
+                cells = (tr("steady") if inside else "", *counts, *(f"{raw:.10g}" for raw in b.raw[at]), *forces)
+                return str(cells[index.column()])
             case _:
-                return f"{block.raw[at, column - 6]:.10g}"
+                return None
 
 
 def number_in(text: str) -> float | None:

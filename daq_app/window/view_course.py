@@ -105,23 +105,16 @@ class CourseView:
     rows: tuple[PlanRow, ...]
     tiles: tuple[Tile, ...]
     stroke: StrokeView
-    redo: Button
-    undo: Button  # of the last redo
-    skip: Button
-    pause: Button
-    note: Button
-    no_answer: Button
-    end: Button
+    buttons: Mapping[str, Button]  # by the act that each stands for
     no_forces: str  # why none are shown; empty where they are
 
 
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
     """Return what is shown of a session."""
-    nought = "" if isinstance(session.command, steps.AskNumber) else "0"  # which is a digit of a number that is due
     (headline, primary), over = _to_do(session, bench), session.over
     again = redo_targets(session)
-    stroke = _stroke(session, again)
-    trial, waited = session.of(session.trial), max(int(now - session.since), 0)
+    stroke, trial = _stroke(session, again), session.of(session.trial)
+    waited = max(int(now - session.since), 0)
     return CourseView(
         headline=headline,
         primary=primary,
@@ -131,17 +124,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
-        redo=_redo(again, stroke.redo),
-        undo=_undo(session),
-        skip=Button(tr("Skip"), "S", trial is not None and session.phase in IN_A_TRIAL, question=_why_skip(trial)),
-        pause=Button(tr("Resume"), "P", sends=steps.Resume())
-        if session.phase == "paused"
-        else Button(tr("Pause"), "P", session.phase in IN_A_TRIAL, steps.Pause()),
-        note=Button(tr("Note"), "N", not over, question=tr("Note, kept with its time:")),
-        no_answer=Button(tr("No answer"), nought, session.phase == "scoring", NO_ANSWER.get(type(session.command))),
-        end=Button(tr("New"), "Ctrl+N", sends=NewSession())
-        if over
-        else Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?")),
+        buttons=_buttons(session, trial) | {"redo": _redo(again, stroke.redo), "undo": _undo(session)},
         no_forces=_no_forces(session.plan),
     )
 
@@ -152,8 +135,18 @@ def _no_forces(plan: SessionPlan) -> str:
     return "" if "forces" in plan.shown.experimenter else tr(NO_FORCES)
 
 
-def _why_skip(trial: TrialState | None) -> str:
-    return "" if trial is None else tr("Why is {trial} left out?", trial=_name_trials((trial,)))
+def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Button]:
+    phase, nought = session.phase, "" if isinstance(session.command, steps.AskNumber) else "0"  # a digit of a number
+    why_skip = "" if trial is None else tr("Why is {trial} left out?", trial=_name_trials((trial,)))
+    pause = Button(tr("Pause"), "P", phase in IN_A_TRIAL, steps.Pause())
+    end = Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?"))
+    return {
+        "skip": Button(tr("Skip"), "S", trial is not None and phase in IN_A_TRIAL, question=why_skip),
+        "pause": Button(tr("Resume"), "P", sends=steps.Resume()) if phase == "paused" else pause,
+        "note": Button(tr("Note"), "N", not session.over, question=tr("Note, kept with its time:")),
+        "no answer": Button(tr("No answer"), nought, phase == "scoring", NO_ANSWER.get(type(session.command))),
+        "end": Button(tr("New"), "Ctrl+N", sends=NewSession()) if session.over else end,
+    }
 
 
 def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:

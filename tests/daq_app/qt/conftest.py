@@ -2,13 +2,15 @@
 
 import os
 import time
+from pathlib import Path
 
 import pytest
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from examples import short_protocol
-from PySide6.QtCore import QEvent, QSettings
+from PySide6.QtCore import QEvent, QSettings, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from daq_app.qt.preferences import SCALE, choose, settings, type_scale
@@ -19,6 +21,8 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.state import Dismissed, NewSession
+from sessions.recording import Recording
+from sessions.run import steps
 
 PACE = 8.0  # simulated seconds in a real one; the drawing of twice as many readings costs more than waiting
 PATIENCE = 60.0  # far beyond what anything takes [s]
@@ -56,6 +60,38 @@ class Driver:
 
     def phase(self, *phases):
         self.until(lambda: self.session is not None and self.session.phase in phases, f"{phases}")
+
+    def sealed(self):
+        """Return the recording of the session, once it is sealed."""
+        self.until(lambda: self.session is not None and self.session.sealing == "sealed", "the sealed session")
+        return Recording.open(Path(self.session.folder))
+
+    def abort(self):
+        """End the session early, and return its recording."""
+        self.window.bridge.send(steps.Abort("enough"))
+        return self.sealed()
+
+    def begin(self, subject="P07", *, scores_only=False):
+        """Begin a session by keyboard, up to its first stimulus."""
+        page = self.window.page
+        if scores_only:
+            page.scores_only.setChecked(True)
+        QTest.keyClicks(page.subject, subject)
+        QTest.keyClick(page.subject, Qt.Key.Key_Return)
+        self.phase("idle")
+        self.go_on("mounting")
+
+    def go_on(self, *phases):
+        """Press Space, and wait for a phase."""
+        QTest.keyClick(self.window, Qt.Key.Key_Space)
+        self.phase(*phases)
+
+    def answer(self, *keys, on=None):
+        """Give an answer by keys on the line or another widget, and wait for the next trial."""
+        number = self.session.trial
+        for key in (*keys, Qt.Key.Key_Return):
+            QTest.keyClick(on or self.window.subject.line, key)
+        self.until(lambda: self.session.phase == "closing" or self.session.trial != number, "the next trial")
 
 
 @pytest.fixture(scope="session")
@@ -139,9 +175,10 @@ def driver(application, one_window, tmp_path):
     one_window.page.study.clear()
     one_window.page.subject.setFocus()
     yield driver
+    one_window.resize(1440, 900)
     if driver.session is not None:
         if not driver.session.over:
             one_window.bridge.send(Stop())
-        driver.until(lambda: driver.session.sealing == "sealed", "the end")
+        driver.sealed()
         one_window.bridge.send(NewSession())
     one_window.bridge.send(Dismissed())

@@ -2,11 +2,14 @@
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from runpy import run_path
 
 import pytest
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter, QPicture
 
+contrast = run_path(str(Path(__file__).parents[3] / "docs" / "looks.py"))["contrast"]  # of two colours
 ROUNDING = 2.0  # of a letter that leans over the edge of its advance [px]
 
 

@@ -4,7 +4,6 @@ import os
 import signal
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
@@ -14,7 +13,6 @@ from PySide6.QtWidgets import QApplication
 from daq_app.qt.preferences import settings
 from daq_app.qt.start import SIMULATED_BENCH
 from daq_app.recorder.messages import Connect, Disconnect
-from sessions.recording import Recording
 from sessions.run import steps
 from sessions.run.replay import different_events, replay
 
@@ -24,27 +22,9 @@ ENTER, SPACE, ESCAPE = Qt.Key.Key_Return, Qt.Key.Key_Space, Qt.Key.Key_Escape
 PACE = 3.0  # a simulated hand strokes 1.2 s after a redo, and the undoing must come before it
 
 
-def begin(driver, subject="P07"):
-    page = driver.window.page
-    QTest.keyClicks(page.subject, subject)
-    QTest.keyClick(page.subject, ENTER)
-    driver.phase("idle")
-    QTest.keyClick(driver.window, SPACE)
-    driver.phase("mounting")
-
-
-def until_scoring(driver):
-    QTest.keyClick(driver.window, SPACE)
-    driver.phase("scoring")
-
-
-def next_trial(driver, number):
-    driver.until(lambda: driver.session.trial != number, "the next trial")
-
-
 def test_an_answer_to_a_recorder_that_is_gone_takes_nothing_away_and_space_resumes(driver):
-    begin(driver)
-    until_scoring(driver)
+    driver.begin()
+    driver.go_on("scoring")
     subject = driver.window.subject
     QTest.keyClick(subject.line, Qt.Key.Key_Right)
     os.kill(driver.window.bridge._client.pid, signal.SIGKILL)
@@ -56,40 +36,38 @@ def test_an_answer_to_a_recorder_that_is_gone_takes_nothing_away_and_space_resum
     QTest.keyClick(subject, SPACE)  # from whichever window
     driver.phase("mounting")
     assert driver.session.trial == 1
-    until_scoring(driver)
+    driver.go_on("scoring")
 
 
 def test_an_answer_can_be_given_with_keys_that_reach_the_experimenters_window(driver):
     window = driver.window
-    begin(driver)
-    until_scoring(driver)
+    driver.begin()
+    driver.go_on("scoring")
     window.setFocus()
     for key in (Qt.Key.Key_Right, Qt.Key.Key_PageUp):
         QTest.keyClick(window, key)
     assert window.subject.line.answer.score == 60.0
-    QTest.keyClick(window, ENTER)
-    next_trial(driver, 1)
+    driver.answer(on=window)
     assert driver.session.trials[0].answer == "score 60"
 
 
 def test_no_key_answers_on_a_page_that_was_closed_and_its_mark_waits(driver):
     window = driver.window
-    begin(driver)
-    until_scoring(driver)
+    driver.begin()
+    driver.go_on("scoring")
     QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
     window.subject.close()
     for key in (Qt.Key.Key_PageUp, ENTER, SPACE):
         QTest.keyClick(window, key)
     assert (driver.session.phase, window.subject.line.answer.score) == ("scoring", 50.0)
     QTest.keyClick(window, Qt.Key.Key_F6)
-    QTest.keyClick(window, ENTER)
-    next_trial(driver, 1)
+    driver.answer(on=window)
     assert driver.session.trials[0].answer == "score 50"
 
 
 def test_a_report_that_comes_between_the_answer_and_its_record_asks_for_no_second_answer(driver):
-    begin(driver)
-    until_scoring(driver)
+    driver.begin()
+    driver.go_on("scoring")
     subject, view = driver.window.subject, driver.view.subject
     QTest.keyClick(subject.line, Qt.Key.Key_Right)
     subject.show_view(view, None)
@@ -98,16 +76,16 @@ def test_a_report_that_comes_between_the_answer_and_its_record_asks_for_no_secon
     QTest.keyClick(subject.line, ENTER)
     driver.window.show_view(with_answer)
     assert not subject.scoring
-    next_trial(driver, 1)
-    until_scoring(driver)
+    driver.until(lambda: driver.session.trial == 2, "the next trial")
+    driver.go_on("scoring")
     assert subject.scoring
     assert subject.line.answer.score is None
 
 
 def test_while_a_note_is_typed_every_key_is_the_notes_and_none_an_answer(driver):
     window = driver.window
-    begin(driver)
-    until_scoring(driver)
+    driver.begin()
+    driver.go_on("scoring")
     QTest.keyClick(window.subject, Qt.Key.Key_N)
     assert window.course.asking
     QTest.keyClicks(window.course.line, "1")
@@ -126,37 +104,30 @@ def test_while_a_note_is_typed_every_key_is_the_notes_and_none_an_answer(driver)
 
 def begin_scoring(driver):
     """Begin a visit without forces, and go on to the first answer."""
-    begin(driver)
-    QTest.keyClick(driver.window, SPACE)
-    driver.phase("ready")
-    QTest.keyClick(driver.window, SPACE)
-    driver.phase("scoring")
+    driver.begin(scores_only=True)
+    driver.go_on("ready")
+    driver.go_on("scoring")
 
 
 def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0_is_no_refusal(driver):
     window = driver.window
     window.page.protocol.setCurrentText("magnitude-estimation")
-    window.page.scores_only.setChecked(True)
     begin_scoring(driver)
     window.setFocus()
     QTest.keyClicks(window, "20")
     assert driver.session.phase == "scoring"
     assert window.subject.number.field.text() == "20"
-    QTest.keyClick(window, ENTER)
-    next_trial(driver, 1)
+    driver.answer(on=window)
     assert driver.session.trials[0].answer == "number 20"
 
 
 def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_course(driver, monkeypatch):
     window = driver.window
-    window.page.scores_only.setChecked(True)
     begin_scoring(driver)
     interval = QApplication.doubleClickInterval()
     QApplication.setDoubleClickInterval(60_000)  # however slow this machine is
     try:
-        QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
-        QTest.keyClick(window.subject.line, ENTER)
-        next_trial(driver, 1)
+        driver.answer(Qt.Key.Key_Right)
         messages = []
         with monkeypatch.context() as patch:
             patch.setattr(window.bridge, "send", messages.append)
@@ -171,13 +142,12 @@ def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_cour
 
 def test_a_reason_that_is_typed_while_the_course_goes_on_discards_no_other_trial_than_the_one_asked_about(driver):
     window, course = driver.window, driver.window.course
-    window.page.scores_only.setChecked(True)
     begin_scoring(driver)
     QTest.keyClick(window, Qt.Key.Key_S)
     assert "trial 1 (" in course._question.text()
     QTest.keyClicks(course.line, "it was dropped")
     window.bridge.send(steps.Scored(40.0))  # meanwhile the subject answers, on another screen
-    next_trial(driver, 1)
+    driver.until(lambda: driver.session.trial == 2, "the next trial")
     QTest.keyClick(course.line, ENTER)
     assert course.asking
     assert course.line.text() == "it was dropped"
@@ -189,10 +159,8 @@ def test_a_reason_that_is_typed_while_the_course_goes_on_discards_no_other_trial
 
 def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
     window = driver.window
-    window.page.scores_only.setChecked(True)
-    begin(driver)
-    QTest.keyClick(window, SPACE)
-    driver.phase("ready")
+    driver.begin(scores_only=True)
+    driver.go_on("ready")
     code = driver.session.trials[0].trial.stimulus.code
     assert (window.middle.redo.text(), window.course.buttons["redo"].text()) == ("Redo 1  R", "Redo 1 R")
     QTest.keyClick(window.subject, Qt.Key.Key_R)
@@ -202,30 +170,25 @@ def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
 
 def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_agrees(driver, tmp_path):
     window = driver.window
-    begin(driver)
-    QTest.keyClick(window, SPACE)
-    driver.phase("scoring")
+    driver.begin()
+    driver.go_on("scoring")
     driver.until(lambda: driver.session.of(1).quality is not None, "what is said of the stroke")
     assert not window.middle.undo.isVisible()
     QTest.keyClick(window, Qt.Key.Key_R)
     if window.course.asking:
         QTest.keyClicks(window.course.line, "mistaken")
         QTest.keyClick(window.course.line, ENTER)
-    driver.until(lambda: driver.view.course.undo.enabled, "a redo that can be undone")
+    driver.until(lambda: driver.view.course.buttons["undo"].enabled, "a redo that can be undone")
     assert window.middle.undo.text() == "Undo redo 1  Ctrl+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     driver.until(lambda: driver.session.phase == "scoring", "the score is asked for again")
-    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
-    QTest.keyClick(window.subject.line, ENTER)
-    driver.until(lambda: driver.session.trial == 2, "the second trial")
+    driver.answer(Qt.Key.Key_Right)
     window.bridge.send(steps.Redo("mistaken too"))
     driver.until(lambda: driver.session.trial == 1, "the first trial again")
     QTest.mouseClick(window.middle.undo, Qt.MouseButton.LeftButton)
     driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the second trial")
     assert driver.session.of(1).quality is not None
-    window.bridge.send(steps.Abort("enough"))
-    driver.until(lambda: driver.session.sealing == "sealed", "the end")
-    recording = Recording.open(Path(driver.session.folder))
+    recording = driver.abort()
     first = recording.trials[0]
     assert (first.outcome, first.score, first.take.number) == ("scored", 50.0, 1)
     assert [take.discarded for take in first.other_takes] == ["the redo was undone"]
@@ -234,9 +197,8 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
 
 
 def test_the_page_of_the_next_session_has_no_code_proposes_the_next_and_enter_begins_none(driver):
-    begin(driver)
-    driver.window.bridge.send(steps.Abort("enough"))
-    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    driver.begin()
+    driver.abort()
     QTest.keyClick(driver.window, ENTER)
     assert driver.session is None
     assert driver.window.page.subject.text() == ""

@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QTabBar,
     QTableWidget,
     QTableWidgetItem,
-    QTreeWidget,
     QWidget,
 )
 
@@ -42,9 +41,8 @@ from daq_app.window.new_session import SessionForm
 from daq_app.window.subject import preview, translator
 from daq_app.window.view import derive_view
 from sessions.plan.protocols import protocol, protocol_names
-from tests.daq_app.qt.painted_text import cut_or_colliding, painted_texts
+from tests.daq_app.qt.painted_text import contrast, cut_or_colliding, painted_texts
 from tests.daq_app.qt.review.examples import SESSION, Nobody, film
-from tests.daq_app.qt.test_window_for_everybody import contrast
 from tests.daq_app.qt.written_text import ROUNDING, cut_off
 from tests.daq_app.session_messages import BAD, CLOSING, MOUNT, PAUSED, SCORE, after
 from tests.sessions.report_example import example
@@ -52,7 +50,9 @@ from tests.sessions.report_example import example
 pytestmark = pytest.mark.qt
 PACE = 1.0  # no test here waits for a session
 SCREENS = [(1366, 768), (1920, 1080), (3840, 2160)]
+SMALL_WINDOW = (900, 560)  # of the subject
 SCALES = [1.0, 1.5, 2.0]
+SLOW = pytest.mark.slow
 DOCUMENT_MARGIN = 4  # around the name of an axis [px]
 LONGEST_FIELD = max(range(len(FIELD_CHOICES)), key=lambda at: len(FIELD_CHOICES[at].axis))
 MODEL_SAYS = (
@@ -91,28 +91,14 @@ def themed(application, request):
     return show
 
 
-@pytest.mark.parametrize("kind", [QListWidget, QTableWidget, QTreeWidget])
-def test_a_selected_row_can_be_read_in_both_themes(themed, kind):
-    widget = kind()
-    if kind is QListWidget:
-        widget.addItem("HHHH 12")
-        widget.setCurrentRow(0)
-    elif kind is QTableWidget:
-        widget.setRowCount(1)
-        widget.setColumnCount(1)
-        widget.setItem(0, 0, QTableWidgetItem("HHHH 12"))
-        widget.selectRow(0)
-    else:
-        from PySide6.QtWidgets import QTreeWidgetItem
-
-        widget.setHeaderHidden(True)
-        widget.addTopLevelItem(QTreeWidgetItem(["HHHH 12"]))
-        widget.setCurrentItem(widget.topLevelItem(0))
+@pytest.mark.parametrize("make", [lambda: _list("HHHH 12"), lambda: _cells("", "HHHH 12")], ids=["list", "table"])
+def test_a_selected_row_can_be_read_in_both_themes(themed, make):
+    widget = make()
+    row = widget.model().index(0, 0)
+    widget.setCurrentIndex(row)
     widget.resize(200, 120)
     themed(widget)
-    box = widget.visualItemRect(widget.item(0, 0) if kind is QTableWidget else widget.itemAt(30, 10))
-    box = box.translated(widget.viewport().mapTo(widget, box.topLeft() * 0))
-    assert painted_contrast(widget, box) >= 4.5
+    assert painted_contrast(widget.viewport(), widget.visualRect(row)) >= 4.5
 
 
 def test_the_chosen_row_of_an_open_list_can_be_read_in_both_themes(themed, application):
@@ -179,9 +165,9 @@ def _cells(head, cell):
     return table
 
 
-def _list():
+def _list(text):
     widget = QListWidget()
-    widget.addItem(LONG)
+    widget.addItem(text)
     return widget
 
 
@@ -194,7 +180,7 @@ def _field():
 @pytest.mark.parametrize(
     ("make", "room"),
     [
-        (_list, 300),
+        (lambda: _list(LONG), 300),
         (_field, 300),
         (_tabs, 600),
         (lambda: _cells(LONG, ""), 0),
@@ -251,16 +237,10 @@ def settle(application):
 @pytest.mark.parametrize(
     ("size", "scale", "theme"),
     [
-        pytest.param(
-            size,
-            scale,
-            theme,
-            marks=[] if (size, scale, theme.dark) in QUICK else pytest.mark.slow,
-            id=f"{size[0]}-{scale}-{name}",
-        )
+        pytest.param(size, scale, theme, marks=[] if (size, scale, theme.dark) in QUICK else SLOW)
         for size in SCREENS
         for scale in SCALES
-        for name, theme in (("light", tokens.LIGHT), ("dark", tokens.DARK))
+        for theme in (tokens.LIGHT, tokens.DARK)
     ],
 )
 def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, size, scale, theme):
@@ -296,7 +276,7 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
 @pytest.mark.parametrize(
     ("size", "scale"),
     [
-        pytest.param(size, scale, marks=[] if (size, scale) in QUICK_SIZES else pytest.mark.slow)
+        pytest.param(size, scale, marks=[] if (size, scale) in QUICK_SIZES else SLOW)
         for size in SCREENS
         for scale in SCALES
     ],
@@ -360,8 +340,8 @@ def cut_axes(window):
 @pytest.mark.parametrize(
     ("size", "scale"),
     [
-        pytest.param(size, scale, marks=[] if (size, scale) == (SCREENS[0], SCALES[-1]) else pytest.mark.slow)
-        for size in SCREENS
+        pytest.param(size, scale, marks=[] if scale == SCALES[-1] and size in (SMALL_WINDOW, SCREENS[0]) else SLOW)
+        for size in (SMALL_WINDOW, *SCREENS)
         for scale in SCALES
     ],
 )

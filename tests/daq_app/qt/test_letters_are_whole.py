@@ -12,7 +12,7 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.parts import WrappedLabel
 from daq_app.qt.plots import ZoomedPlot
 from daq_app.qt.tables import TextTable
-from tests.daq_app.qt.test_window_for_everybody import contrast
+from tests.daq_app.qt.painted_text import contrast
 
 pytestmark = pytest.mark.qt
 

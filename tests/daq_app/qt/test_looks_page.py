@@ -1,7 +1,8 @@
 """The page of the window's looks: its contrasts are those of the standard, and every one can be read."""
 
-import importlib.util
 from pathlib import Path
+from runpy import run_path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtGui import QImage
@@ -11,10 +12,7 @@ pytestmark = pytest.mark.qt
 
 @pytest.fixture(scope="module")
 def looks():
-    spec = importlib.util.spec_from_file_location("looks", Path(__file__).parents[3] / "docs" / "looks.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return SimpleNamespace(**run_path(str(Path(__file__).parents[3] / "docs" / "looks.py")))
 
 
 def test_contrast_is_that_of_the_standard(looks):
@@ -23,8 +21,11 @@ def test_contrast_is_that_of_the_standard(looks):
 
 
 def test_all_that_is_written_and_a_selected_row_stand_out_in_both_themes(looks):
-    assert ("on_act", "act") in looks.PAIRS
+    assert {("on_act", "act"), ("surface", "wrong")} <= set(looks.PAIRS)
     for theme in looks.THEMES.values():
+        for ground in (theme.ground, theme.surface, theme.raised):
+            assert looks.contrast(theme.text, ground) >= 7.0
+            assert looks.contrast(theme.act, ground) >= 4.5
         for ink, ground in looks.PAIRS:
             assert looks.contrast(getattr(theme, ink), getattr(theme, ground)) >= 4.5, (ink, ground)
 

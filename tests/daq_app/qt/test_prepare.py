@@ -166,7 +166,7 @@ def test_a_protocol_of_ones_own_is_rehearsed_from_its_first_trial_to_its_last(dr
     page.simulated.setChecked(True)
     QTest.keyClicks(page.subject, "P21")
     QTest.keyClick(page.subject, Qt.Key.Key_Return)
-    driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the rehearsal")
+    driver.sealed()
     assert [trial.outcome for trial in driver.session.trials] == ["done", "done"]
     assert "SIMULATED" in driver.view.simulated
     assert Path(driver.session.folder).name.startswith("P21_own_")
@@ -179,7 +179,7 @@ def test_a_protocol_is_piloted_by_key_without_a_subject_and_apart_from_every_ses
     assert not window.to_do.primary.isEnabled()  # nobody is named
     window.setFocus()
     QTest.keyClick(window, Qt.Key.Key_F5)
-    driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the pilot")
+    driver.sealed()
     folder = Path(driver.session.folder)
     assert folder.parent == Path(page.folder.text()) / "pilots"
     assert folder.name.startswith("PILOT_own_")

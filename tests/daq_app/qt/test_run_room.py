@@ -1,5 +1,7 @@
 """The Run room in the real window: tiles that are pressed, a stroke that is inspected, and the drawer."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -13,8 +15,7 @@ from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.state import NewSession
 from daq_app.window.view_course import Inspection, Tile
-from sessions.run import steps
-from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
+from tests.daq_app.qt.test_session_by_keyboard import one_trial
 from tests.daq_app.qt.written_text import cut_off
 from tests.daq_app.session_messages import stroke_at
 
@@ -27,10 +28,28 @@ def click(widget):
     QTest.mouseClick(widget, LEFT, pos=widget.rect().center())
 
 
+@pytest.fixture
+def own_panel(driver):
+    """Return signals of a transducer of its own, and a function that shows readings of all its channels until then."""
+    feed = SimpleNamespace(trace=LiveTrace(100.0))
+    panel = LivePanel(feed, driver.window.bridge.model)
+    panel.resize(1200, 800)
+    panel.show()
+    driver.application.processEvents()
+
+    def feed_readings(first, last, value=lambda time: np.ones(len(time)), marks=()):
+        time = np.arange(first, last, 0.01)
+        feed.trace.add(time, np.tile(value(time), (len(CHANNELS), 1)))
+        panel.draw(marks, last)
+
+    yield feed, panel, feed_readings
+    panel.hide()
+
+
 def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     window, middle = driver.window, driver.window.middle
     assert not middle.strip.isVisible()
-    begin(driver, "P30")
+    driver.begin("P30")
     assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
     one_trial(driver, stays=False)
     stroke = driver.session.of(1).quality.stroke
@@ -57,8 +76,7 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     QTest.keyClick(window, Qt.Key.Key_Space)  # the course goes on behind it
     driver.until(lambda: middle.inspected is None, "the next onset")
     assert not middle.trial.isVisible()
-    window.bridge.send(steps.Abort("enough"))
-    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    driver.abort()
     click(first)
     assert middle.trial.isVisible()  # a session that is over can be looked through
 
@@ -99,22 +117,15 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
     finally:
         for key in (DRAWER, DRAWER_SIZES):
             preferences.settings().remove(key)
-        window.resize(1440, 900)
 
 
 def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_stroke(driver):
     window, live = at_size(driver, 1000, 700)
-    try:
-        assert live.plots[0].isVisible()
-        assert not live.plots[3].isVisible()
+    for shown, folded in ((0, 3), (3, 0), (0, 3)):
+        assert live.plots[shown].isVisible()
+        assert not live.plots[folded].isVisible()
         QTest.keyClick(window, Qt.Key.Key_D)
-        assert live.plots[3].isVisible()
-        assert not live.plots[0].isVisible()
-        QTest.keyClick(window, Qt.Key.Key_D)
-        assert live.plots[0].isVisible()
-        assert preferences.settings().value(DRAWER) is None  # what there was no room for is no wish
-    finally:
-        window.resize(1440, 900)
+    assert preferences.settings().value(DRAWER) is None  # what there was no room for is no wish
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
@@ -148,8 +159,7 @@ def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(
     tile = strip.tiles[40]
     place = tile.mapTo(strip.viewport(), tile.rect().center())
     assert strip.viewport().rect().contains(place)
-    assert all(widget.width() >= widget.sizeHint().width() for widget in strip.tiles)
-    assert all(widget.height() >= widget.sizeHint().height() for widget in strip.tiles)
+    assert all(widget.size().expandedTo(widget.sizeHint()) == widget.size() for widget in strip.tiles)
     strip.hide()
 
 
@@ -164,29 +174,19 @@ def test_a_tile_of_a_session_that_is_over_cannot_be_pressed():
     assert not gone.isVisible()
 
 
-def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
-    class Feed:
-        trace = LiveTrace(100.0)
-
-    panel = LivePanel(Feed, driver.window.bridge.model)
-    panel.resize(800, 600)
-    panel.show()
-    driver.application.processEvents()
+def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(own_panel):
+    _, panel, feed_readings = own_panel
     marks = (Mark("onset", 2.0, 2.0), Mark("lift", 5.0, 5.0))
 
-    def feed_readings(first, last):
-        time = np.arange(first, last, 0.01)
-        inside = (time > 2.0) & (time < 5.0)
-        Feed.trace.add(time, np.tile(np.where(inside, 3.0, 0.0), (len(CHANNELS), 1)))
-        panel.draw(marks, last)
+    def curve_until(first, last):
+        feed_readings(first, last, lambda time: np.where((time > 2.0) & (time < 5.0), 3.0, 0.0), marks)
         return panel.plots[0]._columns.values
 
-    curve = feed_readings(0.0, 20.0)
+    curve = curve_until(0.0, 20.0)
     assert np.nanmax(curve) == 3.0
     for minute in range(4):
-        later_curve = feed_readings(20.0 + 60.0 * minute, 80.0 + 60.0 * minute)
+        later_curve = curve_until(20.0 + 60.0 * minute, 80.0 + 60.0 * minute)
     np.testing.assert_array_equal(later_curve, curve)
-    panel.hide()
 
 
 @pytest.mark.parametrize("opened", [False, True])
@@ -212,40 +212,25 @@ def test_buttons_over_the_pictures_are_whole_or_not_there(driver, width, opened)
     assert visible == {False, True}
 
 
-def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transducer_sends(driver):
-    class Feed:
-        trace = LiveTrace(100.0)
-
-    panel = LivePanel(Feed, driver.window.bridge.model)
-    panel.resize(1200, 800)
-    panel.show()
-    driver.application.processEvents()
+def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transducer_sends(own_panel):
+    feed, panel, feed_readings = own_panel
     click(panel.bar.hold)
     assert not panel.bar.hold.isChecked()
 
-    def feed_readings(first, last):
-        time = np.arange(first, last, 0.01)
-        Feed.trace.add(time, np.ones((len(CHANNELS), len(time))))
-        panel.draw((), last)
+    def ends_after(first, last):
+        feed_readings(first, last)
         return panel.plots[0]._end, panel.plots[4]._end, panel.bar.hold.isChecked()
 
-    assert feed_readings(100.0, 105.0) == ("now", "now", False)
+    assert ends_after(100.0, 105.0) == ("now", "now", False)
     click(panel.bar.hold)
-    assert feed_readings(105.0, 106.0) == ("held", "held", True)
-    Feed.trace = LiveTrace(100.0)  # of a transducer that was plugged in anew
-    assert feed_readings(0.0, 1.0) == ("now", "now", False)
-    panel.hide()
+    assert ends_after(105.0, 106.0) == ("held", "held", True)
+    feed.trace = LiveTrace(100.0)  # of a transducer that was plugged in anew
+    assert ends_after(0.0, 1.0) == ("now", "now", False)
 
 
-def test_a_transducer_that_sends_nothing_now_has_no_number_now(driver):
-    class Feed:
-        trace = LiveTrace(100.0)
-
-    panel = LivePanel(Feed, driver.window.bridge.model)
-    panel.resize(1200, 800)
-    time = np.arange(0.0, 1.0, 0.01)
-    Feed.trace.add(time, np.full((len(CHANNELS), len(time)), 3.0))
-    panel.draw((), 1.0)
+def test_a_transducer_that_sends_nothing_now_has_no_number_now(own_panel):
+    _, panel, feed_readings = own_panel
+    feed_readings(0.0, 1.0, lambda time: np.full(len(time), 3.0))
     assert panel.bar.values["N"].text() == "3.00 N"
     panel.draw((), 2.5, silent=True)
     assert panel.bar.values["N"].text() == "–"
@@ -254,10 +239,9 @@ def test_a_transducer_that_sends_nothing_now_has_no_number_now(driver):
 def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
     window, mirror = driver.window, driver.window.course.mirror
     mirror.open.set_room(room=True)
-    begin(driver, "P37")
+    driver.begin("P37")
     assert mirror.open
-    QTest.keyClick(window, Qt.Key.Key_Space)
-    driver.phase("scoring")
+    driver.go_on("scoring")
     assert mirror.picture.isVisible()
     assert mirror.picture.page._question.text() == window.subject._question.text()
     before = mirror.picture.grab().toImage()
@@ -275,13 +259,11 @@ def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(dri
 
 def test_a_visit_of_scores_only_has_no_force_plots_that_stay_empty(driver):
     window = driver.window
-    window.page.scores_only.setChecked(True)
-    begin(driver, "P31")
+    driver.begin("P31", scores_only=True)
     assert not any(plot.isVisible() for plot in window.live.plots)
     assert not window.live.bar.values["N"].isVisible()
     assert window.middle.stroke.text() == "No forces are recorded: this visit is of scores only."
-    window.bridge.send(steps.Abort("enough"))
-    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    driver.abort()
     window.bridge.send(NewSession())
     driver.until(lambda: driver.session is None, "the next session")
     assert any(plot.isVisible() for plot in window.live.plots)

@@ -15,35 +15,20 @@ from PySide6.QtWidgets import QApplication
 from daq_app.window.view import Banner
 from sessions.plan.protocols import protocol_file
 from sessions.plan.study import create_study
-from sessions.recording import Recording
-from sessions.run import steps
 
 pytestmark = pytest.mark.qt
 
 ENTER, SPACE = Qt.Key.Key_Return, Qt.Key.Key_Space
 
 
-def begin(driver, subject="P07"):
-    window = driver.window
-    QTest.keyClicks(window.page.subject, subject)
-    QTest.keyClick(window.page.subject, ENTER)
-    driver.phase("idle")
-    QTest.keyClick(window, SPACE)
-    driver.phase("mounting")
-
-
 def one_trial(driver, *, presses=3, stays=True):
     """Mount, let the simulated hand stroke, score with the arrow keys; a stroke that is `stays` stays meanwhile."""
     window, number = driver.window, driver.session.trial
-    QTest.keyClick(window, SPACE)
-    driver.phase("scoring")
+    driver.go_on("scoring")
     driver.until(lambda: driver.session.of(number).quality is not None, "what is said of the stroke")
     if stays:
         driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", "the stroke stays while its score is awaited")
-    for _ in range(presses):
-        QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
-    QTest.keyClick(window.subject.line, ENTER)
-    driver.until(lambda: driver.session.phase == "closing" or driver.session.trial != number, "the next trial")
+    driver.answer(*[Qt.Key.Key_Right] * presses)
 
 
 def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
@@ -52,22 +37,19 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
     QTest.keyClick(window, Qt.Key.Key_T)
     driver.until(lambda: driver.state.bench.zero is not None, "the zero")
     window.page.subject.setFocus()
-    begin(driver)
+    driver.begin()
     one_trial(driver, presses=1)
     one_trial(driver, presses=4)
     # The second trial is taken up again, with a reason that is typed.
-    if driver.view.course.redo.sends is None:
-        QTest.keyClick(window, Qt.Key.Key_R)
+    QTest.keyClick(window, Qt.Key.Key_R)
+    if window.course.asking:
         QTest.keyClicks(window.course.line, "the finger slipped")
         QTest.keyClick(window.course.line, ENTER)
-    else:
-        QTest.keyClick(window, Qt.Key.Key_R)
     driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the second trial again")
     while driver.session.phase != "closing":
         one_trial(driver)
     QTest.keyClick(window, SPACE)
-    driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
-    recording = Recording.open(Path(driver.session.folder))
+    recording = driver.sealed()
     assert recording.end["complete"]
     assert [record.score for record in recording.trials] == [50.0, 52.0, 52.0]
     assert recording.trials[1].take.number == 2
@@ -85,7 +67,7 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
 
 
 def test_a_recorder_that_is_killed_is_one_banner_and_the_session_goes_on_at_the_same_trial(driver):
-    begin(driver, "P08")
+    driver.begin("P08")
     one_trial(driver)
     folder = driver.session.folder
     os.kill(driver.window.bridge._client.pid, signal.SIGKILL)
@@ -103,8 +85,7 @@ def test_a_recorder_that_is_killed_is_one_banner_and_the_session_goes_on_at_the_
     driver.window.act("end")
     QTest.keyClicks(driver.window.course.line, "enough")
     QTest.keyClick(driver.window.course.line, ENTER)
-    driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
-    recording = Recording.open(Path(folder))
+    recording = driver.sealed()
     assert [record.outcome for record in recording.trials] == ["scored", "scored", "open"]
     assert [event.kind for event in recording.events].count("resumed") == 1
 
@@ -127,7 +108,7 @@ def test_a_subject_is_enrolled_by_key_and_a_session_of_its_study_runs_by_itself_
     assert "S01 is enrolled" in page.frames["Subject"].words.text()
     assert not page._enrol.isVisible()
     QTest.keyClick(page.subject, ENTER)
-    driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the sealed session")
+    driver.sealed()
     assert Path(driver.session.folder).parent == study
     assert driver.session.end.complete
     assert [trial.outcome for trial in driver.session.trials] == ["done"] * 10
@@ -136,7 +117,7 @@ def test_a_subject_is_enrolled_by_key_and_a_session_of_its_study_runs_by_itself_
 
 
 def test_an_error_while_drawing_is_said_and_the_session_goes_on(driver, monkeypatch):
-    begin(driver, "P09")
+    driver.begin("P09")
 
     def fails(*_):
         raise ValueError("no such picture")
@@ -165,13 +146,12 @@ def test_a_wrong_form_begins_nothing_and_typing_goes_to_the_wrong_field(driver):
 
 
 def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that_can_be_resumed(driver, monkeypatch):
-    begin(driver, "P10")
+    driver.begin("P10")
     window = driver.window
     window.close()
     assert window.isVisible()
     assert "close once more" in window.notice._words.text()
-    QTest.keyClick(window, SPACE)
-    driver.phase("scoring")
+    driver.go_on("scoring")
     assert window.notice._words.text() == ""  # the session has gone on: the question is not asked any more
     monkeypatch.setattr(window.bridge, "end", lambda: None)
     monkeypatch.setattr(QGuiApplication, "quit", lambda: None)
@@ -184,7 +164,7 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
 
 def test_the_warning_of_a_tablet_gives_way_to_others_and_goes_when_it_answers_again(driver, monkeypatch):
     window, server = driver.window, SimpleNamespace(connected=False)
-    begin(driver, "P13")
+    driver.begin("P13")
     monkeypatch.setattr(window, "tablet", SimpleNamespace(server=server))
     window.show_view(driver.view)
     assert "tablet does not answer" in window.notice._words.text()
@@ -203,14 +183,13 @@ def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_th
     window.subject.hide()
     other = SimpleNamespace(availableGeometry=lambda: QRect(1500, 0, 800, 600))
     monkeypatch.setattr(QGuiApplication, "screens", lambda: [window.screen(), other])
-    begin(driver, "P12")
+    driver.begin("P12")
     assert window.subject.isVisible()
     assert "Keep your fingers off" in window.subject._text.text()
     assert window.subject.testAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
     window.subject.close()
     assert "F6 brings it again" in window.notice._words.text()
-    QTest.keyClick(window, SPACE)
-    driver.phase("ready", "stroking")
+    driver.go_on("ready", "stroking")
     assert not window.subject.isVisible()  # whoever closed it is not contradicted before an answer is due
     driver.phase("scoring")
     driver.until(window.subject.isVisible, "the page for an answer")
@@ -245,9 +224,8 @@ def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says
     notice.show_view(banner, "", "Mount")
     notice.warn("Close once more.")
     for seconds in (2, 3):  # the banner counts
-        notice.show_view(
-            replace(banner, sentence=f"The transducer does not answer: no readings for {seconds} s."), "", "Mount"
-        )
+        sentence = f"The transducer does not answer: no readings for {seconds} s."
+        notice.show_view(replace(banner, sentence=sentence), "", "Mount")
         assert "does not answer" in notice._words.text()
         assert notice._words.text().endswith("Close once more.")
     notice.show_view(None, "Done again: trial 5 (K50).", "Mount")
@@ -258,13 +236,10 @@ def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_ke
     window = driver.window
     window.page.protocol.setCurrentText("magnitude-estimation")
     window.page.practice.setChecked(True)
-    window.page.scores_only.setChecked(True)
-    begin(driver, "P11")
+    driver.begin("P11", scores_only=True)
     assert driver.view.course.headline.startswith("Practice: mount sample")
-    QTest.keyClick(window, SPACE)
-    driver.phase("ready")
-    QTest.keyClick(window, SPACE)
-    driver.phase("scoring")
+    driver.go_on("ready")
+    driver.go_on("scoring")
     assert driver.view.subject.kind == "number"
     QTest.keyClicks(window.subject.number.field, "12,5")
     QTest.keyClick(window.subject.number.field, ENTER)
@@ -274,22 +249,17 @@ def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_ke
     QTest.keyClicks(window.course.line, "a door slammed")
     QTest.keyClick(window.course.line, ENTER)
     driver.until(lambda: driver.session.notes == ("a door slammed",), "the note")
-    window.bridge.send(steps.Abort("enough"))
-    driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
-    recording = Recording.open(Path(driver.session.folder))
-    [answer] = [event.data for event in recording.events if event.kind == "number_given"]
+    [answer] = [event.data for event in driver.abort().events if event.kind == "number_given"]
     assert (answer["number"], answer["input_device"]) == (12.5, "keyboard")
 
 
 def test_which_of_two_is_chosen_with_a_key_and_kept(driver):
     window = driver.window
     window.page.protocol.setCurrentText("paired-comparison")
-    window.page.scores_only.setChecked(True)
-    begin(driver, "P12")
+    driver.begin("P12", scores_only=True)
     for _ in range(2):
         number = driver.session.trial
-        QTest.keyClick(window, SPACE)
-        driver.phase("ready")
+        driver.go_on("ready")
         QTest.keyClick(window, SPACE)
         driver.until(lambda n=number: driver.session.trial != n or driver.session.phase == "scoring", "the second")
     driver.phase("scoring")

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtGui import QColor
@@ -10,6 +11,7 @@ from PySide6.QtWidgets import QLabel
 from daq_app.qt import tokens
 from daq_app.qt.answer_fields import FULL, PressBar
 from daq_app.qt.subject_window import LARGER
+from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import SubjectView
 from tests.daq_app.qt.written_text import cut_off
 
@@ -83,12 +85,20 @@ def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_who
 
 @pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])
 @pytest.mark.usefixtures("application")
-def test_the_bar_of_the_force_fills_from_where_reading_begins(direction):
-    bar = PressBar()
+def test_the_bar_of_the_force_fills_by_the_mean_of_the_last_moment_from_where_reading_begins(direction):
+    bar, trace = PressBar(), LiveTrace(100.0)
     bar.setLayoutDirection(direction)
     bar.resize(400, 40)
-    bar._force = 0.25 * FULL
-    image, colour = bar.grab().toImage(), QColor(tokens.theme_of(bar).act)
-    filled = [x for x in range(image.width()) if image.pixelColor(x, image.height() // 2) == colour]
-    assert len(filled) == pytest.approx(100, abs=4)
+
+    def show_force():
+        bar.show_force(trace)
+        image, colour = bar.grab().toImage(), QColor(tokens.theme_of(bar).act)
+        return [x for x in range(image.width()) if image.pixelColor(x, image.height() // 2) == colour]
+
+    assert show_force() == []
+    values = np.full((len(CHANNELS), 200), np.nan)
+    values[CHANNELS.index("N")] = np.repeat([4.0, 2.5], [180, 20])
+    trace.add(np.arange(200) / 100.0, values)
+    filled = show_force()
+    assert len(filled) == pytest.approx(400 * 2.5 / FULL, abs=4)
     assert (filled[-1] > 390) is (direction == RIGHT_TO_LEFT)

@@ -5,41 +5,31 @@ import re
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
-from PySide6.QtGui import QAccessible, QColor, QKeyEvent
+from PySide6.QtGui import QAccessible, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QAbstractScrollArea,
     QComboBox,
     QLabel,
-    QLineEdit,
-    QListWidget,
     QScrollArea,
     QWidget,
 )
 
-from daq_app.qt import answer_fields, preferences, tokens
-from daq_app.qt.answer_fields import FULL, PressBar
+from daq_app.qt import answer_fields, preferences
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
-from daq_app.window.live_trace import CHANNELS, LiveTrace
+from daq_app.window.live_trace import CHANNELS
 from daq_app.window.view_course import Button
+from tests.daq_app.qt.written_text import controls, laid_over, unreached_controls
 
 pytestmark = pytest.mark.qt
 
 PACE = 1.0  # no test here waits for a session
-CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget)
-
-
-def controls(window):
-    widgets = [w for kind in CONTROLS for w in window.findChildren(kind)]
-    return [w for w in widgets if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
 
 
 def test_every_control_has_a_name_for_screen_readers(driver):
     for window in (driver.window, driver.window.subject):
-        nameless = [w for w in controls(window) if not w.accessibleName().strip()]
-        assert nameless == []
+        assert [w for w in controls(window) if not w.accessibleName().strip()] == []
 
 
 def test_every_painted_widget_says_what_it_shows(driver):
@@ -64,17 +54,7 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
     fields += [page.studies, page.protocol, page.seed, page.people_score, page.folder]
     places = [order.index(widget) for widget in fields]
     assert places == sorted(places)
-    visible = [
-        w for w in controls(window) if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus
-    ]
-    unreached = [w.accessibleName() for w in visible if w not in reached and not _in_a_group_with_one_of(w, reached)]
-    assert unreached == []
-
-
-def _in_a_group_with_one_of(widget, reached):
-    """Radio buttons of a group are one stop; arrows go on within it."""
-    group = widget.group() if isinstance(widget, QAbstractButton) else None
-    return group is not None and any(button in reached for button in group.buttons())
+    assert unreached_controls(window, reached) == []
 
 
 def test_a_click_leaves_space_to_the_primary_button(driver):
@@ -87,9 +67,8 @@ def test_every_key_of_the_list_is_obeyed_and_no_two_are_the_same():
     special = {"Space": Qt.Key.Key_Space, "F1": Qt.Key.Key_F1, "Esc": Qt.Key.Key_Escape}
     special |= {f"F{number}": Qt.Key(Qt.Key.Key_F1 + number - 1) for number in range(2, 8)}
     for entry in KEYS:
-        modifier = (
-            Qt.KeyboardModifier.ControlModifier if entry.key.startswith("Ctrl+") else Qt.KeyboardModifier.NoModifier
-        )
+        modifiers = Qt.KeyboardModifier
+        modifier = modifiers.ControlModifier if entry.key.startswith("Ctrl+") else modifiers.NoModifier
         name = entry.key.removeprefix("Ctrl+")
         key = special.get(name) or Qt.Key(ord(name))
         assert act_of(QKeyEvent(QEvent.Type.KeyPress, key, modifier)) == entry.act
@@ -109,14 +88,8 @@ def test_the_window_fits_the_screen_and_nothing_is_laid_over_anything_else(drive
     window.resize(*size)
     driver.application.processEvents()
     assert (window.width(), window.height()) == size
-    panels = [
-        w for w in (window.header, window.to_do, window._left, window.live, window.bench, window.strip) if w.isVisible()
-    ]
-    boxes = [w.rect().translated(w.mapTo(window, w.rect().topLeft())) for w in panels]
-    for i, box in enumerate(boxes):
-        assert window.rect().contains(box)
-        assert not any(box.intersects(other) for other in boxes[i + 1 :])
-    window.resize(1440, 900)
+    parts = (window.header, window.to_do, window._left, window.live, window.bench, window.strip)
+    assert laid_over(window, parts) == []
 
 
 def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
@@ -132,7 +105,6 @@ def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
         place = widget.rect().translated(widget.mapTo(window, widget.rect().topLeft()))
         assert window.rect().contains(place)
         assert widget.height() >= widget.minimumHeight()
-    window.resize(1440, 900)
 
 
 def test_what_to_do_now_is_whole_in_the_lowest_window_with_a_banner_of_three_lines_and_two_buttons(driver):
@@ -146,7 +118,6 @@ def test_what_to_do_now_is_whole_in_the_lowest_window_with_a_banner_of_three_lin
     assert sentence.height() >= sentence.heightForWidth(sentence.width())
     assert not first.geometry().intersects(second.geometry())
     assert window.to_do.rect().contains(first.geometry().united(second.geometry()))
-    window.resize(1440, 900)
 
 
 def test_no_button_beside_the_plan_cuts_its_words_off(driver):
@@ -198,7 +169,6 @@ def test_what_the_live_model_says_of_the_readings_stands_in_the_window(driver):
     model.prepare()
     driver.until(lambda: finger.accessibleName().endswith("Model at small strain: nothing touches."), "the model")
     assert len(model.said.row) > 0
-    driver.window.resize(1440, 900)
     model.close()
 
 
@@ -213,28 +183,6 @@ def test_numbers_have_a_point_in_every_country(driver, locale):
         assert not re.search(r"\d,\d", text)
     finally:
         QLocale.setDefault(before)
-
-
-def contrast(first, second):
-    """Contrast ratio of two colours (WCAG 2.1, relative luminance)."""
-
-    def luminance(name):
-        parts = [channel / 255 for channel in QColor(name).getRgb()[:3]]
-        linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
-        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-    bright, dim = sorted((luminance(first), luminance(second)), reverse=True)
-    return (bright + 0.05) / (dim + 0.05)
-
-
-@pytest.mark.parametrize("theme", [tokens.LIGHT, tokens.DARK])
-def test_text_and_states_stand_out_from_their_grounds_in_both_themes(theme):
-    for ground in (theme.ground, theme.surface, theme.raised):
-        assert contrast(theme.text, ground) >= 7.0
-        for colour in (theme.quiet, theme.wrong, theme.look, theme.act):
-            assert contrast(colour, ground) >= 4.5
-    assert contrast(theme.on_act, theme.act) >= 4.5
-    assert contrast(theme.surface, theme.wrong) >= 4.5
 
 
 # ---- the subject's line
@@ -296,19 +244,6 @@ def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     assert fit_line(subject).pixels == pytest.approx(before)
 
 
-def test_next_stands_where_the_answering_hand_is(driver):
-    subject = driver.window.subject
-    subject.show()
-    subject._pages.setCurrentIndex(1)
-    subject.next.show()
-    middle = subject.width() / 2
-    for hand, right in (("left", False), ("right", True)):
-        subject._place_next(hand)
-        driver.application.processEvents()
-        place = subject.next.mapTo(subject, subject.next.rect().center()).x()
-        assert (place > middle) is right
-
-
 def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
     subject: QWidget = driver.window.subject
     line = shown_line(driver)
@@ -317,24 +252,6 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
     assert line in widgets
     texts = [w.text() for w in widgets if hasattr(w, "text")]
     assert not any(re.search(r"\d", text) for text in texts)
-
-
-@pytest.mark.usefixtures("application")
-def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_moment():
-    bar, trace = PressBar(), LiveTrace(100.0)
-    values = np.full((len(CHANNELS), 200), np.nan)
-    values[CHANNELS.index("N"), :180], values[CHANNELS.index("N"), 180:] = 4.0, 2.5
-    bar.resize(400, 40)
-    bar.show_force(trace)
-    assert _filled(bar) == 0
-    trace.add(np.arange(200) / 100.0, values)
-    bar.show_force(trace)
-    assert _filled(bar) == pytest.approx(400 * 2.5 / FULL, abs=3)
-
-
-def _filled(bar):
-    image, colour = bar.grab().toImage(), QColor(tokens.theme_of(bar).act)
-    return sum(image.pixelColor(x, image.height() // 2) == colour for x in range(image.width()))
 
 
 @pytest.mark.usefixtures("application")

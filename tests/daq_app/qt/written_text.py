@@ -2,6 +2,8 @@
 
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
     QAbstractSpinBox,
     QCheckBox,
     QComboBox,
@@ -9,10 +11,12 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QListView,
+    QListWidget,
     QMenuBar,
     QProgressBar,
     QPushButton,
     QRadioButton,
+    QSlider,
     QStyle,
     QStyleOptionButton,
     QStyleOptionComboBox,
@@ -28,6 +32,7 @@ ROUNDING = 2  # by which Qt's own size of a button may fall short of its text; i
 CELL_MARGIN = 3  # that Qt keeps on both sides of the text of a cell [px]
 ENTRY_MARGIN = 2  # that `QLineEdit` keeps on both sides of its text [px]
 HIGHEST = 10_000  # beyond any text [px]
+CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget, QSlider)
 WRAPPED = Qt.TextFlag.TextWordWrap
 ELEMENTS = {
     QPushButton: QStyle.SubElement.SE_PushButtonContents,
@@ -44,6 +49,32 @@ def cut_off(window):
             texts += [text for text in texts_of(widget) if text[0] and is_less(*text[1:])]
             texts += cut_or_colliding(widget) if paints_by_hand(widget) else []
     return texts
+
+
+def laid_over(window, parts):
+    """Return the visible ones of some parts that reach beyond their window, or lie on another."""
+    seen = [part for part in parts if part.isVisible()]
+    boxes = [part.rect().translated(part.mapTo(window, part.rect().topLeft())) for part in seen]
+    alone = [window.rect().contains(a) and sum(a.intersects(b) for b in boxes) == 1 for a in boxes]
+    return [part for part, is_alone in zip(seen, alone, strict=True) if not is_alone]
+
+
+def controls(window):
+    """Return everything in a window that is used, without what Qt's own controls are made of."""
+    widgets = [w for kind in CONTROLS for w in window.findChildren(kind)]
+    inner = [w for w in widgets if isinstance(w.parent(), QComboBox | QAbstractScrollArea | QTabBar)]
+    return [w for w in widgets if w not in inner]
+
+
+def unreached_controls(window, reached):
+    """Return the names of the controls to which Tab should have led and did not.
+
+    Radio buttons of a group are one stop; arrows go on within it.
+    """
+    groups = [w.group() for w in reached if isinstance(w, QAbstractButton) and w.group() is not None]
+    usable = [w for w in controls(window) if w.isVisible() and w.isEnabled()]
+    stops = [w for w in usable if w.focusPolicy() & Qt.FocusPolicy.TabFocus and w not in reached]
+    return [w.accessibleName() for w in stops if not (isinstance(w, QAbstractButton) and w.group() in groups)]
 
 
 def is_less(room, needed):

@@ -14,6 +14,13 @@ RATE = 7000.0
 INFO = TransducerInfo("test://", "test", "stand-in", "FT1", True, RATE, RATE, CALIBRATION)
 
 
+@pytest.fixture
+def feed():
+    feed = LiveFeed()
+    feed.device(INFO)
+    return feed
+
+
 def live(first, wrench, *, stream=1, zero=(0.0,) * 6, status=None):
     n = len(wrench)
     number = np.arange(first, first + n)
@@ -38,9 +45,7 @@ def channel(feed, name):
     return feed.trace.between(-1.0, 1e9)[1][CHANNELS.index(name)]
 
 
-def test_force_ratio_speed_and_place_are_those_of_a_finger_that_slides_at_a_known_speed():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_force_ratio_speed_and_place_are_those_of_a_finger_that_slides_at_a_known_speed(feed):
     feed_blocks(feed, sliding(7000))
     assert channel(feed, "N") == pytest.approx(2.0)
     assert channel(feed, "T") == pytest.approx(1.0)
@@ -51,18 +56,14 @@ def test_force_ratio_speed_and_place_are_those_of_a_finger_that_slides_at_a_know
     assert speed[1100:] == pytest.approx(25.0, rel=1e-6)
 
 
-def test_nothing_is_said_of_ratio_place_and_speed_where_nothing_presses():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_nothing_is_said_of_ratio_place_and_speed_where_nothing_presses(feed):
     feed_blocks(feed, sliding(3000, normal=0.2))
     assert np.isnan(channel(feed, "mu")).all()
     assert np.isnan(channel(feed, "speed")).all()
     assert channel(feed, "N") == pytest.approx(0.2)
 
 
-def test_readings_the_device_calls_invalid_are_not_drawn():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_readings_the_device_calls_invalid_are_not_drawn(feed):
     status = np.zeros(100, np.int64)
     status[40:60] = 2
     feed.add(live(0, sliding(100), status=status), FRAME)
@@ -70,9 +71,7 @@ def test_readings_the_device_calls_invalid_are_not_drawn():
     assert np.isfinite(channel(feed, "N")[:40]).all()
 
 
-def test_a_reading_that_the_device_calls_invalid_moves_no_speed():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_a_reading_that_the_device_calls_invalid_moves_no_speed(feed):
     wrench, status = sliding(7000), np.zeros(7000, np.int64)
     wrench[3000, 3:], status[3000] = 1e5, 2
     feed.add(live(0, wrench, status=status), FRAME)
@@ -81,9 +80,7 @@ def test_a_reading_that_the_device_calls_invalid_moves_no_speed():
     assert speed[np.isfinite(speed)] == pytest.approx(25.0, rel=1e-6)
 
 
-def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time(feed):
     feed_blocks(feed, sliding(1000))
     feed.take_begins()
     feed.add(live(1000, sliding(300)), FRAME)
@@ -93,9 +90,7 @@ def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time():
     assert take.raw[0] == pytest.approx(sliding(300)[0])
 
 
-def test_readings_that_are_missing_leave_a_gap_however_few_they_are():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_readings_that_are_missing_leave_a_gap_however_few_they_are(feed):
     feed.add(live(0, sliding(100)), FRAME)
     feed.add(live(103, sliding(100)), FRAME)
     columns = feed.trace.columns(0.0, 0.05, 500)
@@ -113,9 +108,7 @@ def test_readings_that_came_in_several_messages_are_taken_as_one_up_to_whatever_
     assert messages[0].wrench.tolist() == [*first.wrench.tolist(), *second.wrench.tolist()]
 
 
-def test_a_new_stream_begins_a_new_picture():
-    feed = LiveFeed()
-    feed.device(INFO)
+def test_a_new_stream_begins_a_new_picture(feed):
     feed_blocks(feed, sliding(1000))
     feed.add(live(0, sliding(20), stream=2), FRAME)
     assert len(channel(feed, "N")) == 20

@@ -114,7 +114,8 @@ def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset
     )
     session = after(*first_take, *again).session
     view = course_view(session, BenchState(), 0.0)
-    assert (view.undo.label, view.undo.key, view.undo.enabled) == ("Undo redo 1", "Ctrl+Z", True)
+    undo = view.buttons["undo"]
+    assert (undo.label, undo.key, undo.enabled) == ("Undo redo 1", "Ctrl+Z", True)
     assert view.notice.startswith(f"Done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
     undone = (
         log("undo_redo", 1),
@@ -127,12 +128,12 @@ def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset
     assert tiles(now) == tiles(before)
     assert inspection(now, 1).verdict == "Good"
     assert "score 40" in inspection(now, 1).heading
-    assert not course_view(now, BenchState(), 0.0).undo.enabled
+    assert not course_view(now, BenchState(), 0.0).buttons["undo"].enabled
     stroked = after(*first_take, *again, steps.AskStroke(FIRST), log("contact_onset", 1, time=9.0, noticed=9.0)).session
-    assert not course_view(stroked, BenchState(), 0.0).undo.enabled
+    assert not course_view(stroked, BenchState(), 0.0).buttons["undo"].enabled
 
 
 def test_a_redo_before_the_stroke_or_in_the_middle_of_it_offers_no_undo():
     for so_far in (READY, TOUCH):
         session = after(*so_far, log("redo", 1, reason="sneezed"), steps.StartTake(1, 2), steps.MeasureZero()).session
-        assert not course_view(session, BenchState(), 0.0).undo.enabled
+        assert not course_view(session, BenchState(), 0.0).buttons["undo"].enabled

@@ -113,14 +113,14 @@ def test_a_flawed_stroke_is_redone_by_one_key_whose_reason_is_what_was_found():
     course = derive_view(after(*SCORE, Judged(1, 1, BAD))).course
     assert course.stroke.grade == "refused"
     assert "no steady window" in course.stroke.words
-    assert course.redo.sends == steps.Redo("no steady window")
+    assert course.buttons["redo"].sends == steps.Redo("no steady window")
 
 
 def test_a_good_stroke_is_redone_only_with_a_reason_that_is_asked_for():
     course = derive_view(after(*SCORE, Judged(1, 1, GOOD))).course
     assert course.stroke.words == f"Stroke on {CODE} · steady 1.5 s · µ 0.44 · 21 mm/s · N fell 8 % · good"
-    assert course.redo.enabled
-    assert course.redo.sends is None
+    assert course.buttons["redo"].enabled
+    assert course.buttons["redo"].sends is None
 
 
 def test_what_was_found_of_a_take_that_was_done_again_meanwhile_is_not_shown():
@@ -138,8 +138,8 @@ def test_onset_steady_window_and_lift_are_marked_in_device_time():
 
 
 def test_nothing_can_be_redone_before_the_first_trial_was_begun():
-    assert not derive_view(after(*MOUNT)).course.redo.enabled
-    assert derive_view(after(*READY)).course.redo.enabled
+    assert not derive_view(after(*MOUNT)).course.buttons["redo"].enabled
+    assert derive_view(after(*READY)).course.buttons["redo"].enabled
 
 
 # ---- the lamp

@@ -9,7 +9,6 @@ import pytest
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import finger_words
@@ -22,9 +21,8 @@ from daq_app.qt.stroke_column import BY, DecisionsBar
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
 from tests.daq_app.qt.review.examples import SESSION, film, raw, until
+from tests.daq_app.qt.written_text import controls, laid_over, unreached_controls
 from tests.sessions.report_example import example
-
-CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget, QSlider)
 
 
 def texts(table):
@@ -353,23 +351,18 @@ def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(windo
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):
     window.take(m.Filmed(selected_row(window.state).key, film()))
-    widgets = [w for kind in CONTROLS for w in window.findChildren(kind)]
-    controls = [w for w in widgets if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
-    ours = [w for w in controls if w.parent().metaObject().className() != "QTabBar"]
-    assert [w for w in ours if not w.accessibleName().strip()] == []
+    assert [w for w in controls(window) if not w.accessibleName().strip()] == []
     window.activateWindow()
     window.trials.list.setFocus()
     reached = set()
     for _ in range(80):
-        focused = window.focusWidget()
-        reached.add(focused)
+        reached.add(window.focusWidget())
         window.focusNextChild()
     QTest.keyClick(window, Qt.Key.Key_F1)
     assert window.keys.isVisible()
     QTest.keyClick(window, Qt.Key.Key_Escape)
     assert not window.keys.isVisible()
-    reachable = [w for w in ours if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus]
-    assert [w.accessibleName() for w in reachable if w not in reached] == []
+    assert unreached_controls(window, reached) == []
 
 
 def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(application, window):
@@ -377,11 +370,8 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         window.resize(*size)
         application.processEvents()
         assert (window.width(), window.height()) == size
-        parts = [w for w in (window.way, *window._panels, window.report, window.stop, window.export) if w.isVisible()]
-        boxes = [w.rect().translated(w.mapTo(window, w.rect().topLeft())) for w in parts]
-        for i, box in enumerate(boxes):
-            assert window.rect().contains(box)
-            assert not any(box.intersects(other) for other in boxes[i + 1 :])
+        parts = (window.way, *window._panels, window.report, window.stop, window.export)
+        assert laid_over(window, parts) == []
 
 
 def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
