@@ -16,9 +16,9 @@ from drivers.transducer import TransducerInfo
 
 NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
-COUNTED = (
+COUNTED = tr_noop((
     "lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "noted", "off_units",
-)  # fmt: skip
+))  # fmt: skip
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
@@ -174,7 +174,7 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
 def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
     """Return what was counted of the stream, in words."""
     counts = asdict(bench.health)
-    troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
+    troubles = [f"{counts[name]} {tr(name)}" for name in COUNTED if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
     if troubles := [*troubles, *bench.health.flagged, *rate]:
         return "look", ", ".join(troubles)
@@ -190,7 +190,7 @@ def _is_silent(bench: BenchState) -> bool:
 def _rate(bench: BenchState) -> str:
     if bench.info is None:
         return "–"
-    rate = quantity(bench.info.rate, 0) if isfinite(bench.info.rate) else "unknown"
+    rate = quantity(bench.info.rate, 0) if isfinite(bench.info.rate) else tr("unknown")
     return tr("{measured} Hz (set {asked})", measured=quantity(bench.rate, 0), asked=rate)
 
 

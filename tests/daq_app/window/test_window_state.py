@@ -236,6 +236,13 @@ def test_the_health_lamp_names_what_was_lost():
     assert dict(bench.counters)["lost"] == "3"
 
 
+def test_what_was_lost_and_a_rate_that_is_not_known_are_said_in_the_experimenters_language(monkeypatch):
+    monkeypatch.setattr("daq_app.window.view.tr", lambda text, **values: f"<{text.format(**values)}>")
+    report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 7, (0.0,) * 7, 0)
+    bench = derive_view(after(m.Device(replace(INFO, rate=float("nan")), None), report)).bench
+    assert (bench.lamp_words, bench.rate) == ("3 <lost>", "<6998 Hz (set <unknown>)>")
+
+
 def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_still_come_back():
     def shown(silence, *session):
         report = structs.replace(health_report((0.1,) * 7), silence=silence)
