@@ -198,14 +198,12 @@ class LivePanel(Panel):
         """Say whether there is room for the stroke and an open drawer beside each other."""
         self.drawer.open.set_room(room)
         self._show_tab()
-        self._show_acts()
 
     def toggle_drawer(self) -> None:
         """Open or close the drawer, where readings are shown."""
         if self._forces_shown:
             self.drawer.open.toggle()
             self._show_tab()
-            self._show_acts()
 
     def _show_tab(self) -> None:
         opened = bool(self.drawer.open)
@@ -213,6 +211,7 @@ class LivePanel(Panel):
         word = tr("close") if opened else tr("open")
         self.tab.setAccessibleName(tr("{word} the drawer: six axes, sample and finger", word=word))
         self.tab.setToolTip(self.tab.accessibleName())
+        self._show_acts()
 
     def show_forces(self, shown: bool) -> None:
         """Show readings, or nothing of them where the protocol keeps them from the experimenter."""

@@ -229,7 +229,7 @@ class MainWindow(QMainWindow):
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
         session = check_form(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
         if isinstance(session, Refusal):
-            self.notice.warn(" ".join(session.sentences.values()))
+            self.notice.warn(" ".join(session.values()))
             return
         if session.people.kind == "simulated people":
             self.subject.hide()

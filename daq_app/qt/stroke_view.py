@@ -153,7 +153,7 @@ class StrokeView(QWidget):
         self.show_edges()
         if other:
             self._raw = None
-        self._draw(None)
+        self.show_moment(None)
         if other:
             self.show_all()
 
@@ -176,14 +176,10 @@ class StrokeView(QWidget):
     def show_readings(self, readings: RawReadings | None) -> None:
         """Show the readings as they were recorded, thin, behind the stroke."""
         self._raw = readings
-        self._draw(None)
+        self.show_moment(None)
 
     def show_moment(self, at: int | None) -> None:
         """Show the readings up to one of them, as if they came now; None shows the stroke as a whole."""
-        if self._raw is not None or at is None:
-            self._draw(at)
-
-    def _draw(self, at: int | None) -> None:
         raw = self._raw
         now = None if at is None or raw is None else float(raw.block.time[at]) - self._origin
         until = len(self._time) if now is None else int(np.searchsorted(self._time, now, side="right"))

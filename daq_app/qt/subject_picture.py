@@ -132,7 +132,7 @@ def open_preview(form: SessionForm, size: QSize, parent: QWidget) -> str:
     """Show the pages of a form's protocol as they look in a window of a size; return why not, empty where they are."""
     pages = preview(form, translator(form.language or ENGLISH))
     if isinstance(pages, Refusal):
-        return " ".join(pages.sentences.values())
+        return " ".join(pages.values())
     shown = SubjectPreview(pages, size, parent)
     shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     shown.show()

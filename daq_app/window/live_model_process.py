@@ -73,7 +73,6 @@ class LiveModel:
         self.settled: SettledSolve | None = None  # of the last stroke; None again once another begins
         self.problem = ""  # why nothing is said; empty where all is well
         self.predictions = 0  # that came so far
-        self._news: list[Provisional] = []
         self._child: Child | None = None
         self._under_way = 0
         self._waiting: list[Forces] = []
@@ -128,17 +127,18 @@ class LiveModel:
         """Take what came, and send what waits; return the predictions that are new."""
         if self._child is None:
             return ()
-        self._news = []
+        news: list[Provisional] = []
         try:
             while (message := self._child.receive()) is not None:
                 self._under_way -= not isinstance(message, SettledSolve)  # it comes when it comes
                 self._heard(message)
+                news += [message] if isinstance(message, Provisional) else []
             if not self._under_way:
                 self._send(self._child)
         except (EOFError, OSError):
             self.close()
             self.problem = tr("the live model has stopped; it starts again with the next session")
-        return tuple(self._news)
+        return tuple(news)
 
     def _heard(self, message: Ready | Provisional | SettledSolve) -> None:
         match message:
@@ -146,7 +146,6 @@ class LiveModel:
                 self.problem = problem
             case Provisional():
                 self.said = message
-                self._news.append(message)
                 self.predictions += 1
                 if message.sed[-1] > 0.0:
                     self.settled = None

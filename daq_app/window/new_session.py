@@ -2,7 +2,6 @@
 
 import os
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -50,11 +49,8 @@ class SessionForm:
     pilot: bool = False  # kept apart from what people do, in no study
 
 
-@dataclass(frozen=True, slots=True)
-class Refusal:
+class Refusal(dict[str, str]):
     """Why no session can begin: a sentence for each field that is wrong, by its name."""
-
-    sentences: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +107,7 @@ def check_form(
     study, protocol, seed and the subject's own finger are those that were decided at its enrolment.
     """
     if wrong := _refusals(form, bench):
-        return Refusal(wrong)
+        return wrong
     phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
     phases: list[Phase] = [phase for phase, wanted in phases_wanted.items() if wanted]
     frame, area = (bench.frame, _number(form.area)) if form.forces else (None, None)
@@ -143,8 +139,8 @@ def check_form(
     return StartSession(planned, str(folder), people, (*own, *settings))
 
 
-def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
-    """Return everything that keeps a session from beginning: a sentence for each field that is wrong, by its name."""
+def refusals(form: SessionForm, bench: Bench) -> Refusal:
+    """Return everything that keeps a session from beginning."""
     wrong = _refusals(form, bench)
     if form.tablet and not form.simulated:
         wrong["tablet"] = form.tablet
@@ -160,12 +156,12 @@ def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
         return wrong
     session = check_form(form, bench, datetime.now(), 0)
     if isinstance(session, Refusal):
-        return session.sentences
+        return session
     try:
         check_room(Path(session.folder).parent, need(session.plan, bench.rate if form.forces else None))
     except (RecordingError, OSError) as error:
-        return {"folder": _sentence(error)}
-    return {}
+        return Refusal({"folder": _sentence(error)})
+    return wrong
 
 
 def optional_phases(form: SessionForm) -> tuple[Phase, ...]:
@@ -299,8 +295,8 @@ def _local_time(recorded: object) -> str:
         return "–"
 
 
-def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
-    wrong: dict[str, str] = {}
+def _refusals(form: SessionForm, bench: Bench) -> Refusal:
+    wrong = Refusal()
     if not is_code(form.subject.strip()):
         wrong["subject"] = tr("Give a code of letters, digits, - and _ (at most 32), never a name.")
     if re.search(r"[/\\]|^\.", form.study.strip()):

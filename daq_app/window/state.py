@@ -107,7 +107,7 @@ class BenchState:
 
 def bench_after(bench: BenchState, message: Message) -> BenchState:
     """Return the bench after a message; the same object where it does not concern the bench."""
-    return _fold_load(_fold_tare(_fold_link(bench, message), message), message)
+    return _fold_readings(_fold_link(bench, message), message)
 
 
 def _fold_link(bench: BenchState, message: Message) -> BenchState:
@@ -135,7 +135,7 @@ def _fold_link(bench: BenchState, message: Message) -> BenchState:
             return bench
 
 
-def _fold_tare(bench: BenchState, message: Message) -> BenchState:
+def _fold_readings(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.Tare():
             return replace(bench, taring=True)
@@ -145,12 +145,6 @@ def _fold_tare(bench: BenchState, message: Message) -> BenchState:
             return _set_zero(replace(bench, taring=False), mean, spread, readings, duration)
         case LoggedEvent(kind="zeroed", data=data):
             return _set_zero(bench, data["mean"], data["spread"], data["readings"], data["duration"])
-        case _:
-            return bench
-
-
-def _fold_load(bench: BenchState, message: Message) -> BenchState:
-    match message:
         case m.HealthReport(health, rate, load, peak, saturated, silence):
             loads = {"load": Load(load), "peak": Load(peak)}
             return replace(bench, health=health, rate=rate, saturated=saturated, silence=silence, **loads)
@@ -200,10 +194,10 @@ def fold(state: AppState, message: Message) -> AppState:
     session = state.session and session_after(state.session, message, state.now)
     if bench is not state.bench or session is not state.session:
         state = replace(state, bench=bench, session=session)
-    return _of_the_window(_of_the_session(state, message), message)
+    return _fold_window(state, message)
 
 
-def _of_the_session(state: AppState, message: Message) -> AppState:
+def _fold_window(state: AppState, message: Message) -> AppState:
     match message:
         case m.SessionBegun():
             return replace(state, session=begin_session(message, state.now), failed=None)
@@ -215,12 +209,6 @@ def _of_the_session(state: AppState, message: Message) -> AppState:
             return replace(state, failed=message)
         case m.Gone(requested, sentence):
             return replace(state, gone=None if requested else sentence)
-        case _:
-            return state
-
-
-def _of_the_window(state: AppState, message: Message) -> AppState:
-    match message:
         case Tick(now):
             return replace(state, now=now)
         case Dismissed():

@@ -211,10 +211,11 @@ def test_where_no_file_is_chosen_after_all_protocol_and_language_stay_as_they_we
     language.setCurrentIndex(language.findData("en"))
 
 
-def test_a_pilot_of_a_protocol_that_cannot_be_read_says_why(driver, tmp_path):
+@pytest.mark.parametrize("button", ["_pilot", "_preview"])
+def test_a_pilot_and_a_preview_of_a_protocol_that_cannot_be_read_say_why(driver, tmp_path, button):
     window, page = driver.window, driver.window.page
     (tmp_path / "wrong.toml").write_text("name = ")
     page.add_protocol(str(tmp_path / "wrong.toml"))
-    QTest.mouseClick(page._pilot, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(getattr(page, button), Qt.MouseButton.LeftButton)
     assert driver.session is None
     assert "wrong.toml" in window.notice._words.text()

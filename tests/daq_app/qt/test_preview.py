@@ -90,13 +90,6 @@ def test_it_opens_from_prepare_and_records_nothing(driver):
         QTest.mouseClick(close, Qt.MouseButton.LeftButton)
 
 
-def test_a_protocol_that_cannot_be_read_says_why_in_the_window(driver, tmp_path):
-    (tmp_path / "wrong.toml").write_text("name = ")
-    driver.window.page.add_protocol(str(tmp_path / "wrong.toml"))
-    QTest.mouseClick(driver.window.page._preview, Qt.MouseButton.LeftButton)
-    assert "wrong.toml" in driver.window.notice._words.text()
-
-
 def test_the_subjects_page_speaks_the_chosen_language_before_a_session(driver):
     window, page = driver.window, driver.window.page
     page.protocol.setCurrentText("sensotact-friction")

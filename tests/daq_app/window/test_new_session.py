@@ -80,15 +80,15 @@ def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind)
 def test_what_is_wrong_is_said_beside_its_field(form, bench, field, words):
     request = check_form(form, bench, NOW, 0)
     assert isinstance(request, Refusal)
-    assert list(request.sentences) == [field]
-    assert words in request.sentences[field]
-    assert request.sentences[field].endswith(".")
+    assert list(request) == [field]
+    assert words in request[field]
+    assert request[field].endswith(".")
 
 
 def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     request = check_form(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
-    assert "is a file" in request.sentences["folder"]
+    assert "is a file" in request["folder"]
 
 
 def test_a_folder_below_the_home_of_nobody_or_that_no_file_system_can_hold_is_refused_beside_its_field(tmp_path):
@@ -143,7 +143,7 @@ def test_a_session_of_a_study_is_the_one_decided_at_enrolment_whatever_the_page_
 def test_who_is_not_enrolled_is_enrolled_at_a_button_and_who_was_withdrawn_is_refused(study):
     form = in_study(study, "P08")
     assert enrolment(form).may_enrol
-    assert "not enrolled" in check_form(form, SIMULATED, NOW, 0).sentences["subject"]
+    assert "not enrolled" in check_form(form, SIMULATED, NOW, 0)["subject"]
     assert enrol_subject(form) == ""
     assert "P08 is enrolled" in enrolment(form).words
     assert "blinded" in enrolment(form).words
@@ -151,7 +151,7 @@ def test_who_is_not_enrolled_is_enrolled_at_a_button_and_who_was_withdrawn_is_re
     withdraw(study, "P08", "moved away")
     assert not enrolment(form).may_enrol
     assert "moved away" in enrolment(form).words
-    assert "moved away" in check_form(form, SIMULATED, NOW, 0).sentences["subject"]
+    assert "moved away" in check_form(form, SIMULATED, NOW, 0)["subject"]
 
 
 def test_a_folder_that_is_no_study_leaves_protocol_and_seed_to_the_page(tmp_path):
@@ -173,9 +173,7 @@ def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and
     lines = protocol_file("sensotact-friction").read_text(encoding="utf-8").splitlines()
     bare.write_text("\n".join(line for line in lines if not line.startswith("practice")), encoding="utf-8")
     assert optional_phases(replace(FORM, protocol=str(bare))) == ("pre-evaluation",)
-    assert (
-        "practice" in check_form(replace(FORM, protocol=str(bare), practice=True), REAL, NOW, 0).sentences["protocol"]
-    )
+    assert "practice" in check_form(replace(FORM, protocol=str(bare), practice=True), REAL, NOW, 0)["protocol"]
     assert optional_phases(replace(FORM, protocol="nowhere")) == ()
 
 

@@ -73,7 +73,7 @@ def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
     (tmp_path / "wrong.toml").write_text("name = ")
     refusal = preview(replace(SessionForm(), protocol=str(tmp_path / "wrong.toml")))
     assert isinstance(refusal, Refusal)
-    assert "wrong.toml" in refusal.sentences["protocol"]
+    assert "wrong.toml" in refusal["protocol"]
 
 
 def test_the_mirror_keeps_what_the_protocol_keeps_from_the_experimenter():
