@@ -120,7 +120,7 @@ class CoursePanel(Panel):
             if item is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None beyond the last
                 item = QListWidgetItem()
                 self.plan.addItem(item)
-            text = f"{row.name}   {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"
+            text = f"{row.name} {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"
             item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.outcome}")
             typeface = self.plan.font()
