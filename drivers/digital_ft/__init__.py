@@ -128,12 +128,10 @@ class _DigitalConversation:
     number: int  # of the calibration, 1 to 16
     stored: wire.StoredCalibration  # as it was read
     word: int = 0  # the status word, which can only be read while nothing streams
+    numbering = ClockRecovery
 
     def decoder(self) -> RecordDecoder:
         return wire.StreamDecoder(self.word)
-
-    def numbering(self, rate: float, factor: float) -> ClockRecovery:
-        return ClockRecovery(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Put the calibration's gains and offsets in force, prove it, and let the transducer stream.

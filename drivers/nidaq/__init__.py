@@ -17,7 +17,7 @@ from drivers.calibration_file import read_calibration_file
 from drivers.clock import Clock
 from drivers.clock_recovery import ScanCount
 from drivers.deadline import Deadline, Link
-from drivers.readings import RecordDecoder, Records
+from drivers.readings import Records
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import LinkLost, SetupError, StatusTable, TransducerInfo, bit
 
@@ -178,11 +178,8 @@ class _VoltsDecoder:
 class _TaskConversation:
     """Begins and ends acquisitions."""
 
-    def decoder(self) -> RecordDecoder:
-        return _VoltsDecoder()
-
-    def numbering(self, rate: float, factor: float) -> ScanCount:
-        return ScanCount(rate, factor)
+    decoder = _VoltsDecoder
+    numbering = ScanCount
 
     def begin(self, link: Link) -> bytes:
         link.send(b"start")

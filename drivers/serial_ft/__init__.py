@@ -160,12 +160,10 @@ class _ControllerConversation:
     """Prompts, settings and streams of one controller."""
 
     binary: bool
+    numbering = ClockRecovery
 
     def decoder(self) -> RecordDecoder:
         return wire.BinaryDecoder() if self.binary else wire.AsciiDecoder()
-
-    def numbering(self, rate: float, factor: float) -> ClockRecovery:
-        return ClockRecovery(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""

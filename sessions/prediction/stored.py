@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
-from sessions.file_access import as_type, complete
+from sessions.file_access import complete
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.strokes.decisions import Decision
@@ -255,19 +255,16 @@ class _Solver(msgspec.Struct):
     dofs: int
 
 
-class _SolvedTrial(msgspec.Struct):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _StoredTrial(TrialNumbers):
     solver: _Solver | None
-
-
-class _SolvedTrials(msgspec.Struct):
-    trials: tuple[_SolvedTrial, ...]
 
 
 class _Document(msgspec.Struct):
     """The parts of `prediction.json` that the program itself reads."""
 
     made_by: dict[str, str]
-    trials: tuple[TrialPrediction, ...]
+    trials: tuple[_StoredTrial, ...]
     width: float
     width_origin: str
     options: dict[str, Any]
@@ -294,7 +291,6 @@ def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
 def check_prediction(document: Mapping[str, Any]) -> None:
     """Raise ValueError where a document is no prediction that this program writes: where, and what is expected."""
     parts = complete(document, _Document)
-    as_type(document, _SolvedTrials)
     from_table(parts.options, PredictionOptions, "options")
     from_table(parts.scene, Scene, "scene")
 

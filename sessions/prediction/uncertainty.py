@@ -263,11 +263,10 @@ _Answers = list[tuple[float | None, Prediction | str]]
 def _answers_of_prediction(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
     """Return the answers that the prediction holds already: at the planned depth, slid either way."""
     options = prediction.options
-    if (variant.kinematics, variant.tau_reading) != (options.kinematics, options.tau_reading):
-        return None
-    if variant.driven == "depth":
+    same = (variant.kinematics, variant.tau_reading) == (options.kinematics, options.tau_reading)
+    if same and variant.driven == "depth":
         return [(row.tau_max, row.prediction or row.reasons.get("sed", "")) for row in prediction.trials]
-    if variant.driven == "other way":
+    if same and variant.driven == "other way":
         return [(row.tau_max, row.opposite or row.reasons.get("opposite_sed", "")) for row in prediction.trials]
     return None
 
