@@ -54,7 +54,7 @@ class Faults:
         self._timetable = tuple(timetable)
         self._seed = seed
         self._repeat = repeat
-        self._clock = _device_clock([fault for fault in self._timetable if fault.kind == "slow"], repeat)
+        self._clock = _device_clock(self._timetable, repeat)
         self._swapped: bytes | None = None
         self._delayed: list[tuple[float, bytes]] = []  # when each leaves
 
@@ -62,7 +62,7 @@ class Faults:
         """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""
         kept = tuple(fault for fault in self._timetable if fault.kind == "slow")
         self._timetable = (*kept, *timetable)
-        self._clock = _device_clock([fault for fault in self._timetable if fault.kind == "slow"], self._repeat)
+        self._clock = _device_clock(self._timetable, self._repeat)
 
     def active(self, kind: Kind, time: float) -> bool:
         """Tell whether a fault of the box itself is on at `time` [s]."""
@@ -172,8 +172,9 @@ class Faults:
         return next((f for f in self._timetable if f.kind == kind and f.start <= local < f.stop), None)
 
 
-def _device_clock(slow: Sequence[Fault], repeat: float) -> tuple[Array, Array] | None:
+def _device_clock(timetable: Sequence[Fault], repeat: float) -> tuple[Array, Array] | None:
     """Return knots of time and of the device's own clock [s] over a round of the timetable; None where they agree."""
+    slow = [fault for fault in timetable if fault.kind == "slow"]
     if not slow:
         return None
     last = repeat or FOREVER

@@ -70,12 +70,9 @@ class NetFtBox(ServedBox):
 
     def start(self) -> None:
         """Open the ports and begin to serve. Raises SetupError when a port is in use."""
-        try:
-            for kind, name, port in self._wanted:
-                self._bound.append(_open_port(kind, name, port))
-        except SetupError:
-            self._release()
-            raise
+        with contextlib.ExitStack() as opened:  # which closes those that are open where one cannot be had
+            self._bound = [opened.enter_context(_open_port(*wanted)) for wanted in self._wanted]
+            opened.pop_all()
         for bound, serve in zip(self._bound, (self._on_datagram, self._on_caller, self._on_caller), strict=True):
             self._selector.register(bound, selectors.EVENT_READ, serve)
         rdt, tcp, http = (bound.getsockname()[1] for bound in self._bound)
@@ -85,16 +82,9 @@ class NetFtBox(ServedBox):
     def close(self) -> None:
         """Switch the box off and give back its ports. Harmless when repeated."""
         super().close()
-        self._release()
-
-    def _release(self) -> None:
-        if not self._bound:
-            return
-        opened = [key.fileobj for key in self._selector.get_map().values()]
-        for port in {*opened, *self._bound}:
-            assert isinstance(port, socket.socket)
-            port.close()
-        self._bound.clear()
+        for key in list((self._selector.get_map() or {}).values()):
+            assert isinstance(key.fileobj, socket.socket)
+            key.fileobj.close()
         self._selector.close()
 
     def _serve(self) -> None:

@@ -36,20 +36,16 @@ class _Disk(io.RawIOBase):
     """Takes what HDF5 writes, and keeps the first failure: told of it, the library leaves a file it cannot close."""
 
     def __init__(self, path: Path) -> None:
-        """Make the file."""
         self.failure: OSError | None = None
         self._file = path.open("x+b", buffering=0)
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
-        """Go to a place in the file."""
         return self._file.seek(offset, whence)
 
     def readinto(self, buffer: Any, /) -> int | None:  # noqa: ANN401  whatever has a buffer
-        """Read from there."""
         return self._file.readinto(buffer)
 
     def write(self, data: Any, /) -> int:  # noqa: ANN401
-        """Write there, and say that all was written."""
         rest = memoryview(data).cast("B")
         count = len(rest)
         try:
@@ -57,10 +53,9 @@ class _Disk(io.RawIOBase):
                 rest = rest[self._file.write(rest) :]
         except OSError as error:
             self.failure = error
-        return count
+        return count  # as if all was written
 
     def truncate(self, size: int | None = None, /) -> int:
-        """Give the file this size."""
         try:
             return self._file.truncate(size)
         except OSError as error:
@@ -68,7 +63,6 @@ class _Disk(io.RawIOBase):
             return size or 0
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
         super().close()
 

@@ -83,7 +83,6 @@ class _Rewriter(FleetingWriter):
     """
 
     def follow(self, recording: Recording) -> None:
-        """Begin to follow `recording`."""
         self._later = [event for event in recording.events if event.kind in TELL_LOSSES]
         self._log: Sequence[LoggedEvent] = ()
         self._cut = False
