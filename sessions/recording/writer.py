@@ -50,7 +50,7 @@ class SessionWriter:
         self._blocks: list[ReadingBlock] = []  # handed over, not yet safe
         self._events: list[LoggedEvent] = []
         self._block_rows = 0
-        self._readings = 0
+        self.reading_count = 0  # handed over, from the beginning of the recording
         self._event_count = 0
         self.acknowledged = Acknowledged(time_ns=clock.now_ns())  # how much is safe
         self._failure: str | None = None
@@ -134,7 +134,7 @@ class SessionWriter:
         try:
             _make_durable(connection)
             writer = cls(connection, path, clock)
-            (writer._block_rows, writer._readings) = connection.execute(
+            (writer._block_rows, writer.reading_count) = connection.execute(
                 "SELECT coalesce(max(rowid), 0), coalesce(sum(readings), 0) FROM blocks"
             ).fetchone()
             (writer._event_count,) = connection.execute("SELECT coalesce(max(rowid), 0) FROM events").fetchone()
@@ -142,7 +142,7 @@ class SessionWriter:
             connection.close()
             release_reserve(folder)
             raise RecordingError(f"{path} cannot be gone on with ({error}); {remedy(error)}") from error
-        writer.acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
+        writer.acknowledged = Acknowledged(writer.reading_count, writer._event_count, clock.now_ns())
         writer._has_reserve = bool(reserve)
         return writer
 
@@ -154,7 +154,7 @@ class SessionWriter:
     @property
     def waiting(self) -> int:
         """Return how many readings were handed over and are not safe yet."""
-        return self._readings - self.acknowledged.readings
+        return self.reading_count - self.acknowledged.readings
 
     def limit(self, size: int) -> None:
         """Let the file grow to so many bytes, as on a disk that has no more room."""
@@ -166,7 +166,7 @@ class SessionWriter:
         self._check()
         if len(block):
             self._blocks.append(block)
-            self._readings += len(block)
+            self.reading_count += len(block)
         if self.clock.now_ns() - self.acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
             self.commit()
 
@@ -186,7 +186,7 @@ class SessionWriter:
         """
         self._check()
         instant_ns = self.instant_ns(kind, trial) if time_ns is None else time_ns
-        event = LoggedEvent(self._event_count + 1, instant_ns, kind, trial, self._readings, dict(data or {}))
+        event = LoggedEvent(self._event_count + 1, instant_ns, kind, trial, self.reading_count, dict(data or {}))
         schema.event_row(event)  # what JSON or UTF-8 cannot hold is refused here, before it spoils a commit
         self._events.append(event)
         self._event_count += 1
@@ -215,7 +215,7 @@ class SessionWriter:
         self._block_rows = rows
         self._blocks.clear()
         safe, self._events = self._events, []
-        self.acknowledged = Acknowledged(self._readings, self._event_count, now_ns)
+        self.acknowledged = Acknowledged(self.reading_count, self._event_count, now_ns)
         if safe:
             self.safe(safe)
         return self.acknowledged

@@ -104,9 +104,7 @@ def run_session(
     if plan.forces != (transducer is not None):
         raise ValueError("a visit with forces needs a transducer, and one without has none")
     with interruptions() as interrupted:
-        run = _Run(plan, writer, operator, transducer, writer.clock, settings or RunnerSettings(), progress)
-        if resumed is not None:
-            run.go_on(resumed)
+        run = _Run(plan, writer, operator, transducer, writer.clock, settings or RunnerSettings(), progress, resumed)
         return run.to_the_end(interrupted, stop)
 
 
@@ -121,21 +119,16 @@ class _Run:
     clock: Clock
     settings: RunnerSettings
     progress: Callable[[Status], None]
+    resumed: Continuation | None
 
     def __post_init__(self) -> None:
-        self._state, self._first_commands = start(self.plan)
+        at = None if self.resumed is None else self.resumed.at
+        self._state, self._first_commands = start(self.plan) if at is None else (at.state, at.commands)
         self._watch: TakeWatch | None = None
-        self._readings = self.writer.acknowledged.readings
-        self._resumed: Continuation | None = None
         self._seam: Seam | None = None
         self._reported = Health()
         self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), self.clock.now_ns())
         self._rested_ns: int | None = None  # when the rest is over [session clock]
-
-    def go_on(self, resumed: Continuation) -> None:
-        """Begin where a session that was cut short left off."""
-        self._resumed = resumed
-        self._state, self._first_commands = resumed.at.state, resumed.at.commands
 
     def to_the_end(self, interrupted: Interruptions, stop: Callable[[], Ending | None]) -> SessionEnd:
         """Run, and write the end whatever it was."""
@@ -162,12 +155,12 @@ class _Run:
     def _write_beginning(self) -> None:
         """Write down how the session is run; of one that goes on also the gap, and the take that was open."""
         settings = {"settings": _with_origin(self.settings)}
-        if self._resumed is None:
+        if self.resumed is None:
             self.writer.event("started", data=settings)
             return
-        for line in self._resumed.at.owed:
+        for line in self.resumed.at.owed:
             self.writer.event(*line, commit=False)
-        self.writer.event("resumed", data={**self._resumed.data, "run": settings["settings"]})
+        self.writer.event("resumed", data={**self.resumed.data, "run": settings["settings"]})
 
     def _go_round(self, stop: Callable[[], Ending | None]) -> Ending:
         """Look at transducer and operator again and again, until there is a reason to end."""
@@ -195,7 +188,7 @@ class _Run:
             self.writer.readings(ReadingBlock.empty())  # the disk is asked every second all the same
             return
         block = self._going_on(self.transducer.read(self.settings.tick))
-        self._keep(block)
+        self.writer.readings(block)
         if self._watch is not None:
             for event in self._watch.feed(block):
                 self._take(event)
@@ -207,16 +200,12 @@ class _Run:
 
     def _going_on(self, block: ReadingBlock) -> ReadingBlock:
         """Return readings so that their numbers and times follow those before a resumption."""
-        if self._resumed is None or not len(block):
+        if self.resumed is None or not len(block):
             return block
         if self._seam is None:
-            self._seam = self._resumed.joins(self._resumed.last, block)
+            self._seam = self.resumed.joins(self.resumed.last, block)
             self.writer.event("readings_joined", data=asdict(self._seam), commit=False)
         return self._seam.join(block)
-
-    def _keep(self, block: ReadingBlock) -> None:
-        self.writer.readings(block)
-        self._readings += len(block)
 
     def _take(self, event: Event) -> None:
         """Let the machine decide about an event, write both down, then show what it asks for."""
@@ -289,7 +278,7 @@ class _Run:
                 type(self._state).__name__.lower(),
                 trial_in_hand(self._state),
                 len(self.plan.trials),
-                self._readings,
+                self.writer.reading_count,
                 health.lost,
                 health.lag_ms,
                 self.writer.acknowledged,
@@ -307,7 +296,7 @@ class _Run:
                         self.writer.event(*line, commit=False)
             complete = isinstance(self._state, Ended) and self._state.complete
             self._report_losses(now=True)
-            end = SessionEnd(reason, cause, complete, self._readings, health)
+            end = SessionEnd(reason, cause, complete, self.writer.reading_count, health)
             self.writer.event("ended", data=asdict(end))
         return end
 
@@ -317,7 +306,7 @@ class _Run:
         self.transducer.stop()
         with suppress(LinkLost, DeviceFault):  # all that had arrived was handed over before it says so
             while len(block := self._going_on(self.transducer.read(0.0))):
-                self._keep(block)
+                self.writer.readings(block)
         return self.transducer.health
 
 

@@ -124,7 +124,7 @@ def test_nothing_is_shown_before_it_is_safe(tmp_path):
 
     def show_checked(command):
         if not isinstance(command, MeasureZero):
-            assert session.writer.acknowledged.readings == session.writer._readings
+            assert session.writer.acknowledged.readings == session.writer.reading_count
             assert session.writer.acknowledged.events == session.writer._event_count
         show(command)
 
