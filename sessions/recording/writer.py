@@ -21,7 +21,7 @@ from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
 from sessions.recording.recovery import fold_log, identities, rescue
 from sessions.recording.schema import RecordingError
-from sessions.recording.storage import release_reserve, take_reserve
+from sessions.recording.storage import RESERVE_FILE, release_reserve, take_reserve
 
 COMMIT_EVERY_NS = 1_000_000_000
 LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold
@@ -54,7 +54,6 @@ class SessionWriter:
         self._event_count = 0
         self.acknowledged = Acknowledged(time_ns=clock.now_ns())  # how much is safe
         self._failure: str | None = None
-        self._has_reserve = False
         self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # called with events once they are safe
         self.must_end: str | None = None  # why only the end should still be written
 
@@ -113,9 +112,7 @@ class SessionWriter:
                 f"{path} cannot be begun ({error}); {remedy(error)}, or give a folder on a local disk"
             ) from error
         sync_folder(folder)
-        writer = cls(connection, path, clock or RealClock())
-        writer._has_reserve = bool(reserve)
-        return writer
+        return cls(connection, path, clock or RealClock())
 
     @classmethod
     def open(cls, folder: Path, clock: Clock, *, reserve: int = 0) -> Self:
@@ -143,7 +140,6 @@ class SessionWriter:
             release_reserve(folder)
             raise RecordingError(f"{path} cannot be gone on with ({error}); {remedy(error)}") from error
         writer.acknowledged = Acknowledged(writer.reading_count, writer._event_count, clock.now_ns())
-        writer._has_reserve = bool(reserve)
         return writer
 
     @property
@@ -253,7 +249,7 @@ class SessionWriter:
         """Try a commit that failed once more: elsewhere, or in the room that was kept back."""
         if self._lost_sight():
             self._rescue()
-        elif not self._has_reserve or self.must_end is not None:
+        elif self.must_end is not None or not (self.folder / RESERVE_FILE).exists():
             self._fail(error)
         else:
             self.must_end = (
@@ -274,7 +270,6 @@ class SessionWriter:
         lost, self._failure = self._path, "it was removed, renamed or replaced"
         self._path = rescue(self._connection, lost)
         self._connection.close()
-        self._has_reserve = False
         self._connection = sqlite3.connect(self._path, isolation_level=None)
         try:
             _make_durable(self._connection)
