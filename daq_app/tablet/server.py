@@ -30,6 +30,7 @@ TRIES = 5  # of wrong codes, before there is a new one
 WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
 ALIVE = 5.0  # a tablet that says nothing for so long is gone [s]
 PATIENCE = 10.0  # for the first message [s]
+OFF = logging.CRITICAL + 1
 PAGE = Path(__file__).with_name("page.html")
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
 MISSING = "the subject's page on a tablet needs the packages websockets and segno: pip install 'daq-app[tablet]'"
@@ -77,7 +78,7 @@ class TabletServer:
             ping_interval=ALIVE / 2,
             ping_timeout=ALIVE / 2,
             compression=None,
-            logger=_silent(),
+            logger=logging.Logger("tablet", OFF),  # a traceback is nothing for the terminal that opened the window
         )
         threading.Thread(target=self._server.serve_forever, name="the tablet's server", daemon=True).start()
 
@@ -214,14 +215,6 @@ def _listening(address: str, port: int) -> socket.socket:
         except OSError as error:
             refused = error
     raise NoTabletServer(f"{address} is no address of this machine ({refused.strerror}); give --subject-address")
-
-
-def _silent() -> logging.Logger:
-    """Return a log that nobody reads: a traceback is nothing for the terminal that opened the window."""
-    log = logging.getLogger(__name__)
-    log.propagate = False
-    log.addHandler(logging.NullHandler())
-    return log
 
 
 def _new_code() -> str:

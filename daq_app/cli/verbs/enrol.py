@@ -12,19 +12,9 @@ from typing import Any
 from daq_app.cli.options import add_body_arguments, add_seed, body_of
 from daq_app.console import DONE, Console, WrongValue, table
 from sessions.file_access import write_whole
+from sessions.plan import study as studies
 from sessions.plan.protocols import protocol_file
-from sessions.plan.study import (
-    Member,
-    Study,
-    StudyError,
-    create_study,
-    enrol,
-    is_study,
-    note,
-    open_study,
-    study_key,
-    withdraw,
-)
+from sessions.plan.study import Member, Study, StudyError
 from sessions.recording.derived import check_replaceable
 from sessions.toml_file import text_of
 
@@ -55,22 +45,22 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.protocol is not None:
         file = protocol_file(options.protocol)
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed
-        create_study(folder, text_of(file), seed, blinded=options.blind, where=str(file))
+        studies.create_study(folder, text_of(file), seed, blinded=options.blind, where=str(file))
     member = None
     if options.withdraw is not None:
-        member = withdraw(folder, options.subject, options.withdraw)
+        member = studies.withdraw(folder, options.subject, options.withdraw)
     elif options.subject is not None:
-        member = enrol(folder, options.subject, body)
+        member = studies.enrol(folder, options.subject, body)
     if options.labels is not None:
         _write_labels(folder, options.labels)
         console.note(f"{options.labels} tells which stimulus bears which code: it is for whoever puts the labels on")
-    _show(open_study(folder), member, console)
+    _show(studies.open_study(folder), member, console)
     return DONE
 
 
 def _refuse_mixtures(options: argparse.Namespace) -> None:
     making = options.protocol is not None
-    if making and is_study(options.study):
+    if making and studies.is_study(options.study):
         raise StudyError(f"{options.study} is a study already, and its protocol is fixed: enrol without --protocol")
     if (options.blind or options.seed is not None) and not making:
         raise WrongValue("--blind and --seed are decided when a study is made: give --protocol")
@@ -82,11 +72,11 @@ def _refuse_mixtures(options: argparse.Namespace) -> None:
 
 def _write_labels(folder: Path, path: Path) -> None:
     """Write the code of each stimulus to a file, and that it was written into the study."""
-    key, study = study_key(folder), open_study(folder)
+    key, study = studies.study_key(folder), studies.open_study(folder)
     labels = study.protocol.labels if key is None else key.labels
     lines = [f"{descriptor} {index}: {code}" for (descriptor, index), code in labels.items()]
     if key is not None:
-        note(folder, "labels_told", {})
+        studies.note(folder, "labels_told", {})
     write_whole(path, "\n".join([LABELS, *lines, ""]).encode())
 
 

@@ -63,7 +63,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
             console.progress(0.9, f"making {PREDICTION} again")
             differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, replayed, decided, recording))
             compared.append(PREDICTION)
-    lasted = _duration(recording)
+    events = recording.events
+    lasted = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
     notes = list(_notes(recording))
     console.result(
         {
@@ -93,9 +94,3 @@ def _notes(recording: Recording) -> Iterator[str]:
     elif not recording.plan.trials:
         yield "an imported recording: it had no course, so only its readings and what is made of them were gone through"
     yield from recording.losses
-
-
-def _duration(recording: Recording) -> float:
-    """Return the time from the first event to the last on the session clock [s]."""
-    events = recording.events
-    return (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0

@@ -11,7 +11,7 @@ from daq_app.batch.derived import analyse_session, open_visit, predict_session, 
 from daq_app.cli.options import add_analysis, add_flag, add_shared, add_visit, area_law, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.plan.plan import Blinded
-from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
+from sessions.prediction import BY_NAME, PredictionOptions
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import reveal, store_page
@@ -66,10 +66,21 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
-    prediction = predict_session(recording, analysis, console, _prediction_options(recording, options), afferent)
+    # What was asked before is asked again, so that nothing kept is lost, and what a page shows.
+    before = stored_options(recording) or PredictionOptions()
+    variants = max(before.variants, options.variants, key=("none", "small", "both").index)
+    wanted = replace(before, intervals=True, variants=variants, course="history")
+    prediction = predict_session(recording, analysis, console, wanted, afferent)
     from sessions.report import findings
 
-    further = replace(_further(recording, prediction, afferent, options, console), unreadable=unreadable)
+    reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
+    facts = afferent_facts(afferent or AfferentSettings(), reference)
+    paths = None
+    if options.paths != "none" and recording.plan.forces:
+        finite, quantity = options.paths == "finite", BY_NAME[options.quantity]
+        progress = console.reporter("many paths of the analysis", until=0.9)
+        paths = trial_paths(recording, prediction, progress, finite=finite, quantity=quantity)
+    further = Further(firing, facts, afferent, options.quantity, paths, unreadable=unreadable)
     report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
@@ -91,27 +102,3 @@ def _check_scores(visit: Recording, recording: Recording) -> None:
     if not table.left_out and judged.isdisjoint((score.descriptor, score.index) for score in table.scores):
         which = "a stimulus of this session" if table.scores else "any stimulus"
         raise WrongValue(f"--scores {visit.folder} is not allowed: it holds no score of {which}; leave it out")
-
-
-def _prediction_options(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
-    """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
-    before = stored_options(recording) or PredictionOptions()
-    variants = max(before.variants, options.variants, key=("none", "small", "both").index)
-    return replace(before, intervals=True, variants=variants, course="history")
-
-
-def _further(
-    recording: Recording,
-    prediction: SessionPrediction,
-    afferent: AfferentSettings | None,
-    options: argparse.Namespace,
-    console: Console,
-) -> Further:
-    """Return the intervals of the SEDs, and what was asked for beside."""
-    reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
-    paths = None
-    if options.paths != "none" and recording.plan.forces:
-        finite = options.paths == "finite"
-        progress = console.reporter("many paths of the analysis", until=0.9)
-        paths = trial_paths(recording, prediction, progress, finite=finite, quantity=BY_NAME[options.quantity])
-    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, options.quantity, paths)

@@ -9,8 +9,8 @@ import random
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
@@ -125,7 +125,7 @@ class _WatchedRecorder:
         self._waiting: list[m.Report] = []
 
     def until(self, kind: type[AReport]) -> AReport:
-        """Note reports until one of a kind comes, and return it."""
+        """Return the next report of a kind."""
         for report in self._reports(DEADLINE):
             if isinstance(report, kind):
                 return report
@@ -138,8 +138,8 @@ class _WatchedRecorder:
         for _ in self._reports(seconds):
             pass
 
-    def kill(self) -> None:
-        """Kill it, and note what was still on its way."""
+    def close(self) -> None:
+        """Kill it, and note what was still on its way; one that lived on would rescue what is removed then."""
         self.recorder.kill()
         if not any(isinstance(report, m.Gone) for report in self._reports(DEADLINE)):
             raise SelfTestFailed("a recorder that was killed did not end")
@@ -151,31 +151,18 @@ class _WatchedRecorder:
             self._waiting += self.recorder.poll(0.01)
             while self._waiting:
                 report = self._waiting.pop(0)
-                self._note(report)
+                match report:
+                    case LoggedEvent():
+                        self.events.append(report)
+                    case Status(safe=safe):
+                        self.safe = max(self.safe, safe.readings)
+                    case m.Live(received_ns=received_ns) if len(received_ns) and not self._over:
+                        self.shown_ns = int(received_ns[-1])
+                    case m.SessionEnded():
+                        self._over = True  # what is shown from now on is not recorded
+                    case _:
+                        pass
                 yield report
-
-    def _note(self, report: m.Report) -> None:
-        match report:
-            case LoggedEvent():
-                self.events.append(report)
-            case Status(safe=safe):
-                self.safe = max(self.safe, safe.readings)
-            case m.Live(received_ns=received_ns) if len(received_ns) and not self._over:
-                self.shown_ns = int(received_ns[-1])
-            case m.SessionEnded():
-                self._over = True  # what is shown from now on is not recorded
-            case _:
-                pass
-
-
-@contextmanager
-def _recorder_to_kill() -> Generator[_WatchedRecorder]:
-    """Lend a recorder and kill it, after Ctrl-C too: one that lived on would rescue what is removed then."""
-    watched = _WatchedRecorder()
-    try:
-        yield watched
-    finally:
-        watched.kill()
 
 
 def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[dict[str, Any], list[Path]]:
@@ -190,7 +177,7 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
     folder = room / "killed-0"
     for number in range(KILLS):
         progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
-        with _recorder_to_kill() as watched:
+        with closing(_WatchedRecorder()) as watched:
             trial = _begin_or_resume(watched, folder)
             watched.hear(chance.uniform(*RUNNING))
         recording = Recording.open(folder)
@@ -238,7 +225,7 @@ def _try_stops(room: Path) -> float:
     """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
     took: list[float] = []
     for number in range(STOPS):
-        with _recorder_to_kill() as watched:
+        with closing(_WatchedRecorder()) as watched:
             _begin_or_resume(watched, room / str(number))
             watched.hear(0.3)
             began = time.monotonic()

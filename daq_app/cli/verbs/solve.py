@@ -1,7 +1,6 @@
 """Run the solver once, on a scene file."""
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
@@ -82,7 +81,13 @@ def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
 
 
 def _print(prediction: "Prediction", title: str, console: Console, deep: "Receptor | None" = None) -> None:
-    row, course = _row(prediction, deep), _course(prediction)
+    from solver.prediction import ROW
+    from solver.response.rates import course_errors, course_numbers
+    from solver.response.receptor_row import row_along
+
+    row = None if deep is None else row_along(prediction, receptor=deep)
+    history = prediction.history
+    course = None if history is None else (course_numbers(history), course_errors(prediction))
     row_at = {} if row is None or deep is None else {"row_at": {"depth": deep.depth, **_row_in_json(row)}}
     plain = prediction.to_dict()
     console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
@@ -114,8 +119,6 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     if course is not None:
         _say_course(*course, console)
     if row is not None and deep is not None:
-        from solver.prediction import ROW
-
         console.say(f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; kPa, shares):")
         cells = [
             [_with_error(*pair, factor) for pair, (_, factor) in zip(zip(*pairs, strict=True), UNITS, strict=True)]
@@ -136,28 +139,23 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     console.note(*(f"note: {warning}" for warning in prediction.warnings))
 
 
-def _course(prediction: "Prediction") -> "tuple[CourseNumbers, CourseNumbers] | None":
-    """Return the named instants and the rates of a course, and their errors; None where no course was asked for."""
-    from solver.response.rates import course_errors, course_numbers
-
-    return None if prediction.history is None else (course_numbers(prediction.history), course_errors(prediction))
-
-
 def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
     from solver.response.rates import INSTANTS, NUMBERS
 
-    def pairs(names: Sequence[str], values: "Array", off: "Array") -> dict[str, dict[str, float | None]]:
-        columns = zip(names, values.tolist(), off.tolist(), strict=True)
-        return {name: {"value": _none(value), "error": _none(error)} for name, value, error in columns}
-
-    def by_part(values: "Array") -> dict[str, float | None]:
-        return dict(zip(INSTANTS, map(_none, values.tolist()), strict=True))
-
-    parts = zip(INSTANTS, numbers.at, errors.at, strict=True)
-    rates = zip(NAMES, numbers.rate.T, errors.rate.T, strict=True)
+    parts = zip(INSTANTS, _plain(numbers.at), _plain(errors.at), strict=True)
+    rates = zip(NAMES, _plain(numbers.rate.T), _plain(errors.rate.T), strict=True)
     return {
-        "instants": {part: pairs((*NUMBERS, *NAMES), value, error) for part, value, error in parts},
-        "rates": {name: {**by_part(value), "errors": by_part(error)} for name, value, error in rates},
+        "instants": {
+            part: {
+                name: {"value": value, "error": error}
+                for name, value, error in zip((*NUMBERS, *NAMES), values, off, strict=True)
+            }
+            for part, values, off in parts
+        },
+        "rates": {
+            name: {**dict(zip(INSTANTS, values, strict=True)), "errors": dict(zip(INSTANTS, off, strict=True))}
+            for name, values, off in rates
+        },
     }
 
 
@@ -182,27 +180,20 @@ def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Cons
         console.say("Their errors are not known: the nested mesh has no such course.")
 
 
-def _none(value: float) -> float | None:
-    return value if isfinite(value) else None
+def _plain(table: "Array") -> list[list[float | None]]:
+    """Return a table as lists, None for nan."""
+    return [[value if isfinite(value) else None for value in line] for line in table.tolist()]
 
 
 def _with_error(value: float, error: float, factor: float) -> str:
     return f"{number(value, 4, factor=factor)} ± {number(error, 2, factor=factor)}" if isfinite(value) else "–"
 
 
-def _row(prediction: "Prediction", receptor: "Receptor | None") -> "Row | None":
-    from solver.response.receptor_row import row_along
-
-    return None if receptor is None else row_along(prediction, receptor=receptor)
-
-
 def _row_in_json(row: "Row") -> dict[str, object]:
     """Return arc positions [mm], every quantity there and its errors, None where the finger ends."""
     from solver.prediction import ROW
 
-    values, errors = (
-        {name: [_none(one) for one in line] for name, line in zip(NAMES, table.tolist(), strict=True)} for table in row
-    )
+    values, errors = (dict(zip(NAMES, _plain(table), strict=True)) for table in row)
     return {"arc": ROW.tolist(), **values, "errors": errors}
 
 
