@@ -172,95 +172,30 @@ def _take(setting: str, out: Path, session: Path | None) -> None:
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(out / "settings"))
     application = QApplication([])
-    chosen = DARK if theme == "dark" else LIGHT
-    camera = _Camera(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
-    _Places(camera).all()
+    shown = (
+        application,
+        (width, height),
+        DARK if theme == "dark" else LIGHT,
+        lambda name: out / f"{name}-{setting}.png",
+    )
+    _Places(*shown).all()
     if session is not None:
-        _take_review(camera, session)
-
-
-class _Camera:
-    """What pictures of a setting are taken with."""
-
-    def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
-        self.application, self.size, self.theme, self.path = application, size, theme, path
-        self.meanwhile = lambda: None  # done again and again while the window works
-
-    def wait(self, condition) -> None:  # noqa: ANN001
-        """Let the window work until something holds."""
-        end = time.monotonic() + 120.0
-        while not condition() and time.monotonic() < end:
-            self.meanwhile()
-            self.application.processEvents()
-            time.sleep(0.002)
-
-    def picture(self, name: str, widget) -> None:  # noqa: ANN001
-        """Take a picture of a widget once it has painted."""
-        for _ in range(5):
-            self.meanwhile()
-            self.application.processEvents()
-            time.sleep(0.02)
-        widget.grab().save(str(self.path(name)))
-
-
-def _take_review(camera: _Camera, session: Path) -> None:
-    """Take a picture of each of Review's places, on a copy of a session."""
-    from daq_app.analyst import state
-
-    places = _Places(camera)
-    places.play(*OPEN, until=3.0)
-    folder = Path(tempfile.mkdtemp()) / session.name
-    shutil.copytree(session, folder)
-    places.window.rooms.open(folder)
-    window = places.window.rooms.analyst
-
-    def picture(name: str, page: int) -> None:
-        camera.wait(lambda: window.state.step is None)
-        window._pages.setCurrentIndex(page)
-        places.picture(name)
-
-    places.picture("19-review-opening")
-    camera.wait(lambda: window.state.stage == "predicted")
-    picture("20-review-trials", 0)
-    picture("21-review-finger", 2)
-    steady = window.state.report.strokes[0].steady
-    window.ask(state.Move(1, "steady begin", steady[0] + 0.1, "E02", "the finger still stuck there"))
-    picture("22-review-window-moved", 1)
-    window._follow("readings")
-    window.stroke.player.step(-300)
-    picture("23-review-replay", 1)
-    window.model.near.click()
-    window.model.history.click()
-    camera.wait(lambda: window.state.film is not None)
-    window.model.player.seek(30)
-    picture("24-review-history", 2)
-    window.model.tabs.setCurrentIndex(1)
-    camera.wait(lambda: window.state.drawn)
-    picture("25-review-session", 2)
-    window.ask(state.Compare(str(session)))
-    camera.wait(lambda: "compared" in window.state.drawn)
-    picture("26-review-comparison", 2)
-    window.keys.toggle()
-    picture("27-review-keys", 2)
-    places.window.rooms.review.leave()
-    places.window.bridge.end()
-    shutil.rmtree(folder.parent)
+        _Places(*shown).review(session)
 
 
 class _Places:
     """The window, brought to each of its places."""
 
-    def __init__(self, camera: _Camera) -> None:
+    def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
         from daq_app.qt.start import open_window
 
-        self.camera, self.recorder = camera, PlayedRecorder()
-        self.window = open_window(camera.application, lambda: self.recorder, camera.theme)
+        self.application, self.path, self.recorder = application, path, PlayedRecorder()
+        self.window = open_window(application, lambda: self.recorder, theme)
         self.subject = self.window.subject
         self.window.side.show = self.subject.show
         for widget in (self.window, self.subject):
-            widget.resize(*camera.size)
+            widget.resize(*size)
         self.window.show()
-        camera.meanwhile = self._acknowledge
 
     def all(self) -> None:
         """Take a picture of each place."""
@@ -288,7 +223,7 @@ class _Places:
         self.picture("07-stroking")
         self.play(logged("finger_lifted", 1, time=7.2, noticed=7.25), until=7.3)
         self.play(steps.AskScore(trial, PLAN.blocks[0].scale_ends), until=8.5)
-        self.camera.wait(lambda: self.window.bridge.state.session.judged == 1)
+        self.wait(lambda: self.window.bridge.state.session.judged == 1)
         self.picture("08-scoring")
         self.picture("09-subject-line-empty", self.subject)
         line = self.subject.line
@@ -316,23 +251,75 @@ class _Places:
         self.picture("17-subject-thanks", self.subject)
         self.subject.check_ruler()
         self.picture("18-subject-ruler", self.subject)
-        self.camera.meanwhile = lambda: None
         self.window.bridge.end()
+
+    def review(self, session: Path) -> None:
+        """Take a picture of each of Review's places, on a copy of a session."""
+        from daq_app.analyst import state
+
+        self.play(*OPEN, until=3.0)
+        folder = Path(tempfile.mkdtemp()) / session.name
+        shutil.copytree(session, folder)
+        self.window.rooms.open(folder)
+        window = self.window.rooms.analyst
+
+        def picture(name: str, page: int) -> None:
+            self.wait(lambda: window.state.step is None)
+            window._pages.setCurrentIndex(page)
+            self.picture(name)
+
+        self.picture("19-review-opening")
+        self.wait(lambda: window.state.stage == "predicted")
+        picture("20-review-trials", 0)
+        picture("21-review-finger", 2)
+        steady = window.state.report.strokes[0].steady
+        window.ask(state.Move(1, "steady begin", steady[0] + 0.1, "E02", "the finger still stuck there"))
+        picture("22-review-window-moved", 1)
+        window._follow("readings")
+        window.stroke.player.step(-300)
+        picture("23-review-replay", 1)
+        window.model.near.click()
+        window.model.history.click()
+        self.wait(lambda: window.state.film is not None)
+        window.model.player.seek(30)
+        picture("24-review-history", 2)
+        window.model.tabs.setCurrentIndex(1)
+        self.wait(lambda: window.state.drawn)
+        picture("25-review-session", 2)
+        window.ask(state.Compare(str(session)))
+        self.wait(lambda: "compared" in window.state.drawn)
+        picture("26-review-comparison", 2)
+        window.keys.toggle()
+        picture("27-review-keys", 2)
+        self.window.rooms.review.leave()
+        self.window.bridge.end()
+        shutil.rmtree(folder.parent)
 
     def play(self, *reports, until: float) -> None:  # noqa: ANN002
         """Have reports said, then readings up to an instant."""
         self.recorder.play(*reports)
         self.recorder.readings(until)
-        self.camera.wait(lambda: not any(isinstance(said, m.Live) for said in self.recorder._waiting))
+        self.wait(lambda: not any(isinstance(said, m.Live) for said in self.recorder._waiting))
 
     def picture(self, name: str, widget=None) -> None:  # noqa: ANN001
-        """Take a picture of the window, or of another widget."""
-        self.camera.picture(name, widget or self.window)
+        """Take a picture of the window, or of another widget, once it has painted."""
+        for _ in range(5):
+            self._work()
+            time.sleep(0.02)
+        (widget or self.window).grab().save(str(self.path(name)))
 
-    def _acknowledge(self) -> None:
-        """Have the disk acknowledge, as it does all the time."""
+    def wait(self, condition) -> None:  # noqa: ANN001
+        """Let the window work until something holds."""
+        end = time.monotonic() + 120.0
+        while not condition() and time.monotonic() < end:
+            self._work()
+            time.sleep(0.002)
+
+    def _work(self) -> None:
+        """Let the window work, while the disk acknowledges, as it does all the time."""
         if self.window.bridge.recording:
             self.recorder.play(status(time.monotonic_ns()))
+        self.application.processEvents()
 
 
 if __name__ == "__main__":
