@@ -19,11 +19,11 @@ LARGEST_SEED = 10_000_000  # of a study of simulated people, each of whom has a 
 
 
 def within(
-    name: str, kind: type[int] | type[float], least: float, greatest: float, words: str = ""
+    name: str, kind: type[int] | type[float], least: float, greatest: float, words: str = "", per: int = 1
 ) -> Callable[[str], float]:
     """Return the `type` of an option for argparse: a number that raises WrongValue where it is not allowed.
 
-    `words` say what is allowed where the least and the greatest value do not.
+    `words` say what is allowed where the least and the greatest value do not. What is typed is `per` times the value.
     """
     ends = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
     usual = f"a whole number from {ends}" if kind is int else ends
@@ -33,7 +33,7 @@ def within(
         if not least <= value <= greatest:
             shown = value if kind is int else f"{value:g}"
             raise WrongValue(f"{name} {shown} is not allowed: {words or usual}")
-        return value
+        return value if per == 1 else value / per
 
     read.__name__ = kind.__name__  # argparse names it where a text is no number
     return read
@@ -181,9 +181,10 @@ def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) ->
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Declare --calibration-error."""
+    """Declare --calibration-error, typed in per cent: the standard uncertainty of each axis' gain [-]."""
     meaning = "standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)"
-    add_number(parser, "--calibration-error", float, (0.0, 20.0), meaning, None, "PERCENT", "0 to 20 (per cent)")
+    read = within("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
+    parser.add_argument("--calibration-error", type=read, metavar="PERCENT", help=meaning)
 
 
 def area_law(options: argparse.Namespace) -> AreaLaw | None:
@@ -204,9 +205,3 @@ def area_law(options: argparse.Namespace) -> AreaLaw | None:
     if not 0.0 <= exponent <= 1.0:
         raise WrongValue(f"--area {options.area} is not allowed: fixed, hertz, or an exponent from 0 to 1")
     return AreaLaw("power", exponent, force)
-
-
-def calibration_error(options: argparse.Namespace) -> float | None:
-    """Return the standard uncertainty of each axis' gain [-], None where it was not given."""
-    percent: float | None = options.calibration_error
-    return None if percent is None else percent / 100.0

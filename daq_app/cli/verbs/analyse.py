@@ -8,7 +8,7 @@ import argparse
 import math
 
 from daq_app.batch.derived import analyse_session, analysis_document, outdated_prediction
-from daq_app.cli.options import add_analysis, add_number, add_session, area_law, calibration_error
+from daq_app.cli.options import add_analysis, add_number, add_session, area_law
 from daq_app.console import DONE, FLAWED, Console, table
 from daq_app.wording import number
 from sessions.recording import Recording
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     recording = Recording.open(options.session)
     analysis = analyse_session(
-        recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=calibration_error(options)
+        recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=options.calibration_error
     )
     console.note(outdated_prediction(recording, analysis.settings))
     console.result(analysis_document(analysis))

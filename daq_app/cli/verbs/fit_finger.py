@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from daq_app.batch.derived import open_visit, stored_settings
-from daq_app.cli.options import add_calibration, add_flag, add_number, add_seed, add_visit, calibration_error
+from daq_app.cli.options import add_calibration, add_flag, add_number, add_seed, add_visit
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number, span
 from sessions.exchange.csv_text import displacement_log
@@ -63,9 +63,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         check_replaceable(options.scene, SCENE_HEAD)
     recording, _, unreadable = open_visit(options.session, options.subject, console)
     settings = stored_settings(recording)
-    gain_error = calibration_error(options)
-    if gain_error is not None:
-        settings = replace(settings, gain_error=gain_error)
+    if options.calibration_error is not None:
+        settings = replace(settings, gain_error=options.calibration_error)
     curves = _curves(options, recording, settings)
     flaws = [*curves.left_out, *([] if options.relaxation else _relaxation_flaws(curves))]
     console.note(*flaws)

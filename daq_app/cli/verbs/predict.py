@@ -11,16 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session
-from daq_app.cli.options import (
-    add_analysis,
-    add_flag,
-    add_number,
-    add_shared,
-    add_visit,
-    area_law,
-    calibration_error,
-    numbers_by_key,
-)
+from daq_app.cli.options import add_analysis, add_flag, add_number, add_shared, add_visit, area_law, numbers_by_key
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, finger_in
@@ -66,7 +57,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     stated = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
     choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **stated)
     recording, _, unreadable = open_visit(options.session, options.subject, console)
-    analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
+    analysis = analyse_session(recording, console, area_law(options), gain_error=options.calibration_error)
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = {"afferent": firing_document(prediction, afferent)} if options.afferent else {}

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_afferent, stored_options
-from daq_app.cli.options import add_analysis, add_flag, add_shared, add_visit, area_law, calibration_error
+from daq_app.cli.options import add_analysis, add_flag, add_shared, add_visit, area_law
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.plan.plan import Blinded
 from sessions.prediction import BY_NAME, PredictionOptions
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         pages.make_place(recording.folder)
     if options.figures is not None:
         pages.make_place(options.figures)
-    analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
+    analysis = analyse_session(recording, console, area_law(options), gain_error=options.calibration_error)
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)

@@ -10,14 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
-from daq_app.cli.options import (
-    add_body_arguments,
-    add_flag,
-    add_number,
-    add_shared,
-    body_of,
-    own_sentence,
-)
+from daq_app.cli.options import add_body_arguments, add_flag, add_number, add_shared, body_of, own_sentence
 from daq_app.cli.terminal import attend_session, open_device
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder

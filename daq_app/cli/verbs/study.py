@@ -24,7 +24,6 @@ from daq_app.cli.options import (
     add_seed,
     add_shared,
     area_law,
-    calibration_error,
     numbers_by_key,
     within,
 )
@@ -73,12 +72,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
     planted = _planted_values(options.power)
     powers = power(
-        planted,
-        SUBJECTS,
-        SURFACES,
-        options.studies,
-        options.seed,
-        lambda part: console.progress(part, "designs"),
+        planted, SUBJECTS, SURFACES, options.studies, options.seed, lambda part: console.progress(part, "designs")
     )
     recoveries = _recovery(options, planted, console)
     designs = [{**asdict(one), "power": one.share} for one in powers]
@@ -125,8 +119,7 @@ def _say_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, c
     rows = [
         [
             f"{one.people} × {one.surfaces} × {len(one.depths)}",
-            f"{100 * one.preferred:.0f} %",
-            f"{100 * one.family:.0f} %",
+            *(f"{100 * share:.0f} %" for share in (one.preferred, one.family)),
         ]
         for one in recoveries
     ]
@@ -195,11 +188,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     along = options.quantity if options.paths != "none" else SED.name
-    visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options), along)
-    exclusions, truth = (
-        exclusions_in(folder),
-        _load_ground_truth(folder),
-    )  # what is wrong with them is said before hours of work
+    visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, options.calibration_error, along)
+    # What is wrong with these is said before hours of work.
+    exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
     shelf = Shelf(out / "results", visit_options)
     done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
     if truth is not None and options.quantity == SED.name:
@@ -221,10 +212,9 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        settings = check_ground_truth(json_value(read_within_limit(path)))
+        return check_ground_truth(json_value(read_within_limit(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
-    return settings
 
 
 def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
