@@ -130,6 +130,10 @@ class Console:
 
         return report
 
+    def counter(self, things: str, count: int) -> Callable[[float], None]:
+        """Return what a long job calls with the part done of so many things."""
+        return lambda part: self.progress(part, f"{round(part * count)} of {count} {things}")
+
     def _bar(self, text: str, now: float, end_known: bool) -> str:
         """Return the line of a terminal: part done, text, bar, and where the end is known rate and time left."""
         from tqdm import tqdm  # here: it takes longer to import than most verbs take to answer

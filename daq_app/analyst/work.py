@@ -151,7 +151,11 @@ class Work:
         self._say(m.Answered(finding, self._finger(row.prediction)))
 
     def _finger(self, prediction: Prediction | None) -> Finger | None:
-        return None if prediction is None else finger_of(prediction, self._sketch(prediction.mesh, prediction.scene))
+        if prediction is None:
+            return None
+        sketch = self._sketch(prediction.mesh, prediction.scene)
+        frame = _frame(fields_of(prediction, sketch), prediction.skin, prediction.row.sed)
+        return Finger(_parts(sketch), frame, prediction.row.arc)
 
     def _sketch(self, mesh: Mesh, scene: Scene) -> Sketch:
         if id(mesh) not in self._sketches:
@@ -333,11 +337,8 @@ def sentence_of(error: Exception) -> str:
     return str(error) if own else f"{type(error).__name__}: {error}"
 
 
-def finger_of(prediction: Prediction, sketch: Sketch) -> Finger:
-    """Return the settled finger of a prediction."""
-    drawn = fields_of(prediction, sketch)
-    parts = Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
-    return Finger(parts, _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc)
+def _parts(sketch: Sketch) -> Parts:
+    return Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
 
 
 def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
@@ -348,8 +349,7 @@ def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progre
         if not progress(min(1.0, (begin + AT_ONCE) / len(instants))):
             raise Cancelled
     frames = tuple(_frame(still.fields, still.skin, still.row) for still in pictures)
-    parts = Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
-    return Film(parts, frames, tuple(_instant(still) for still in pictures), ROW)
+    return Film(_parts(sketch), frames, tuple(_instant(still) for still in pictures), ROW)
 
 
 def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:

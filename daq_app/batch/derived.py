@@ -182,7 +182,8 @@ def repeat(
     The plan is that of `plan_of`, where `recording` is a replay of it. Raises SettingsError where `stored` is damaged.
     """
     if name == ANALYSIS:
-        bootstrap = bootstrap_of(stored) if "bootstrap" in stored else None
+        kept: Mapping[str, Any] = stored.get("bootstrap") or {}
+        bootstrap = bootstrap_settings(kept.get("settings") or {}) if "bootstrap" in stored else None
         return analysis_document(analyse(recording, settings_of(stored), decisions), bootstrap)
     options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
@@ -225,18 +226,11 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
     return {**analysis.to_dict(), "bootstrap": intervals_document(settings, intervals)}
 
 
-def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
-    """Return what the intervals of a stored analysis were drawn from. Raises SettingsError."""
-    bootstrap: Mapping[str, Any] = stored.get("bootstrap") or {}
-    return bootstrap_settings(bootstrap.get("settings") or {})
-
-
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
 
     The law of the contact area, the calibration's error and the seed of the intervals are all that can be asked for;
-    the rest is the program's.
-    Raises SettingsError.
+    the rest is the program's. Raises SettingsError.
     """
     settings: Mapping[str, Any] = stored.get("settings") or stored
     area = from_table(settings.get("area") or {}, AreaLaw, "area")

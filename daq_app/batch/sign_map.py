@@ -159,7 +159,6 @@ def _plain(numbers: Array) -> list[float | None]:
 def answers_of(
     trials: Sequence[Trial],
     progress: Callable[[float], None],
-    *,
     keep: Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,

@@ -29,7 +29,7 @@ from sessions.recording.manifest import is_sealed
 from sessions.recording.recovery import fold_log
 from sessions.recording.storage import RESERVE, check_room, need, unsafe
 from sessions.run import resuming
-from sessions.run.runner import STOPPED, Continuation, Ending, Operator, Status, run_session
+from sessions.run.runner import STOPPED, Continuation, Ending, Operator, run_session
 from sessions.run.steps import Command, Event
 
 WHY = "a session is being recorded"
@@ -178,7 +178,7 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
             bench.lent(prepared.clock_offset_ns) if prepared.plan.forces else None,
             resumed=prepared.resumed,
             stop=operator.stop,
-            progress=operator.progress,
+            progress=send,
         )
     resumable = end.cause in resuming.RESUMABLE
     send(m.SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
@@ -255,10 +255,6 @@ class _Operator:
         if self._touching and now_ns - self._alone_ns < LIFT_PATIENCE_NS:
             return None
         return "client", CLIENT_GONE
-
-    def progress(self, status: Status) -> None:
-        """Send it on."""
-        self._send(status)
 
     def take_safe(self, events: Sequence[LoggedEvent]) -> None:
         """Send what became safe, and remember whether a finger touches."""

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from daq_app.console import Console
 from daq_app.simulation.wiring import INPUT, Connection, SimulatedPeople, connect, planted_surface
 from drivers.clock import Clock, SimulatedClock
-from sessions.file_access import write_json
+from sessions.file_access import holds_something, write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
 from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.prediction import PredictionOptions
@@ -168,7 +168,7 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
 
     The same seed gives the same readings and answers. Raises RecordingError where `out` cannot be used.
     """
-    if out.exists() and any(out.iterdir()):
+    if holds_something(out):
         raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
     planted = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
     (out / DAMAGED).mkdir()
@@ -213,25 +213,15 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     people = SyntheticPeople(
         SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), planned, spoilt
     )
-    conduct(
-        planned,
-        out / subject,
-        people,
-        console,
-        settings=[_study_seed(seed)],
-        run=RunnerSettings(tick=TICK),
-        durable=False,
-    )
+    study, run = [_study_seed(seed)], RunnerSettings(tick=TICK)
+    conduct(planned, out / subject, people, console, settings=study, run=run, durable=False)
     return [
         {
             "subject": subject,
             "trial": trial.number,
             "descriptor": trial.stimulus.descriptor,
             "index": trial.stimulus.index,
-            "mu": stroke.mu,
-            "tau_max": stroke.tau_max,
-            "speed": stroke.speed,
-            "direction": stroke.direction,
+            **{name: getattr(stroke, name) for name in ("mu", "tau_max", "speed", "direction")},
             **people.meant(trial),
         }
         for trial, stroke in zip(people.stroked, bench.ground_truth(), strict=True)

@@ -15,20 +15,10 @@ from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
 from simulators.bench import Bench, PlantedStroke
 from simulators.net_ft_box import NetFtBox
-from simulators.serving import WIRES, serve
+from simulators.serving import WIRES as WIRES  # the verb serves them
+from simulators.serving import serve as serve
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
-
-__all__ = [
-    "WIRES",
-    "Connection",
-    "SimulatedHand",
-    "SimulatedPeople",
-    "SimulatedSubject",
-    "connect",
-    "planted_surface",
-    "serve",
-]
 
 SIMULATED = "sim"
 REPLAY = "replay:"  # and the path of a session folder

@@ -99,11 +99,9 @@ def _rows(
         {
             "descriptor": row.stimulus.descriptor,
             "index": row.stimulus.index,
-            "planted_mu": planted[row.trial].mu,
+            **{f"planted_{name}": getattr(planted[row.trial], name) for name in ("mu", "tau_max", "speed")},
             "mu": row.mu,
-            "planted_tau_max": planted[row.trial].tau_max,
             "tau_max": row.tau_max,
-            "planted_speed": planted[row.trial].speed,
             "speed": speeds.get(row.trial),
             "sed": row.sed,
             "error_estimate": row.error_estimate,

@@ -81,12 +81,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     else:
         where = str(options.design)
         design, origin = check_design(tables_in(text_of(options.design), where), scene, where), "set"
-    count = samples * (len(design) + 2)
-
-    def show_progress(part: float) -> None:
-        console.progress(part, f"{round(part * count)} of {count} scenes")
-
-    indices, seds = sensitivity(scene, design, samples, options.seed, show_progress)
+    progress = console.counter("scenes", samples * (len(design) + 2))
+    indices, seds = sensitivity(scene, design, samples, options.seed, progress)
     low, high = float(seds.min()), float(seds.max())
     doubtful = doubts(indices, samples)
     constant = constant_numbers(scene, design)
@@ -122,13 +118,8 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     drawn = sign_map.drawn_fingers(points, options.kinematics)
     trials = [*changes.values(), *mapped.values(), *drawn]
     try:
-        answers = sign_map.answers_of(
-            trials,
-            lambda part: console.progress(part, f"{round(part * len(trials))} of {len(trials)} fingers"),
-            keep=options.keep,
-            workers=options.workers,
-            scheduler=options.scheduler,
-        )
+        progress = console.counter("fingers", len(trials))
+        answers = sign_map.answers_of(trials, progress, options.keep, options.workers, options.scheduler)
     except OSError as error:
         if options.keep is None:
             raise
