@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from sessions.report.contents import Report
@@ -14,12 +14,12 @@ CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What stands in one cell, the mark of the note that explains it, and under it the interval of its number."""
+    """What stands in one cell, the note that explains it, and under it the interval of its number."""
 
     text: str
-    mark: str = ""
-    hover: str = ""
+    note: str = ""
     interval: str = ""
+    mark: str = ""  # of the note, given by `table`
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,81 +53,60 @@ Row = tuple[Cell | str | int, ...]  # a text or a whole number stands for a cell
 Rows = tuple[str, Iterable[Row]]  # the heading of a group, and its rows
 
 
-@dataclass(slots=True)
-class Notes:
-    """The reasons met so far, each with a letter."""
-
-    marks: dict[str, str] = field(default_factory=dict[str, str])
-
-    def mark(self, sentence: str) -> str:
-        """Return the letter of a note, a new one where it was not met before."""
-        n = len(self.marks)
-        letters = (chr(ord("a") + n // 26 - 1) if n >= 26 else "") + chr(ord("a") + n % 26)
-        return self.marks.setdefault(sentence, letters)
-
-    def number(self, value: float | None, shown: Callable[[float], str], reason: str | None) -> Cell:
-        """Return the number, or a dash with its reason."""
-        if value is not None:
-            return Cell(shown(value))
-        why = reason or "not determined"
-        return Cell(NONE, self.mark(why), why)
-
-    def estimate(
-        self,
-        value: float | None,
-        shown: Callable[[float], str],
-        reason: str | None,
-        ends: tuple[float, float] | None,
-        without: str | None = None,
-        *,
-        of_ends: Callable[[float], str] | None = None,
-        unit: float = 1.0,
-    ) -> Cell:
-        """Return the number over its interval, `without` which it has a note that says why; or a dash with its reason.
-
-        `of_ends` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
-        """
-        if value is None:
-            return self.number(None, shown, reason)
-        if ends is None:
-            why = f"no interval: {without or 'not computed'}"
-            return Cell(shown(value), self.mark(why), why)
-        return Cell(shown(value), interval=between(*ends, of_ends or shown, unit))
-
-    def interval(
-        self, low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None
-    ) -> Cell:
-        """Return the interval as a cell of its own, or a dash with its reason."""
-        missing = low is None or high is None
-        return self.number(None, shown, reason) if missing else range_cell(low, high, shown)
-
-    def entries(self) -> tuple[tuple[str, str], ...]:
-        """Return every note with its letter."""
-        return tuple((mark, sentence) for sentence, mark in self.marks.items())
+def number_cell(value: float | None, shown: Callable[[float], str], reason: str | None) -> Cell:
+    """Return a number, or a dash with its reason."""
+    return Cell(NONE, reason or "not determined") if value is None else Cell(shown(value))
 
 
-def table(name: str, caption: str, columns: str, groups: Iterable[Rows], notes: Notes | None = None) -> Table | None:
-    """Return a table without its empty groups; None where no group has rows.
+def estimate_cell(
+    value: float | None,
+    shown: Callable[[float], str],
+    reason: str | None,
+    ends: tuple[float, float] | None,
+    without: str | None = None,
+    *,
+    of_ends: Callable[[float], str] | None = None,
+    unit: float = 1.0,
+) -> Cell:
+    """Return a number over its interval, `without` which it has a note that says why; or a dash with its reason.
+
+    `of_ends` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
+    """
+    if value is None:
+        return number_cell(None, shown, reason)
+    if ends is None:
+        return Cell(shown(value), f"no interval: {without or 'not computed'}")
+    return Cell(shown(value), interval=between(*ends, of_ends or shown, unit))
+
+
+def range_cell(low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None = None) -> Cell:
+    """Return an interval as a cell of its own, a dash with the reason where there is none."""
+    return Cell(NONE, reason or "") if low is None or high is None else Cell(f"{shown(low)} to {shown(high)}")
+
+
+def table(name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Table | None:
+    """Return a table without its empty groups, its notes marked in reading order; None where no group has rows.
 
     `columns` are its heads with their units, as in "index | SED [kPa]".
     """
-    cells = ((name, tuple(tuple(map(_cell, row)) for row in rows)) for name, rows in groups)
+    marks: dict[str, str] = {}  # by the note
+
+    def marked(content: Cell | str | int) -> Cell:
+        cell = content if isinstance(content, Cell) else Cell(str(content))
+        return replace(cell, mark=marks.setdefault(cell.note, _letters(len(marks)))) if cell.note else cell
+
+    cells = ((name, tuple(tuple(map(marked, row)) for row in rows)) for name, rows in groups)
     kept = tuple(Group(name, rows) for name, rows in cells if rows)
     if not kept:
         return None
     short, further = _in_short(caption)
     heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
-    return Table(
-        name,
-        short,
-        tuple(Column(head, unit) for head, _, unit in heads),
-        kept,
-        (*further, *(notes.entries() if notes else ())),
-    )
+    notes = ((mark, note) for note, mark in marks.items())
+    return Table(name, short, tuple(Column(head, unit) for head, _, unit in heads), kept, (*further, *notes))
 
 
-def _cell(content: Cell | str | int) -> Cell:
-    return content if isinstance(content, Cell) else Cell(str(content))
+def _letters(n: int) -> str:
+    return (chr(ord("a") + n // 26 - 1) if n >= 26 else "") + chr(ord("a") + n % 26)
 
 
 def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
@@ -168,8 +147,3 @@ def group_by_experiment(
     names = [e.name for e in report.experiments] or list(dict.fromkeys(map(experiment, things)))
     groups: list[Rows] = [(name, [row(t) for t in things if experiment(t) == name]) for name in names]
     return [*groups, ("", [row(t) for t in things if experiment(t) not in names])]
-
-
-def range_cell(low: float | None, high: float | None, shown: Callable[[float], str]) -> Cell:
-    """Return the cell of an interval, a dash where there is none."""
-    return Cell(NONE if low is None or high is None else f"{shown(low)} to {shown(high)}")

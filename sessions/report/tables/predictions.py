@@ -7,7 +7,7 @@ from typing import NamedTuple
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
-from sessions.report.tables import Cell, Notes, Row, Rows, Table, group_by_experiment, table
+from sessions.report.tables import Cell, Row, Rows, Table, estimate_cell, group_by_experiment, number_cell, table
 from sessions.report.wording import (
     ShownResponse,
     caption,
@@ -23,7 +23,6 @@ from sessions.report.wording import (
 
 def prediction_table(report: Report) -> Table | None:
     """Return what the model was given, and the SED it predicts."""
-    notes = Notes()
     columns = "µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
@@ -36,17 +35,17 @@ def prediction_table(report: Report) -> Table | None:
             bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
         missing, error = p.reasons.get("sed"), None if p.doubt else p.error_estimate
         return (
-            notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
+            estimate_cell(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
             {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
-            notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
-            _depth(p, notes),
-            _stroke_sed(p, notes),
-            notes.number(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
-            notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
+            estimate_cell(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
+            _depth(p),
+            _stroke_sed(p),
+            number_cell(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
+            number_cell(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
     words = caption("predictions", how=_HOW, model=report.model)
-    return _table(report, "table-predictions", words, columns, _rows(report, row), notes)
+    return _table(report, "table-predictions", words, columns, _rows(report, row))
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
@@ -65,24 +64,24 @@ class _Estimate(NamedTuple):
     doubt: str = ""  # why no finger can be in that state
 
 
-def _cell(notes: Notes, of: _Estimate, shown: Callable[[float], str], least: int, unit: float = 1.0) -> Cell:
+def _cell(of: _Estimate, shown: Callable[[float], str], least: int, unit: float = 1.0) -> Cell:
     """Return a number ± its error, over its interval; in doubt without both, which would speak for it."""
     if of.doubt and of.value is not None:
-        return notes.estimate(of.value, shown, None, None, of.doubt)
+        return estimate_cell(of.value, shown, None, None, of.doubt)
     with_error_of = _with(of.error, least, unit)
-    return notes.estimate(of.value, with_error_of, of.reason, of.ends, of.without, of_ends=shown, unit=unit)
+    return estimate_cell(of.value, with_error_of, of.reason, of.ends, of.without, of_ends=shown, unit=unit)
 
 
-def _sed(notes: Notes, of: _Estimate, *, star: bool) -> Cell:
+def _sed(of: _Estimate, *, star: bool) -> Cell:
     """Return an SED in kPa; `star` marks an interval that was found otherwise than the others of its table."""
-    cell = _cell(notes, of, sed, 3, 1e3)
+    cell = _cell(of, sed, 3, 1e3)
     return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
 
 
-def _stroke_sed(p: PredictionFinding, notes: Notes) -> Cell:
+def _stroke_sed(p: PredictionFinding) -> Cell:
     ends, without, star = _of(p.interval)
     estimate = _Estimate(p.sed, p.error_estimate, p.reasons.get("sed"), ends, without, p.doubt)
-    return _sed(notes, estimate, star=star)
+    return _sed(estimate, star=star)
 
 
 def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
@@ -101,26 +100,26 @@ def afferent_table(report: Report) -> Table | None:
     """Return the firing rates of an afferent, where they were asked for."""
     if all(p.settled_rate is None for p in report.predictions):
         return None
-    notes, shown = Notes(), shown_response(report.afferent_quantity)
+    shown = shown_response(report.afferent_quantity)
     published = shown.name == SED.name
     columns = f"{shown.label} [{shown.unit}] | peak rate [imp/s] | settled rate [imp/s]"
 
     def row(p: PredictionFinding) -> Row:
         firing = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), _of(p.interval)[1] if published else _SED_ALONE
-        rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in firing)
-        return (_stroke_sed(p, notes) if published else _responding(p, shown, notes), *rates)
+        rates = (estimate_cell(rate, places(1), why, ends, without) for rate, ends in firing)
+        return (_stroke_sed(p) if published else _responding(p, shown), *rates)
 
     below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
     words = caption("afferent", label=shown.label, below=below if published else "", model=report.model)
-    return _table(report, "table-afferent", words, columns, _rows(report, row), notes)
+    return _table(report, "table-afferent", words, columns, _rows(report, row))
 
 
-def _responding(p: PredictionFinding, shown: ShownResponse, notes: Notes) -> Cell:
+def _responding(p: PredictionFinding, shown: ShownResponse) -> Cell:
     """Return a quantity at the ending in the unit shown, ± its error from the mesh."""
     numbers = shown.of(p)
     if not numbers:
-        return notes.number(None, str, p.reasons.get("sed"))
+        return number_cell(None, str, p.reasons.get("sed"))
     value, error = (shown.factor * number for number in (*numbers, 0.0)[:2])
     return Cell(with_error(value, error, shown.places))
 
@@ -130,21 +129,20 @@ def variants_table(report: Report) -> Table | None:
     ways = _ways(report)
     if not ways:
         return None
-    notes = Notes()
 
     def cell(one: Alternative) -> Cell:
         ends, why, star = _of(one.interval)
-        return _sed(notes, _Estimate(one.sed, one.error_estimate, one.reason, ends, why, one.doubt), star=star)
+        return _sed(_Estimate(one.sed, one.error_estimate, one.reason, ends, why, one.doubt), star=star)
 
     legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
     words = caption("variants", legend=legend, how=_HOW)
-    return _table(report, "table-beside", words, columns, _by_strain(report, cell), notes)
+    return _table(report, "table-beside", words, columns, _by_strain(report, cell))
 
 
 def variant_forces_table(report: Report) -> Table | None:
     """Return the normal force of each variant, or the depth that the measured force presses it to."""
-    ways, notes = _ways(report), Notes()
+    ways = _ways(report)
     if not ways:
         return None
 
@@ -156,12 +154,12 @@ def variant_forces_table(report: Report) -> Table | None:
         ends = None if interval is None else interval.indentation if pressed else interval.normal_force
         why = None if interval is None else interval.reason
         estimate = _Estimate(None if one.sed is None else value, error, one.reason, ends, why, one.doubt)
-        return _cell(notes, estimate, places(2), 2)
+        return _cell(estimate, places(2), 2)
 
     alternatives = [one.variant for p in report.predictions for one in p.alternatives]
     units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in alternatives}
     columns = " | ".join(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))
-    return _table(report, "table-beside-forces", caption("variant-forces"), columns, _by_strain(report, cell), notes)
+    return _table(report, "table-beside-forces", caption("variant-forces"), columns, _by_strain(report, cell))
 
 
 def _ways(report: Report) -> tuple[str, ...]:
@@ -184,7 +182,6 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows
 
 def force_table(report: Report) -> Table | None:
     """Return the model's forces beside the measured ones."""
-    notes = Notes()
     columns = (
         "model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "
         "measured T [N] | depth of the model [mm] | depth to match [mm]"
@@ -201,7 +198,7 @@ def force_table(report: Report) -> Table | None:
         def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
             doubt = p.doubt if name in _OF_STATE else ""
             estimate = _Estimate(getattr(p, name), error, p.reasons.get(name), ends, without, doubt)
-            return _cell(notes, estimate, places(decimals), decimals)
+            return _cell(estimate, places(decimals), decimals)
 
         why = _of(p.interval)[1]
         return (
@@ -210,14 +207,14 @@ def force_table(report: Report) -> Table | None:
             cell("measured_normal", None, intervals.get("normal_force"), _SHORT),
             cell("tangential_force", p.tangential_force_error, tangential, why),
             cell("measured_tangential", None, intervals.get("tangential_force"), _SHORT),
-            _depth(p, notes),
+            _depth(p),
             cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
         )
 
     origin = f" ({report.width_origin})" if report.width_origin else ""
     width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm{origin}"
     words = caption("forces", width=width, model=report.model)
-    return _table(report, "table-forces", words, columns, _rows(report, row), notes)
+    return _table(report, "table-forces", words, columns, _rows(report, row))
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
@@ -228,7 +225,6 @@ def direction_table(report: Report) -> Table | None:
     """Return the SED of both directions at equal depth."""
     if all(p.opposite_sed is None for p in report.predictions):
         return None
-    notes = Notes()
     columns = "depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
 
     def row(p: PredictionFinding) -> Row:
@@ -239,15 +235,15 @@ def direction_table(report: Report) -> Table | None:
         doubt = p.doubt or p.opposite_doubt
         unknown = doubt or without or _of(p.interval)[1]
         return (
-            _depth(p, notes),
+            _depth(p),
             direction(p.direction),
-            _stroke_sed(p, notes),
-            _sed(notes, opposite, star=star),
-            notes.estimate(ratio, places(3), why, None if doubt else ends, unknown),
+            _stroke_sed(p),
+            _sed(opposite, star=star),
+            estimate_cell(ratio, places(3), why, None if doubt else ends, unknown),
         )
 
     words = caption("directions", how=_HOW, model=report.model)
-    return _table(report, "table-directions", words, columns, _rows(report, row), notes)
+    return _table(report, "table-directions", words, columns, _rows(report, row))
 
 
 def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
@@ -262,10 +258,10 @@ def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends 
     return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
-def _table(report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows], notes: Notes) -> Table | None:
+def _table(report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Table | None:
     """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
-    return table(name, caption, f"{'trial | index' if planned else 'stroke'} | {columns}", groups, notes)
+    return table(name, caption, f"{'trial | index' if planned else 'stroke'} | {columns}", groups)
 
 
 def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]:
@@ -278,8 +274,8 @@ def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]
     return group_by_experiment(report, report.predictions, lambda p: p.experiment, name_row)
 
 
-def _depth(p: PredictionFinding, notes: Notes) -> Cell:
-    return notes.number(p.indentation, lambda v: f"{v:g}", "no plan says how deep the model is pressed")
+def _depth(p: PredictionFinding) -> Cell:
+    return number_cell(p.indentation, lambda v: f"{v:g}", "no plan says how deep the model is pressed")
 
 
 def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:

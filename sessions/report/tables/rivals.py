@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from textwrap import fill
 
-from sessions.report.tables import Notes, Row, Table, table
+from sessions.report.tables import Row, Table, estimate_cell, number_cell, table
 from sessions.report.wording import NONE, capital, caption, correlation, digits, p_value, places
 from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
@@ -42,17 +42,16 @@ def _weighed(compared: Compared) -> bool:
 
 
 def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: Callable[[str], bool]) -> Table | None:
-    notes = Notes()
     columns = (
         f"quantity | n | r | r of {quantity} minus this | Steiger's Z | p | r given the model's µ | "
         f"left-out error [0–100]{' | AIC weight' if _weighed(compared) else ''}"
     )
     width = columns.count("|") + 1
     groups = [
-        (name, tuple(_row(rival, quantity, notes)[:width] for rival in rivals if shown(rival.name)))
+        (name, tuple(_row(rival, quantity)[:width] for rival in rivals if shown(rival.name)))
         for name, rivals in compared
     ]
-    return table(anchor, caption, columns, groups, notes)
+    return table(anchor, caption, columns, groups)
 
 
 def rival_words(rivals: Sequence[Rival]) -> str:
@@ -115,7 +114,7 @@ def _verdict(name: str, model: str, compared: Sequence[Rival]) -> str:
     return f"On {name}, {sentence}."
 
 
-def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
+def _row(rival: Rival, quantity: str) -> Row:
     why = rival.reasons.get
     contrast = rival.contrast
     ends = bounds(rival.low, rival.high)
@@ -123,22 +122,20 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     less: Row = (NONE, NONE, NONE)
     if contrast is not None:
         less = (
-            notes.estimate(contrast.difference, correlation, None, bounds(contrast.low, contrast.high)),
+            estimate_cell(contrast.difference, correlation, None, bounds(contrast.low, contrast.high)),
             NONE if contrast.z is None else digits(contrast.z, 2),
             NONE if contrast.p is None else p_value(contrast.p),
         )
     elif rival.name != quantity:
-        less = (notes.number(None, correlation, why("contrast")), NONE, NONE)
+        less = (number_cell(None, correlation, why("contrast")), NONE, NONE)
     return (
         rival.name,
         rival.n,
-        notes.estimate(rival.r, correlation, why("r"), ends, "too few cases, or a perfect r"),
+        estimate_cell(rival.r, correlation, why("r"), ends, "too few cases, or a perfect r"),
         *less,
-        notes.estimate(rival.partial, correlation, why("partial"), partial, "it takes five surfaces"),
-        notes.number(rival.left_out_error, places(1), why("left_out_error")),
-        NONE
-        if rival.weight is None and why("weight") is None
-        else notes.number(rival.weight, places(3), why("weight")),
+        estimate_cell(rival.partial, correlation, why("partial"), partial, "it takes five surfaces"),
+        number_cell(rival.left_out_error, places(1), why("left_out_error")),
+        NONE if rival.weight is None and why("weight") is None else number_cell(rival.weight, places(3), why("weight")),
     )
 
 

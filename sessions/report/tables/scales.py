@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from sessions.report.contents import Report
-from sessions.report.tables import Cell, Notes, Row, Rows, Table, table
+from sessions.report.tables import Cell, Row, Rows, Table, estimate_cell, number_cell, table
 from sessions.report.wording import NONE, capital, caption, digits, p_value, places, plural
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.psychometric import Psychometric
@@ -18,9 +18,8 @@ CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
 
 def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     """Return the values of each surface by both models, where subjects chose between two."""
-    notes = Notes()
-    groups = [(one.descriptor, tuple(_rows(one, notes))) for one in descriptors if one.scales]
-    return table("table-scales", caption("scales"), "surface | Bradley–Terry [logit] | Thurstone V [z]", groups, notes)
+    groups = [(one.descriptor, tuple(_rows(one))) for one in descriptors if one.scales]
+    return table("table-scales", caption("scales"), "surface | Bradley–Terry [logit] | Thurstone V [z]", groups)
 
 
 def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
@@ -28,42 +27,41 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     judgements: list[Judgement] = [kind for kind in JUDGEMENTS if any(kind in one.latent for one in descriptors)]
     if judgements in ([], ["scores"]):
         return None
-    notes = Notes()
     groups: list[Rows] = []
     for one in descriptors:
         means = {mean.index: mean.mean for mean in one.scores}
         rows = (
             (
                 index,
-                notes.number(means.get(index), places(1), "no scores were given"),
-                *(_latent(one, kind, index, notes) for kind in judgements),
+                number_cell(means.get(index), places(1), "no scores were given"),
+                *(_latent(one, kind, index) for kind in judgements),
             )
             for index in one.indices
         )
         groups.append((one.descriptor, tuple(rows)))
     heads = " | ".join(f"by {kind} [z]" for kind in judgements)
-    return table("table-latent", caption("latent"), f"surface | mean score [0–100] | {heads}", groups, notes)
+    return table("table-latent", caption("latent"), f"surface | mean score [0–100] | {heads}", groups)
 
 
-def _latent(one: DescriptorFindings, kind: Judgement, index: int, notes: Notes) -> Cell:
+def _latent(one: DescriptorFindings, kind: Judgement, index: int) -> Cell:
     values = one.latent.get(kind)
     scaled = None if values is None else values.get(index)
     if scaled is None:
-        return notes.number(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
-    return notes.estimate(scaled.value, places(2), None, scaled.ends, "too few subjects")
+        return number_cell(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
+    return estimate_cell(scaled.value, places(2), None, scaled.ends, "too few subjects")
 
 
-def _rows(one: DescriptorFindings, notes: Notes) -> Iterable[Row]:
+def _rows(one: DescriptorFindings) -> Iterable[Row]:
     indices = sorted({index for scale in one.scales for index in scale.values}) or list(one.indices)
     for index in indices:
-        yield (index, *(_value(scale, scale.values.get(index), notes) for scale in one.scales))
-    yield ("first of two", *(_value(scale, scale.first, notes) for scale in one.scales))
+        yield (index, *(_value(scale, scale.values.get(index)) for scale in one.scales))
+    yield ("first of two", *(_value(scale, scale.first) for scale in one.scales))
 
 
-def _value(scale: PairedScale, interval: IntervalEstimate | None, notes: Notes) -> Cell:
+def _value(scale: PairedScale, interval: IntervalEstimate | None) -> Cell:
     if interval is None:
-        return notes.number(None, str, scale.reason or "this surface was not chosen between")
-    return notes.estimate(interval.value, places(2), None, interval.ends, scale.interval_reason or None)
+        return number_cell(None, str, scale.reason or "this surface was not chosen between")
+    return estimate_cell(interval.value, places(2), None, interval.ends, scale.interval_reason or None)
 
 
 def scale_sentences(one: DescriptorFindings) -> list[str]:
@@ -108,14 +106,13 @@ Judged = tuple[str, Mapping[str, Psychometric], Means]  # what was judged, each 
 
 def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
     """Return PSE, JND, lapses, order and scatter of each subject, under the name of what was judged."""
-    notes = Notes()
     groups = [
-        (name, (*(_row(who, one, notes) for who, one in functions.items()), *_mean_row(means, notes)))
+        (name, (*(_row(who, one) for who, one in functions.items()), *_mean_row(means)))
         for name, functions, means in judgements
         if functions
     ]
     columns = "subject | answers | PSE [times µ] | JND [% of µ] | lapses [%] | order [% of µ] | correlation of answers"
-    return table("table-psychometric", caption("psychometric"), columns, groups, notes)
+    return table("table-psychometric", caption("psychometric"), columns, groups)
 
 
 def session_functions(report: Report) -> list[Judged]:
@@ -188,26 +185,26 @@ def _mean_percent(log_difference: float) -> float:
     return _percent(math.exp(log_difference))
 
 
-def _mean_row(means: Means, notes: Notes) -> Iterable[Row]:
+def _mean_row(means: Means) -> Iterable[Row]:
     pse, jnd = means
     if pse is None or jnd is None or pse.n < LEAST_OF_A_MEAN:
         return
     cells: list[Cell] = []
     for mean, unit, after in ((pse, math.exp, 2), (jnd, _mean_percent, 0)):
         ends = None if mean.low is None or mean.high is None else (unit(mean.low), unit(mean.high))
-        cells.append(notes.estimate(unit(mean.mean), places(after), None, ends, "it takes two subjects"))
+        cells.append(estimate_cell(unit(mean.mean), places(after), None, ends, "it takes two subjects"))
     yield ("geometric mean", f"of {pse.n} and {jnd.n}", *cells, NONE, NONE, NONE)
 
 
-def _row(who: str, one: Psychometric, notes: Notes) -> Row:
+def _row(who: str, one: Psychometric) -> Row:
     return (
         who,
         one.answers,
-        _cell(one.pse, one, math.exp, 2, notes),
-        _cell(one.jnd, one, _percent, 0, notes),
-        _cell(one.lapse, one, lambda share: 100.0 * share, 1, notes),
-        _cell(one.order, one, _percent, 1, notes),
-        _cell(one.correlation, one, float, 2, notes, "answers to a pair are single, or all one way"),
+        _cell(one.pse, one, math.exp, 2),
+        _cell(one.jnd, one, _percent, 0),
+        _cell(one.lapse, one, lambda share: 100.0 * share, 1),
+        _cell(one.order, one, _percent, 1),
+        _cell(one.correlation, one, float, 2, "answers to a pair are single, or all one way"),
     )
 
 
@@ -216,13 +213,12 @@ def _cell(
     one: Psychometric,
     unit: Callable[[float], float],
     after: int,
-    notes: Notes,
     missing: str = "orders are not known",
 ) -> Cell:
     if profile is None:
-        return notes.number(None, str, one.reason or missing)
+        return number_cell(None, str, one.reason or missing)
     ends = None if profile.ends is None else (unit(profile.ends[0]), unit(profile.ends[1]))
     sides = [f"above {digits(unit(profile.low), after)}"] if profile.low is not None else []
     sides += [f"below {digits(unit(profile.high), after)}"] if profile.high is not None else []
     without = f"within what was compared the answers bound it {' and '.join(sides) or 'on neither side'}"
-    return notes.estimate(unit(profile.value), places(after), None, ends, without)
+    return estimate_cell(unit(profile.value), places(after), None, ends, without)

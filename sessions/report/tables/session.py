@@ -7,11 +7,13 @@ from sessions.prediction import BY_NAME
 from sessions.report.contents import GroundTruth, Report, StrokeFinding
 from sessions.report.tables import (
     Cell,
-    Notes,
     Row,
     Rows,
     Table,
+    estimate_cell,
     group_by_experiment,
+    number_cell,
+    range_cell,
     sections_of,
     table,
 )
@@ -53,79 +55,74 @@ _OF_DECISION = {"onset": "onset", "break_away": "stick", "slide_onset": "slide_o
 
 def stroke_table(report: Report) -> Table | None:
     """Return the strokes with their friction, speed and flaws, each number over its interval."""
-    notes = Notes()
     columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
 
     def row(stroke: StrokeFinding) -> Row:
-        cell = partial(_estimate, notes, stroke)
+        cell = partial(_estimate, stroke)
         return (
             cell("mu_static", places(3)),
             cell("mu_dynamic", places(3)),
             cell("mu_max", places(3)),
             cell("tau_max", tau, unit=1e3),
             cell("speed", places(1)),
-            notes.number(stroke.direction, lambda v: "p → d" if v > 0 else "d → p", stroke.reasons.get("direction")),
+            number_cell(stroke.direction, lambda v: "p → d" if v > 0 else "d → p", stroke.reasons.get("direction")),
             ", ".join(name.replace("_", " ") for name in stroke.flaws) or "none",
         )
 
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
-    return _table(report, "table-strokes", caption("session-strokes", kind=kind), columns, row, notes)
+    return _table(report, "table-strokes", caption("session-strokes", kind=kind), columns, row)
 
 
 def course_table(report: Report) -> Table | None:
     """Return each stroke's forces, direction and instants, each over its bootstrap interval."""
     if not any(stroke.bootstrap for stroke in report.strokes):
         return None
-    notes = Notes()
     columns = (
         "normal force [N] | tangential force [N] | heading [°] | agree [1] | "
         "onset [s] | break-away [s] | slide onset [s]"
     )
 
     def row(stroke: StrokeFinding) -> Row:
-        cell = partial(_estimate, notes, stroke)
+        cell = partial(_estimate, stroke)
         why = stroke.reasons.get("direction") or _TOO_SHORT
         return (
             cell("normal_force", places(2)),
             cell("tangential_force", places(2)),
             cell("heading", places(1)),
-            notes.number(stroke.direction_agrees, places(3), why),
+            number_cell(stroke.direction_agrees, places(3), why),
             cell("onset", places(3)),
             cell("break_away", places(3)),
             cell("slide_onset", places(3)),
         )
 
     kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
-    return _table(report, "table-courses", caption("session-courses", kinds=kinds), columns, row, notes)
+    return _table(report, "table-courses", caption("session-courses", kinds=kinds), columns, row)
 
 
-def _table(
-    report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row], notes: Notes
-) -> Table | None:
+def _table(report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row]) -> Table | None:
     """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
     planned = any(stroke.trial is not None for stroke in report.strokes)
 
     def name_row(stroke: StrokeFinding) -> Row:
         if not planned:
             return (stroke.number, *row(stroke))
-        cell = partial(notes.number, shown=places(0), reason="no trial asks for it")
+        cell = partial(number_cell, shown=places(0), reason="no trial asks for it")
         coded = stroke.index is None and stroke.code
         return (stroke.number, cell(stroke.trial), stroke.code if coded else cell(stroke.index), *row(stroke))
 
     groups = group_by_experiment(report, report.strokes, lambda s: s.experiment, name_row)
-    return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
+    return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups)
 
 
-def _estimate(notes: Notes, stroke: StrokeFinding, name: str, shown: Format, unit: float = 1.0) -> Cell:
+def _estimate(stroke: StrokeFinding, name: str, shown: Format, unit: float = 1.0) -> Cell:
     """Return one number of a stroke over its bootstrap interval, or why it has none."""
     without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, _TOO_SHORT)
     why = stroke.reasons.get(name) or _MISSING.get(name)
-    return notes.estimate(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, unit=unit)
+    return estimate_cell(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, unit=unit)
 
 
 def planted_table(report: Report) -> Table | None:
     """Return the simulator's ground truth beside the numbers of the analysis."""
-    notes = Notes()
     # Of several strokes in a trial the model gets the first.
     strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     predictions = {prediction.trial: prediction for prediction in report.predictions}
@@ -147,58 +144,55 @@ def planted_table(report: Report) -> Table | None:
         for name, truth, value, shown, unit in quantities:
             reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
             ends = stroke.bootstrap.get(name) if stroke else None
-            cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
+            cell = estimate_cell(value, shown, reason, ends, _TOO_SHORT, unit=unit)
             off = None if value is None else 100 * (value / truth - 1)
-            cells += [shown(truth), cell, notes.number(off, with_sign, reason)]
+            cells += [shown(truth), cell, number_cell(off, with_sign, reason)]
         right = stroke is not None and stroke.direction == p.direction
         cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
 
     names = {trial: one.experiment for trial, one in {**predictions, **strokes_by_trial}.items()}
     groups = group_by_experiment(report, report.planted, lambda p: names.get(p.trial, ""), row)
-    return table("table-planted", caption("session-planted"), columns, groups, notes)
+    return table("table-planted", caption("session-planted"), columns, groups)
 
 
 def score_table(report: Report) -> Table | None:
     """Return mean scores with their intervals."""
-    notes = Notes()
-    groups = [(e.name, [score_cells(m, notes) for m in e.scores]) for e in report.experiments]
+    groups = [(e.name, [score_cells(m) for m in e.scores]) for e in report.experiments]
     columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
-    return table("table-scores", caption("session-scores"), columns, groups, notes)
+    return table("table-scores", caption("session-scores"), columns, groups)
 
 
-def score_cells(mean: MeanScore, notes: Notes) -> Row:
+def score_cells(mean: MeanScore) -> Row:
     """Return index, subjects, mean score, its interval and standard deviation; of a session as of a study."""
-    interval = notes.interval(mean.low, mean.high, places(1), mean.reason)
-    sd = spread_cell(mean.sd, mean.n, places(1), mean.reason, notes)
+    interval = range_cell(mean.low, mean.high, places(1), mean.reason)
+    sd = spread_cell(mean.sd, mean.n, places(1), mean.reason)
     return mean.index, mean.n, digits(mean.mean, 1), interval, sd
 
 
-def spread_cell(sd: float | None, n: int, shown: Format, reason: str | None, notes: Notes) -> Cell:
+def spread_cell(sd: float | None, n: int, shown: Format, reason: str | None) -> Cell:
     """Return the standard deviation of n values over its interval."""
-    return notes.estimate(sd, shown, reason, sd_interval(sd, n) if sd else None, "all are alike")
+    return estimate_cell(sd, shown, reason, sd_interval(sd, n) if sd else None, "all are alike")
 
 
 def answer_tables(report: Report) -> tuple[Table | None, ...]:
     """Return every subject's scores, a table an experiment."""
     tables: list[Table | None] = []
     for e in report.experiments:
-        notes = Notes()
-        rows = [(who, *(notes.number(s, places(1), "no score") for s in own)) for who, own in e.answers.items()]
+        rows = [(who, *(number_cell(s, places(1), "no score") for s in own)) for who, own in e.answers.items()]
         columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
         caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
-        tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)], notes))
+        tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)]))
     return tuple(tables)
 
 
 def relation_table(report: Report) -> Table | None:
     """Return how the predicted quantity goes with mean scores and with the indices."""
     shown = shown_response(report.response)
-    notes = Notes()
     groups: list[Rows] = []
     for e in report.experiments:
         related = (("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation))
-        groups.append((e.name, [_relation_row(name, r, notes) for name, r in related if r is not None]))
+        groups.append((e.name, [_relation_row(name, r) for name, r in related if r is not None]))
     columns = (
         f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
         f"exact p of rho | slope [{shown.step} a point] | r without one"
@@ -207,28 +201,28 @@ def relation_table(report: Report) -> Table | None:
     own = "The forces are those of one subject, whose scores are the own ones. " if any_own else ""
     scores = "scores and to " if report.scored else ""
     words = caption("session-relation", label=shown.label, model=report.model, scores=scores, own=own)
-    return table("table-relation", words, columns, groups, notes)
+    return table("table-relation", words, columns, groups)
 
 
-def rank_interval(related: Relation, notes: Notes) -> Cell:
+def rank_interval(related: Relation) -> Cell:
     """Return the interval of Spearman's rho, or why it has none."""
     alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
     why = alike if related.spearman is not None else related.reason
-    return notes.interval(related.spearman_low, related.spearman_high, correlation, why)
+    return range_cell(related.spearman_low, related.spearman_high, correlation, why)
 
 
-def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
+def _relation_row(name: str, related: Relation) -> Row:
     without = [(label, NONE if r is None else correlation(r)) for label, r in related.without]
     no_slope = "no line has one through two points, or through points wholly on it"
     return (
         name,
         related.n,
-        notes.number(related.pearson, correlation, related.reason),
-        notes.interval(related.low, related.high, correlation, related.reason),
-        notes.number(related.spearman, correlation, related.reason),
-        rank_interval(related, notes),
-        notes.number(related.spearman_p, p_value, related.reason or "too many orders to count"),
-        notes.estimate(
+        number_cell(related.pearson, correlation, related.reason),
+        range_cell(related.low, related.high, correlation, related.reason),
+        number_cell(related.spearman, correlation, related.reason),
+        rank_interval(related),
+        number_cell(related.spearman_p, p_value, related.reason or "too many orders to count"),
+        estimate_cell(
             related.slope,
             lambda v: significant(1e6 * v, 3),
             related.reason,

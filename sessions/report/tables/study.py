@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
-from sessions.report.tables import Cell, Notes, Row, Table, range_cell, sections_of, table
+from sessions.report.tables import Cell, Row, Table, number_cell, range_cell, sections_of, table
 from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
@@ -76,15 +76,14 @@ def _visit_row(visit: Visit, study: StudyFindings) -> Row:
 
 
 def _scores(study: StudyFindings) -> Table | None:
-    notes = Notes()
 
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         within = {mean.index: mean for mean in one.within}
         for mean in one.scores:
             inner = within.get(mean.index)
-            *cells, spread = score_cells(mean, notes)
+            *cells, spread = score_cells(mean)
             low, high = (None, None) if inner is None else (inner.low, inner.high)
-            yield (*cells, notes.interval(low, high, places(1), _NOT_WITHIN), spread)
+            yield (*cells, range_cell(low, high, places(1), _NOT_WITHIN), spread)
 
     columns = (
         "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | "
@@ -92,7 +91,7 @@ def _scores(study: StudyFindings) -> Table | None:
     )
     complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
     words = caption("study-scores", complete=complete or "none")
-    return _table(study, "table-scores", words, columns, rows, notes)
+    return _table(study, "table-scores", words, columns, rows)
 
 
 def _agreement(study: StudyFindings) -> Table | None:
@@ -106,19 +105,18 @@ def _agreement(study: StudyFindings) -> Table | None:
 
 
 def _normalised_scores(study: StudyFindings) -> Table | None:
-    notes = Notes()
 
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
             plain = raw[index]
-            ends = notes.interval(plain.low, plain.high, places(1), plain.reason)
-            yield (index, plain.n, digits(plain.mean, 1), ends, mean.n, *_mean(mean, places(2), notes))
+            ends = range_cell(plain.low, plain.high, places(1), plain.reason)
+            yield (index, plain.n, digits(plain.mean, 1), ends, mean.n, *_mean(mean, places(2)))
 
     columns = (
         "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
     )
-    return _table(study, "table-normalised", caption("study-normalised"), columns, rows, notes)
+    return _table(study, "table-normalised", caption("study-normalised"), columns, rows)
 
 
 def _differences(study: StudyFindings) -> Table | None:
@@ -133,7 +131,6 @@ def _differences(study: StudyFindings) -> Table | None:
 
 
 def _estimates(study: StudyFindings) -> Table | None:
-    notes = Notes()
 
     def from_log(log: float) -> str:
         return three_figures(math.exp(log))
@@ -143,21 +140,20 @@ def _estimates(study: StudyFindings) -> Table | None:
             return
         for index, geometric in one.estimates.geometric.items():
             means = (geometric, one.estimates.equal_moduli[index])
-            yield (index, geometric.n, *(cell for mean in means for cell in _mean(mean, from_log, notes)))
+            yield (index, geometric.n, *(cell for mean in means for cell in _mean(mean, from_log)))
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]
     left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
-    return _table(study, "table-estimates", caption("study-estimates", left=left), columns, rows, notes)
+    return _table(study, "table-estimates", caption("study-estimates", left=left), columns, rows)
 
 
 def _surfaces(study: StudyFindings) -> Table | None:
-    notes = Notes()
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces if any(s.subjects for s in one.surfaces) else ():
-            cells = (*_mean(s.mu, places(3), notes), *_mean(s.response, written, notes))
-            yield (s.index, s.subjects, *cells, _spread(s.response, shown.factor, notes))
+            cells = (*_mean(s.mu, places(3)), *_mean(s.response, written))
+            yield (s.index, s.subjects, *cells, _spread(s.response, shown.factor))
 
     def written(response: float) -> str:
         return digits(shown.factor * response, shown.places)
@@ -169,30 +165,29 @@ def _surfaces(study: StudyFindings) -> Table | None:
         f"standard deviation [{unit}]"
     )
     words = caption("study-surfaces", label=shown.label, model=study_model(study))
-    return _table(study, "table-surfaces", words, columns, row, notes)
+    return _table(study, "table-surfaces", words, columns, row)
 
 
-def _spread(mean: Average | None, factor: float, notes: Notes) -> Cell:
+def _spread(mean: Average | None, factor: float) -> Cell:
     if mean is None:
-        return notes.number(None, str, _NO_STROKE)
+        return number_cell(None, str, _NO_STROKE)
     sd = None if mean.sd is None else factor * mean.sd
-    return spread_cell(sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread", notes)
+    return spread_cell(sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread")
 
 
 def _forces(study: StudyFindings) -> Table | None:
-    notes = Notes()
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces:
             if s.normal_force is not None or s.model_normal_force is not None:
                 numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
-                yield (s.index, s.subjects, *(cell for number in numbers for cell in _mean(number, places(2), notes)))
+                yield (s.index, s.subjects, *(cell for number in numbers for cell in _mean(number, places(2))))
 
     columns = (
         "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
         "depth to match [mm] | 95 % interval [mm]"
     )
-    return _table(study, "table-forces", caption("study-forces", model=study_model(study)), columns, row, notes)
+    return _table(study, "table-forces", caption("study-forces", model=study_model(study)), columns, row)
 
 
 _NOT_WITHIN = "no interval: no two subjects scored every surface, or they differ alike between surfaces"
@@ -200,29 +195,28 @@ _NOT_OF_PEOPLE = "no interval of two subjects, of some who are all alike, or of 
 _NO_STROKE = "no subject's stroke gives this number"
 
 
-def _mean(mean: Average | None, shown: Callable[[float], str], notes: Notes) -> Row:
+def _mean(mean: Average | None, shown: Callable[[float], str]) -> Row:
     """Return a mean and its interval, or dashes with the reason."""
     if mean is None:
-        return (notes.number(None, str, _NO_STROKE),) * 2
-    return shown(mean.mean), notes.interval(mean.low, mean.high, shown, no_interval(mean))
+        return (number_cell(None, str, _NO_STROKE),) * 2
+    return shown(mean.mean), range_cell(mean.low, mean.high, shown, no_interval(mean))
 
 
 def _relation(study: StudyFindings) -> Table | None:
-    notes = Notes()
 
     def rows(one: DescriptorFindings) -> tuple[Row, ...]:
         estimated = None if one.estimates is None else one.estimates.repeated
         return (
-            *_of_means("means", one.mean_relation, notes),
-            *_of_means("means, standardised", one.normalised.mean_relation, notes),
-            *_within_subjects("within subjects", one.repeated, notes, one.repeated_holm, one.without_subject),
-            *_within_subjects("within, standardised", one.normalised.repeated, notes),
-            *_within_subjects("within, log estimates", estimated, notes),
+            *_of_means("means", one.mean_relation),
+            *_of_means("means, standardised", one.normalised.mean_relation),
+            *_within_subjects("within subjects", one.repeated, one.repeated_holm, one.without_subject),
+            *_within_subjects("within, standardised", one.normalised.repeated),
+            *_within_subjects("within, log estimates", estimated),
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
     words = caption("study-relation", label=BY_NAME[study.response].label, model=study_model(study))
-    return _table(study, "table-relation", words, columns, rows, notes)
+    return _table(study, "table-relation", words, columns, rows)
 
 
 def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
@@ -235,15 +229,15 @@ def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
     return rivals_table(compared, label, model), responses_table(compared, label, model)
 
 
-def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:
+def _of_means(name: str, related: Relation | None) -> Iterable[Row]:
     if related is not None and related.pearson is not None:
         yield (
             name,
             f"{related.n} surfaces",
             correlation(related.pearson),
-            notes.interval(related.low, related.high, correlation, related.reason),
+            range_cell(related.low, related.high, correlation, related.reason),
             _or_dash(related.spearman, correlation),
-            rank_interval(related, notes),
+            rank_interval(related),
             _or_dash(related.spearman_p, p_value),
             NONE,
             _without([(f"index {label}", r) for label, r in related.without if r is not None]),
@@ -253,7 +247,6 @@ def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row
 def _within_subjects(
     name: str,
     repeated: RepeatedCorrelation | None,
-    notes: Notes,
     adjusted: float | None = None,
     without: Sequence[tuple[str, float]] = (),
 ) -> Iterable[Row]:
@@ -262,7 +255,7 @@ def _within_subjects(
             name,
             f"{repeated.dof} d.f.",
             correlation(repeated.r),
-            notes.interval(*(repeated.people or (None, None)), correlation, _NOT_OF_PEOPLE),
+            range_cell(*(repeated.people or (None, None)), correlation, _NOT_OF_PEOPLE),
             NONE,
             NONE,
             _or_dash(repeated.people_p, p_value),
@@ -282,8 +275,6 @@ def _without(left_out: Sequence[tuple[str, float]]) -> str:
     return ", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest))
 
 
-def _table(
-    study: StudyFindings, name: str, words: str, columns: str, rows: RowsOf, notes: Notes | None = None
-) -> Table | None:
+def _table(study: StudyFindings, name: str, words: str, columns: str, rows: RowsOf) -> Table | None:
     """Return a table with the rows of each descriptor under its name."""
-    return table(name, words, columns, ((one.descriptor, rows(one)) for one in study.descriptors), notes)
+    return table(name, words, columns, ((one.descriptor, rows(one)) for one in study.descriptors))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from itertools import combinations
 
 from sessions.prediction import BY_NAME, Quantity
-from sessions.report.tables import Cell, Notes, Row, Table, range_cell, table
+from sessions.report.tables import Cell, Row, Table, estimate_cell, number_cell, range_cell, table
 from sessions.report.trials import model_in_short
 from sessions.report.wording import NONE, caption, digits, p_value, places, plural, sed, significant, tau, three_figures
 from sessions.statistics.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
@@ -133,7 +133,6 @@ def trials_table(study: StudyFindings) -> Table | None:
     """Return every trial with what was scored, measured and predicted; None where they are too many for a page."""
     if sum(len(visit.rows) for visit in study.visits) > MOST:
         return None
-    notes = Notes()
     columns = (
         "trial | index | score [0–100] | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
         "estimated error [%] | flaws"
@@ -141,7 +140,7 @@ def trials_table(study: StudyFindings) -> Table | None:
     groups = [
         (
             f"{visit.session}, {descriptor}{_exclusion_note(study, visit, descriptor)}",
-            [_row(row, notes) for row in visit.rows if row.descriptor == descriptor],
+            [_row(row) for row in visit.rows if row.descriptor == descriptor],
         )
         for visit in study.visits
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
@@ -149,7 +148,7 @@ def trials_table(study: StudyFindings) -> Table | None:
     known = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
     calibrations = f" (calibration: {'; '.join(known)})" if known else ""
     words = caption("study-trials", calibrations=calibrations, model=study_model(study))
-    return table("table-trials", words, columns, groups, notes)
+    return table("table-trials", words, columns, groups)
 
 
 def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
@@ -160,23 +159,23 @@ def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     )
 
 
-def _row(row: TrialRow, notes: Notes) -> Row:
+def _row(row: TrialRow) -> Row:
     answer = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
 
     def estimate(name: str, shown: Callable[[float], str], unit: float = 1.0, without: str = _FEW) -> Cell:
         interval = bounds(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
-        return notes.estimate(getattr(row, name), shown, why, interval, without, unit=unit)
+        return estimate_cell(getattr(row, name), shown, why, interval, without, unit=unit)
 
     return (
         row.trial,
         row.index,
-        notes.number(answer, places(1), f"no score: {row.outcome}"),
+        number_cell(answer, places(1), f"no score: {row.outcome}"),
         estimate("mu", places(3)),
         estimate("tau_max", tau, 1e3),
         estimate("normal_force", places(2)),
         estimate("speed", places(1)),
         estimate("sed", sed, 1e3, row.sed_interval),
-        notes.number(row.error_estimate, lambda v: significant(100 * v, 2), why),
+        number_cell(row.error_estimate, lambda v: significant(100 * v, 2), why),
         ", ".join(flaw.replace("_", " ") for flaw in row.flaws) or "none",
     )
