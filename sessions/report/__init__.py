@@ -6,34 +6,26 @@ from pathlib import Path
 
 import numpy as np
 
-from sessions.plan.plan import Block, SessionPlan
+from sessions.plan.plan import SessionPlan
 from sessions.prediction import BY_NAME, SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
-from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.stored import model_facts
 from sessions.prediction.surface_series import other_signs
 from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
-from sessions.report.contents import (
-    Experiment,
-    Fact,
-    GroundTruth,
-    PredictionFinding,
-    Report,
-    StrokeFinding,
-    same_fields,
-)
+from sessions.report.contents import Experiment, Fact, GroundTruth, Report, same_fields
 from sessions.report.facts import scene_file, session_commands
 from sessions.report.trials import course, fields, flaws, model_in_short, omissions, predictions, strokes
 from sessions.report.wording import full_stop
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
-from sessions.statistics.psychometric import Psychometric, function_of
-from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, NAMES, RESPONSES, rivals_of_means
+from sessions.statistics.pooled import rival_values, subject_function
+from sessions.statistics.rivals import NAMES, rivals_of_means
 from sessions.statistics.scores import ScoreTable, by_key, distinct_sessions, mean_scores, score_matrix, score_table
+from sessions.statistics.visit import TrialRow, Visit, visit_from
 from sessions.strokes import Analysis
-from sessions.strokes.stroke import FIXED, AreaLaw, rule_for
+from sessions.strokes.stroke import FIXED, AreaLaw
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +57,10 @@ def findings(
     plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
     more = further or Further()
     alone = numbers_alone(recording, analysis, prediction, more)
-    stroke_findings, predicted = alone.strokes, alone.predictions
     head = _head(recording, tables)
     other_sessions = [Path(table.session).name for table in tables[1:]]
-    numbers = quantities(predicted, stroke_findings)
-    judged = experiments(plan, tables, numbers, more.paths, analysis.settings.area, more.response)
+    visit = visit_from(recording, analysis, prediction, more.paths or {}, {})
+    scored = any(table.scores for table in tables)
     return replace(
         alone,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
@@ -80,15 +71,15 @@ def findings(
         apparatus=facts.apparatus(recording, analysis),
         excluded=(
             *map(full_stop, more.unreadable),
-            *facts.exclusion_sentences(recording, analysis, stroke_findings, tables),
+            *facts.exclusion_sentences(recording, analysis, alone.strokes, tables),
         ),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
-        experiments=with_psychometric(judged, recording, analysis),
+        experiments=experiments(plan, tables, visit, analysis.settings.area, more.response),
         course=course(recording),
         fields=fields(prediction),
         planted=tuple(planted or ()),
-        sealed=_seal_sentence(recording, tables, predicted),
+        sealed=visit.sealed if scored and alone.predictions else "",
         modelled=tuple(Fact(*fact) for fact in model_facts(prediction)),
         left_out=omissions(prediction),
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
@@ -120,12 +111,6 @@ def numbers_alone(
     )
 
 
-def _seal_sentence(recording: Recording, tables: Sequence[ScoreTable], predicted: Sequence[PredictionFinding]) -> str:
-    if not predicted or not any(table.scores for table in tables):
-        return ""
-    return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in predicted])
-
-
 def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:
     """Return the first line of everything made of this session when any of it was simulated, else ""."""
     if recording.simulated_sentence is not None:
@@ -135,92 +120,33 @@ def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:
     return f"SIMULATED: {simulated} of the sessions whose scores are used here {are} simulated" if simulated else ""
 
 
-Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` -> block and index -> number
-
-
-def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[StrokeFinding]) -> Quantities:
-    """Return each quantity by block and index, the mean over repetitions: the model's, and of the strokes it got."""
-    by_number = {stroke.number: stroke for stroke in strokes}
-
-    def numbers(one: PredictionFinding) -> dict[str, float | None]:
-        stroke = by_number.get(one.stroke or 0)
-        own = {name: getattr(one if name == MODEL_MU else stroke, FIELDS[name], None) for name in FIELDS}
-        responses = {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
-        return own | responses | {MODEL: one.sed}
-
-    rows = [(one.experiment, one.index, numbers(one)) for one in predictions if one.index is not None]
-
-    def means(name: str) -> dict[tuple[str, int], float]:
-        values = by_key(((block, i), value) for block, i, own in rows if (value := own.get(name)) is not None)
-        return {key: float(np.mean(repetitions)) for key, repetitions in values.items()}
-
-    return {name: means(name) for name in NAMES}
-
-
-def with_psychometric(
-    experiments: Sequence[Experiment], recording: Recording, analysis: Analysis
-) -> tuple[Experiment, ...]:
-    """Return the experiments, those of blocks with a standard with the subject's psychometric function."""
-    blocks = {block.name: block for block in recording.plan.blocks if block.standard is not None}
-    return tuple(
-        replace(one, psychometric=_psychometric(blocks[one.name], recording, analysis)) if one.name in blocks else one
-        for one in experiments
-    )
-
-
-def _psychometric(block: Block, recording: Recording, analysis: Analysis) -> Psychometric:
-    index = {trial.number: trial.stimulus.known_index for trial in block.trials}
-    standard = next(index[trial.number] for trial in block.trials if trial.standard)
-    friction = by_key(
-        (("", index[one.trial]), one.mu)
-        for one in analysis.friction
-        if one.trial in index and one.mu is not None and one.mu > 0.0
-    )
-    answers = [
-        ("", standard, (index[first], index[record.trial.number]), record.choice)
-        for record in recording.trials
-        if record.choice is not None and record.trial.number in index
-        for first in [record.trial.compared_with]
-        if first is not None
-    ]
-    return function_of(answers, friction)
-
-
 def experiments(
     plan: SessionPlan,
     tables: Sequence[ScoreTable],
-    numbers: Quantities,
-    paths: Mapping[int, Values] | None = None,
+    visit: Visit,
     law: AreaLaw = FIXED,
     response: str = SED.name,
 ) -> tuple[Experiment, ...]:
-    """Return one experiment a block; `numbers` are the `quantities` of its surfaces.
+    """Return one experiment a block; `visit` holds its trials with what was measured and predicted.
 
-    `response` names the quantity of the model that is held against scores and rivals. `paths` holds that of each
-    trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
-    number was given.
+    `response` names the quantity of the model that is held against scores and rivals, and that the paths of the visit
+    hold. `law` gives the contact area of every number but theirs.
     """
     label = BY_NAME[response].label
     judged: list[Experiment] = []
     for block in plan.blocks:
         if block.phase != "main":
             continue
-        descriptor = block.trials[0].stimulus.descriptor
-        indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
+        trials = [row for row in visit.rows if row.block == block.name]
+        descriptor = trials[0].descriptor
+        indices = tuple(sorted({row.index for row in trials}))
         means = tuple(one for one in mean_scores(tables) if one.descriptor == descriptor and one.index in indices)
         score_of = {mean.index: mean.mean for mean in means}
         rows = score_matrix(tables, descriptor)
         own = {i: score for i, score in rows.get(plan.subject, {}).items() if len(rows) > 1 and i in indices}
-        series = {
-            name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
-            for name, values in numbers.items()
-        }
+        series = _surface_series(trials)
         predicted = series.get(label, {})
-        along = [
-            PathTrial("", index, score_of.get(index), rule_for(trial), (paths or {}).get(trial.number, ()))
-            for trial in block.trials
-            for index in [trial.stimulus.known_index]
-        ]
+        along = [PathTrial("", row.index, score_of.get(row.index), row.rule, row.paths) for row in trials]
         judged.append(
             Experiment(
                 **same_fields(block, Experiment),
@@ -235,9 +161,19 @@ def experiments(
                 rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
                 response=response,
                 paths=path_findings(along, "small", law, within=False),
+                psychometric=subject_function([(visit, row) for row in trials]) if block.standard else None,
             )
         )
     return tuple(judged)
+
+
+def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
+    """Return the mean over repetitions of each quantity of the surfaces, by its name in `rivals.NAMES` and by index."""
+    values = by_key((name, (row.index, value)) for row in trials for name, value in rival_values(row).items())
+    return {
+        name: {index: float(np.mean(repeats)) for index, repeats in sorted(by_key(values.get(name, [])).items())}
+        for name in NAMES
+    }
 
 
 def _relation(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:

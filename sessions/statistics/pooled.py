@@ -27,7 +27,7 @@ from sessions.statistics.findings import (
 )
 from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spreads
 from sessions.statistics.multiverse import PathTrial, path_findings
-from sessions.statistics.psychometric import function_of
+from sessions.statistics.psychometric import Psychometric, function_of
 from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
 from sessions.statistics.scales import (
     MODELS,
@@ -131,7 +131,7 @@ def _descriptor(
     pairs = choices(trials)
     scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
     compared = constant_stimuli(trials)
-    competing = [_rival_trial(subject, row, score) for subject, row, _, score in points]
+    competing = [RivalTrial(subject, row.index, score, rival_values(row)) for subject, row, _, score in points]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -170,10 +170,11 @@ def _descriptor(
     )
 
 
-def _rival_trial(subject: str, row: TrialRow, score: float) -> RivalTrial:
+def rival_values(row: TrialRow) -> dict[str, float]:
+    """Return the quantities of a trial that may go with its score, by their names in `rivals.NAMES`."""
     numbers = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
     numbers |= {label: row.response(name) for label, name in RESPONSES.items()}
-    return RivalTrial(subject, row.index, score, {name: value for name, value in numbers.items() if value is not None})
+    return {name: value for name, value in numbers.items() if value is not None}
 
 
 def response_term(quantity: Quantity) -> str:
@@ -314,19 +315,25 @@ def choices(trials: Trials) -> list[Choice]:
 
 def constant_stimuli(trials: Trials) -> ConstantStimuli | None:
     """Return the psychometric function of each subject who compared with a standard; None where nobody did."""
-    standards = [(visit, row) for visit, row in trials if row.standard is not None]
-    friction = by_key(((v.session, row.index), row.mu) for v, row in standards if row.mu is not None and row.mu > 0.0)
-    answers = by_key(
-        (v.subject, (v.session, row.standard, (row.before, row.index), row.choice))
-        for v, row in standards
-        if row.standard is not None and row.choice is not None and row.before is not None
-    )
-    if not answers:
+    compared = by_key((visit.subject, (visit, row)) for visit, row in trials if row.standard is not None)
+    answered = {subject: own for subject, own in sorted(compared.items()) if any(row.choice for _, row in own)}
+    if not answered:
         return None
-    functions = {subject: function_of(own, friction) for subject, own in sorted(answers.items())}
+    functions = {subject: subject_function(own) for subject, own in answered.items()}
     pse = [one.pse.value for one in functions.values() if one.pse is not None]
     jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
     return ConstantStimuli(functions, average(pse), average(jnd))
+
+
+def subject_function(trials: Trials) -> Psychometric:
+    """Return the psychometric function of one subject's trials with a standard."""
+    friction = by_key(((v.session, row.index), row.mu) for v, row in trials if row.mu is not None and row.mu > 0.0)
+    answers = [
+        (v.session, row.standard, (row.before, row.index), row.choice)
+        for v, row in trials
+        if row.standard is not None and row.choice is not None and row.before is not None
+    ]
+    return function_of(answers, friction)
 
 
 def latent_scales(

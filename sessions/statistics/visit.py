@@ -177,27 +177,41 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     along: Mapping[int, Values] = {}
     if options.paths != "none" and prediction is not None:
         along = trial_paths(known, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])
-    records = {record.trial.number: record for record in known.trials}
+    return visit_from(known, analysis, prediction, along, made_by)
+
+
+def visit_from(
+    recording: Recording,
+    analysis: Analysis,
+    prediction: SessionPrediction | None,
+    along: Mapping[int, Values],
+    made_by: Mapping[str, str],
+) -> Visit:
+    """Return what an analysed session says of its trials; `along` holds a quantity of each along many paths.
+
+    Raises Blinded while the stimuli's key is sealed.
+    """
+    records = {record.trial.number: record for record in recording.trials}
     rows = tuple(
         replace(_row(block, place, records[trial.number], analysis, prediction), paths=along.get(trial.number, ()))
-        for block in known.plan.blocks
+        for block in recording.plan.blocks
         if block.phase == "main"
         for place, trial in enumerate(block.trials)
     )
     numbers = [{name: getattr(row, name) for name in NUMBERS} for row in (prediction.trials if prediction else ())]
-    end = known.end
+    end = recording.end
     return Visit(
-        session=known.folder.name,
-        subject=known.plan.subject,
-        protocol=known.plan.protocol,
-        simulated=known.simulated_sentence or "",
-        forces=known.plan.forces,
+        session=recording.folder.name,
+        subject=recording.plan.subject,
+        protocol=recording.plan.protocol,
+        simulated=recording.simulated_sentence or "",
+        forces=recording.plan.forces,
         complete=end is not None and bool(end.get("complete")),
         rows=rows,
-        losses=(*known.losses, *known.flaws),
+        losses=(*recording.losses, *recording.flaws),
         made_by=dict(made_by),
-        sha256=file_sha256(known.folder / LIVE_FILE),
-        sealed="" if prediction is None else sealed_sentence(known, numbers),
+        sha256=file_sha256(recording.folder / LIVE_FILE),
+        sealed="" if prediction is None else sealed_sentence(recording, numbers),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
         calibration=analysis.bootstrap.calibration,
         model=tuple(fact for fact in model_facts(prediction) if fact[0] != "audits"),

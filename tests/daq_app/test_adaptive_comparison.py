@@ -5,7 +5,7 @@ from functools import partial
 from itertools import product
 
 import pytest
-from test_constant_stimuli import true_friction
+from test_constant_stimuli import stroked_visit
 
 from daq_app.console import Console
 from daq_app.simulation.synthetic import conduct
@@ -18,11 +18,10 @@ from sessions.plan.protocols.protocol import FOLDER
 from sessions.plan.study import StudyError, create_study
 from sessions.recording import Recording
 from sessions.recording.archive import problems
-from sessions.report import experiments, with_psychometric
+from sessions.report import experiments
 from sessions.run.resuming import resumption
 from sessions.run.states import Mounting
 from sessions.statistics.psychometric import QUARTILE
-from sessions.strokes.stroke import FIXED
 from simulators.subject import SimulatedSubject, SubjectSettings
 
 ADAPTIVE = protocol("adaptive-comparison")
@@ -96,8 +95,7 @@ def test_a_session_compares_what_its_answers_ask_for_and_its_recording_says_so(r
 
 
 def test_the_function_of_an_adaptive_session_holds_what_was_planted_in_the_subject(recording):
-    outcomes = experiments(recording.plan, [], {}, None, FIXED)
-    (experiment,) = with_psychometric(outcomes, recording, true_friction(recording, ADAPTIVE.planted_friction))
+    (experiment,) = experiments(recording.plan, [], stroked_visit(recording, ADAPTIVE.planted_friction))
     function, truth = experiment.psychometric, SubjectSettings()
     assert function.answers == 40
     assert function.pse.low < 0.0 < function.pse.high

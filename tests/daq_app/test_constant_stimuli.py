@@ -1,6 +1,7 @@
 """Constant stimuli from protocol to report: simulated people compare, and what was planted in them comes back."""
 
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +12,7 @@ from daq_app.simulation.wiring import SimulatedPeople, planted_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
-from sessions.report import experiments, with_psychometric
+from sessions.report import experiments
 from sessions.report.tables.scales import (
     psychometric_sentences,
     psychometric_table,
@@ -21,7 +22,6 @@ from sessions.report.tables.scales import (
 from sessions.statistics.pooled import constant_stimuli
 from sessions.statistics.psychometric import QUARTILE
 from sessions.statistics.visit import VisitOptions, visit_of
-from sessions.strokes.stroke import FIXED
 from simulators.subject import SimulatedSubject, SubjectSettings
 
 
@@ -34,10 +34,11 @@ def session(folder, seed):
     return Recording.open(folder)
 
 
-def true_friction(recording, planted=()):
-    """Return as an analysis the friction that the simulated bench plants in every stroke."""
-    surfaces = {record.trial.number: planted_surface(record.trial, planted) for record in recording.trials}
-    return SimpleNamespace(friction=[SimpleNamespace(trial=n, mu=surface.mu) for n, surface in surfaces.items()])
+def stroked_visit(recording, planted=()):
+    """Return the visit with the friction that the simulated bench plants in every stroke."""
+    visit = visit_of(recording, VisitOptions(), {})
+    mu = {record.trial.number: planted_surface(record.trial, planted).mu for record in recording.trials}
+    return replace(visit, rows=tuple(replace(row, mu=mu[row.trial]) for row in visit.rows))
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +47,7 @@ def recording(tmp_path_factory):
 
 
 def test_the_function_of_a_session_holds_what_was_planted_in_the_subject(recording):
-    outcomes = experiments(recording.plan, [], {}, None, FIXED)
-    judged = with_psychometric(outcomes, recording, true_friction(recording))
+    judged = experiments(recording.plan, [], stroked_visit(recording))
     truth = SubjectSettings()
     for outcome in judged:
         function = outcome.psychometric
@@ -76,16 +76,9 @@ def test_without_forces_a_study_has_no_function_and_says_why(recording):
 
 def test_a_study_has_the_geometric_means_of_its_subjects(recording, tmp_path):
     trials = []
-    for number, session_recording in enumerate([recording, session(tmp_path / "4", 4), session(tmp_path / "5", 5)]):
-        visit = visit_of(session_recording, VisitOptions(), {})
-        mu = {friction.trial: friction.mu for friction in true_friction(session_recording).friction}
-        visit = SimpleNamespace(session=str(number), subject=visit.subject, rows=visit.rows)
-        for row in visit.rows:
-            if row.descriptor == "stickiness":
-                copy = SimpleNamespace(
-                    index=row.index, before=row.before, choice=row.choice, standard=row.standard, mu=mu[row.trial]
-                )
-                trials.append((visit, copy))
+    for session_recording in (recording, session(tmp_path / "4", 4), session(tmp_path / "5", 5)):
+        visit = stroked_visit(session_recording)
+        trials += [(visit, row) for row in visit.rows if row.descriptor == "stickiness"]
     stimuli = constant_stimuli(trials)
     assert list(stimuli.functions) == ["S03", "S04", "S05"]
     assert stimuli.pse.n == 3
