@@ -14,7 +14,7 @@ from sessions.prediction.surface_series import other_signs
 from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
-from sessions.report.contents import Experiment, Fact, GroundTruth, Report, same_fields
+from sessions.report.contents import Experiment, Fact, GroundTruth, Report
 from sessions.report.facts import scene_file, session_commands
 from sessions.report.trials import course, fields, flaws, model_in_short, omissions, predictions, strokes
 from sessions.report.wording import full_stop
@@ -57,15 +57,13 @@ def findings(
     plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
     more = further or Further()
     alone = numbers_alone(recording, analysis, prediction, more)
-    head = _head(recording, tables)
     other_sessions = [Path(table.session).name for table in tables[1:]]
     visit = visit_from(recording, analysis, prediction, more.paths or {}, {})
     scored = any(table.scores for table in tables)
     return replace(
         alone,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
-        simulated=bool(head),
-        head=head,
+        head=_head(recording, tables),
         versions=tuple(Fact(name, version) for name, version in software_versions().items()),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
@@ -149,8 +147,9 @@ def experiments(
         along = [PathTrial("", row.index, score_of.get(row.index), row.rule, row.paths) for row in trials]
         judged.append(
             Experiment(
-                **same_fields(block, Experiment),
+                name=block.name,
                 descriptor=descriptor,
+                scale_ends=block.scale_ends,
                 indices=indices,
                 scores=means,
                 answers={subject: tuple(map(row.get, indices)) for subject, row in rows.items()},

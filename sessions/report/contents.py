@@ -50,9 +50,6 @@ class Experiment:
 
     name: str
     descriptor: str
-    instruction: str
-    direction: int  # +1 proximal to distal, -1 distal to proximal
-    indentation: float  # of the model [mm]
     scale_ends: tuple[str, str]
     indices: tuple[int, ...]  # of its stimuli, rising
     scores: tuple[MeanScore, ...]
@@ -146,7 +143,6 @@ class Report:
 
     title: str = ""
     session: str
-    simulated: bool = False
     head: str = ""  # first line of whatever is made of a simulated session; "" for a real one
     sealed: str = ""  # whether predictions were sealed before scores
     versions: tuple[Fact, ...] = ()
@@ -175,6 +171,11 @@ class Report:
     scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are shown
     afferent_quantity: str = "sed"  # what it answers to, one of `solver.quantities`
+
+    @property
+    def simulated(self) -> bool:
+        """Whether anything of the session was simulated."""
+        return bool(self.head)
 
     @property
     def scored(self) -> bool:

@@ -63,7 +63,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
     return _page(
         "report.html.jinja",
         plates(report) if drawings is None else drawings,
-        report.head if report.simulated else "",
+        report.head,
         report=report,
         question=question(report),
         summary=summary(report),
@@ -116,8 +116,7 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
     written: list[Path] = []
     for plate in plates(report) if drawings is None else drawings:
         for panel in plate.panels:
-            numbers = panel_csv(panel, report.head if report.simulated else "")
-            for ending, text in ((".svg", panel.svg), (".csv", numbers)):
+            for ending, text in ((".svg", panel.svg), (".csv", panel_csv(panel, report.head))):
                 path = folder / (re.sub(r"[^0-9A-Za-z_-]", "-", panel.name) + ending)  # a name any file system takes
                 swap_in(path, text)
                 written.append(path)

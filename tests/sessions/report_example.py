@@ -68,9 +68,6 @@ def experiment(descriptor, score_tables):
     return Experiment(
         name=descriptor,
         descriptor=descriptor,
-        instruction="Stroke the surface once and say how it feels.",
-        direction=DIRECTION[descriptor],
-        indentation=DEPTH[descriptor],
         scale_ends=("not at all", "as much as I can imagine"),
         indices=tuple(rows),
         scores=means,
@@ -295,7 +292,6 @@ def _contents():
     return {
         "title": "sensotact-friction, subject P01",
         "session": "P01-forces",
-        "simulated": True,
         "head": "SIMULATED: the transducer and the subject of this recording are simulated",
         "sealed": "Predictions were not sealed before the scores were given.",
         "versions": (Fact("daq-app", "0.1.0"), Fact("numpy", "2.4.6")),

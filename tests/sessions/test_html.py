@@ -92,7 +92,7 @@ def test_simulated_is_the_first_thing_a_reader_sees(page_text):
 
 
 def test_a_real_session_says_simulated_nowhere():
-    real = example(simulated=False, head="", predictions=(), fields=(), strokes=example().strokes[:1])
+    real = example(head="", predictions=(), fields=(), strokes=example().strokes[:1])
     assert "SIMULATED" not in page(real)
 
 
@@ -164,7 +164,6 @@ def test_the_correlation_stands_with_its_interval_and_number_of_stimuli(page_tex
 def test_a_report_without_plan_scores_or_predictions_shows_what_it_has():
     strokes = tuple(s for s in example().strokes if s.number < 3)
     small_report = example(
-        simulated=False,
         head="",
         experiments=(),
         strokes=strokes,

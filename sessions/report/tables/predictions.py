@@ -19,6 +19,7 @@ from sessions.report.wording import (
     tau,
     with_error,
 )
+from sessions.statistics.scores import bounds
 
 
 def prediction_table(report: Report) -> Table | None:
@@ -27,7 +28,7 @@ def prediction_table(report: Report) -> Table | None:
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
     def row(p: PredictionFinding) -> Row:
-        stroke = None if p.stroke is None else strokes.get(p.stroke)
+        stroke = strokes.get(p.stroke or 0)  # they are counted from 1
         intervals = {} if stroke is None else stroke.bootstrap
         mu = intervals.get(model_mu(stroke, p)[0])
         bound = intervals.get("tau_max")
@@ -68,32 +69,29 @@ def _cell(of: _Estimate, shown: Callable[[float], str], least: int, unit: float 
     """Return a number ± its error, over its interval; in doubt without both, which would speak for it."""
     if of.doubt and of.value is not None:
         return estimate_cell(of.value, shown, None, None, of.doubt)
-    with_error_of = _with(of.error, least, unit)
-    return estimate_cell(of.value, with_error_of, of.reason, of.ends, of.without, of_ends=shown, unit=unit)
+
+    def shown_with_error(value: float) -> str:
+        return with_error(unit * value, None if of.error is None else unit * of.error * abs(value), least)
+
+    return estimate_cell(of.value, shown_with_error, of.reason, of.ends, of.without, of_ends=shown, unit=unit)
 
 
-def _sed(of: _Estimate, *, star: bool) -> Cell:
-    """Return an SED in kPa; `star` marks an interval that was found otherwise than the others of its table."""
-    cell = _cell(of, sed, 3, 1e3)
-    return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
+def _sed(
+    value: float | None, error: float | None, reason: str | None, interval: SedInterval | None, doubt: str
+) -> Cell:
+    """Return an SED in kPa; an interval for which draws were solved is marked with a star."""
+    cell = _cell(_Estimate(value, error, reason, *_of(interval), doubt), sed, 3, 1e3)
+    star = cell.interval and interval is not None and interval.method == "sampling"
+    return replace(cell, interval=f"{cell.interval}*") if star else cell
 
 
 def _stroke_sed(p: PredictionFinding) -> Cell:
-    ends, without, star = _of(p.interval)
-    estimate = _Estimate(p.sed, p.error_estimate, p.reasons.get("sed"), ends, without, p.doubt)
-    return _sed(estimate, star=star)
+    return _sed(p.sed, p.error_estimate, p.reasons.get("sed"), p.interval, p.doubt)
 
 
-def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
-    """Return what shows a number with its relative error, in another unit."""
-    return lambda value: with_error(unit * value, None if error is None else unit * error * abs(value), least)
-
-
-def _of(interval: SedInterval | None) -> tuple[Ends | None, str | None, bool]:
-    """Return the ends of an interval, why it has none, and whether draws were solved for it."""
-    if interval is None or interval.low is None or interval.high is None:
-        return None, None if interval is None else interval.reason, False
-    return (interval.low, interval.high), None, interval.method == "sampling"
+def _of(interval: SedInterval | None) -> tuple[Ends | None, str | None]:
+    """Return the ends of an interval, and why it has none."""
+    return (None, None) if interval is None else (bounds(interval.low, interval.high), interval.reason or None)
 
 
 def afferent_table(report: Report) -> Table | None:
@@ -131,8 +129,7 @@ def variants_table(report: Report) -> Table | None:
         return None
 
     def cell(one: Alternative) -> Cell:
-        ends, why, star = _of(one.interval)
-        return _sed(_Estimate(one.sed, one.error_estimate, one.reason, ends, why, one.doubt), star=star)
+        return _sed(one.sed, one.error_estimate, one.reason, one.interval, one.doubt)
 
     legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
@@ -189,7 +186,7 @@ def force_table(report: Report) -> Table | None:
     strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
 
     def row(p: PredictionFinding) -> Row:
-        intervals = {} if p.stroke is None else strokes.get(p.stroke, {})
+        intervals = strokes.get(p.stroke or 0, {})
         normal, tangential = (
             (None, None) if p.interval is None else (p.interval.normal_force, p.interval.tangential_force)
         )
@@ -228,17 +225,16 @@ def direction_table(report: Report) -> Table | None:
     columns = "depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
 
     def row(p: PredictionFinding) -> Row:
-        back, without, star = _of(p.opposite_interval)
+        back, without = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         ratio, ends = _ratio(p, back)
-        opposite = _Estimate(p.opposite_sed, p.opposite_error, why, back, without, p.opposite_doubt)
         doubt = p.doubt or p.opposite_doubt
         unknown = doubt or without or _of(p.interval)[1]
         return (
             _depth(p),
             direction(p.direction),
             _stroke_sed(p),
-            _sed(opposite, star=star),
+            _sed(p.opposite_sed, p.opposite_error, why, p.opposite_interval, p.opposite_doubt),
             estimate_cell(ratio, places(3), why, None if doubt else ends, unknown),
         )
 
