@@ -38,7 +38,7 @@ class ExportSource:
     prediction: Mapping[str, Any] | None  # as `prediction.json` holds it; None where nothing was predicted
 
 
-def export(source: ExportSource, name: str, folder: Path, progress: Progress | None = None) -> Path:
+def export(source: ExportSource, name: str, folder: Path, progress: Progress = lambda _: None) -> Path:
     """Write a session in the format called `name` into `folder`, which is new or empty, and return it.
 
     The folder appears when it is whole: stopped half-way nothing is left. Raises ExportError.
@@ -47,13 +47,9 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress | N
         raise ExportError(f"{folder} is not empty; give a new folder, for nothing is written over")
     try:
         with whole_folder(folder) as part:
-            importlib.import_module(FORMATS[name]).write(source, part, progress or _unseen)
+            importlib.import_module(FORMATS[name]).write(source, part, progress)
     except OSError as error:
         raise ExportError(
             f"{folder} cannot be written ({error.strerror or error}); {remedy(error, new=True)}, or give another"
         ) from error
     return folder
-
-
-def _unseen(part: float) -> None:
-    """Show no progress."""

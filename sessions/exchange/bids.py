@@ -9,10 +9,12 @@ import gzip
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import groupby, pairwise
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -158,20 +160,15 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
     mark = (1,) if recording.simulated else ()
     first_ns = recording.events[0].time_ns if recording.events else 0
     expected = recording.expected_readings or 1
-    several = sum(begins for _, begins in _stretches(recording)) > 1
-    file: Any = None
-    written, part, last = 0, 0, None
-    try:
-        for block, begins in _stretches(recording):
-            if begins:
-                part += 1
-                stem = f"{names.stem}{f'_recording-{part}' if several else ''}_physio"
-                if file is not None:
-                    file.close()
-                file = io.TextIOWrapper(_ReproducibleGzip(folder / f"{stem}.tsv.gz"), encoding="utf-8", newline="")
-                write_json(
-                    folder / f"{stem}.json",
-                    {
+    several = any(part > 1 for part, _ in _stretches(recording))
+    written = 0
+    for part, blocks in groupby(_stretches(recording), itemgetter(0)):
+        stem = f"{names.stem}{f'_recording-{part}' if several else ''}_physio"
+        last: int | None = None
+        with _packed(folder / f"{stem}.tsv.gz") as file:
+            for _, block in blocks:
+                if last is None:
+                    sidecar = {
                         **recording.mark,
                         "SamplingFrequency": _sampling_frequency(recording.info.rate, block),
                         "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
@@ -182,16 +179,12 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                         "ManufacturersModelName": recording.info.model,
                         "DeviceSerialNumber": recording.info.serial,
                         **{column.heading: _describe(column) for column in described},
-                    },
-                )
-                last = None
-            write_rows(file, _rows_with_gaps(block, last, rows(block, calibration), len(described), mark), "\t")
-            last = int(block.sequence[-1])
-            written += len(block)
-            progress(min(written / expected, 1.0))
-    finally:
-        if file is not None:
-            file.close()
+                    }
+                    write_json(folder / f"{stem}.json", sidecar)
+                write_rows(file, _rows_with_gaps(block, last, rows(block, calibration), len(described), mark), "\t")
+                last = int(block.sequence[-1])
+                written += len(block)
+                progress(min(written / expected, 1.0))
 
 
 def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
@@ -202,10 +195,11 @@ def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
     return (len(block) - 1) / span if span > 0.0 else None
 
 
-def _stretches(recording: Recording) -> Iterator[tuple[ReadingBlock, bool]]:
-    """Yield the readings in order, and whether a break lies before them."""
+def _stretches(recording: Recording) -> Iterator[tuple[int, ReadingBlock]]:
+    """Yield the readings in order, each block with the number of its stretch without a break, from 1."""
     last: float | None = None
     previous: int | None = None
+    part = 0
     rate = recording.info.rate if recording.info is not None else math.nan
     most = BREAK * rate if math.isfinite(rate) else math.inf
     for block in recording.blocks():
@@ -216,7 +210,8 @@ def _stretches(recording: Recording) -> Iterator[tuple[ReadingBlock, bool]]:
         breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (missing > most))]
         cuts = [0, *(i for i in breaks if i), len(block)]
         for start, stop in pairwise(cuts):
-            yield block.between(start, stop), start in breaks
+            part += start in breaks
+            yield part, block.between(start, stop)
         last, previous = float(block.time[-1]), int(block.sequence[-1])
 
 
@@ -234,16 +229,15 @@ def _rows_with_gaps(
         expected = row[0] + 1
 
 
-class _ReproducibleGzip(gzip.GzipFile):
-    """A gzip file that holds neither its name nor a time, so that the same session gives the same bytes."""
-
-    def __init__(self, path: Path) -> None:
-        self._raw = path.open("wb")
-        super().__init__("", "wb", compresslevel=6, fileobj=self._raw, mtime=0)
-
-    def close(self) -> None:
-        super().close()
-        self._raw.close()
+@contextmanager
+def _packed(path: Path) -> Generator[TextIO]:
+    """Open a text to be packed without name and time, so that the same session gives the same bytes."""
+    with (
+        path.open("wb") as raw,
+        gzip.GzipFile("", "wb", compresslevel=6, fileobj=raw, mtime=0) as file,
+        io.TextIOWrapper(file, encoding="utf-8", newline="") as text,
+    ):
+        yield text
 
 
 def _sidecar(part: Path) -> dict[str, Any]:

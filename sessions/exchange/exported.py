@@ -97,7 +97,13 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
         clock=StillClock(exported.events[-1].time_ns if exported.events else 0),
     )
     try:
-        _write(exported, writer)
+        readings = RecordedReadings(exported.blocks())
+        for event in exported.events:  # in the order in which both were recorded
+            for block in readings.blocks_up_to(event.readings):
+                writer.readings(block)
+            writer.event(event.kind, event.trial, event.data, time_ns=event.time_ns, commit=False)
+        for block in readings.blocks_up_to(None):
+            writer.readings(block)
         writer.commit()
         restored = Recording.open(folder)
         problems = [sentence for sentence in head.losses if sentence not in restored.losses]
@@ -114,17 +120,6 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
     for name, content in exported.side_files.items():
         write_whole(folder / name, content)
     return tuple(problems)
-
-
-def _write(exported: ExportedSession, writer: SessionWriter) -> None:
-    """Write readings and events in the order in which they were recorded."""
-    readings = RecordedReadings(exported.blocks())
-    for event in exported.events:
-        for block in readings.blocks_up_to(event.readings):
-            writer.readings(block)
-        writer.event(event.kind, event.trial, event.data, time_ns=event.time_ns, commit=False)
-    for block in readings.blocks_up_to(None):
-        writer.readings(block)
 
 
 _DAMAGED = (

@@ -53,6 +53,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     plan = recording.plan
     mark = f"{recording.simulated_sentence}. " if recording.simulated_sentence else ""
     document = description(recording)
+    bootstrap: Mapping[str, Any] = (source.analysis.get("bootstrap") or {}).get("settings") or {}
     first_ns = recording.events[0].time_ns if recording.events else 0
     file = pynwb.NWBFile(
         session_description=f"{mark}A subject strokes surfaces over a six-axis force transducer and judges them.",
@@ -67,7 +68,8 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
             {
                 **document,
                 "log": [asdict(event) for event in recording.events],
-                "calibration_error": _calibration(source),
+                # How uncertain each axis' gain is, which the intervals hold, and whether somebody set that.
+                "calibration_error": {name: bootstrap.get(name) for name in ("gain_error", "gain_error_origin")},
             }
         ),
         subject=Subject(
@@ -93,12 +95,6 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     with new_hdf5(folder / FILE) as hdf5, pynwb.NWBHDF5IO(file=hdf5, mode="w") as io:
         io.write(file)
     progress(1.0)
-
-
-def _calibration(source: ExportSource) -> dict[str, Any]:
-    """Return how uncertain each axis' gain is, which the intervals hold, and whether somebody set that."""
-    settings: Mapping[str, Any] = (source.analysis.get("bootstrap") or {}).get("settings") or {}
-    return {name: settings.get(name) for name in ("gain_error", "gain_error_origin")}
 
 
 def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: str) -> None:

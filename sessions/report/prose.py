@@ -99,7 +99,7 @@ def _by_place(report: Report) -> str:
         rows = [p.row for p in report.predictions if p.experiment == experiment.name and p.row]
         arcs = rows[0] if rows else ()
         places = sorted(arc for arc in arcs if abs(arc) <= REACH and all(arc in row for row in rows))
-        by_place = {arc: _relation(report, experiment, _at(arc)) for arc in places}
+        by_place = {arc: _relation(report, experiment, lambda p, arc=arc: p.row.get(arc)) for arc in places}
         known = {arc: related.pearson for arc, related in by_place.items() if related.pearson is not None}
         if 0.0 in known:
             low, high = _alike(known)
@@ -110,10 +110,6 @@ def _by_place(report: Report) -> str:
         "The sign of r of the SED stays the same if the ending is moved along the skin (tried up to "
         f"{REACH:g} mm to each side, positive towards the tip): in {' and in '.join(ranges)}."
     )
-
-
-def _at(arc: float) -> _Value:
-    return lambda one: one.row.get(arc)
 
 
 def _alike(known: Mapping[float, float]) -> tuple[float, float]:

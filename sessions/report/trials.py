@@ -197,7 +197,7 @@ def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
         *(
             Fact(
                 "warning",
-                max(same, key=_numbers_in),
+                max(same, key=lambda sentence: [float(number.group()) for number in _NUMBER.finditer(sentence)]),
                 f"the greatest numbers of {plural(len(same), 'trial')} with this warning",
             )
             for same in warned.values()
@@ -240,10 +240,6 @@ def field_of(experiment: str, row: TrialPrediction) -> Field | None:
     if picture is None or row.stimulus is None:
         return None
     return Field(experiment, row.stimulus.known_index, *picture)
-
-
-def _numbers_in(sentence: str) -> list[float]:
-    return [float(number.group()) for number in _NUMBER.finditer(sentence)]
 
 
 NO_ESTIMATE = "no estimate"  # of what leaving an effect out changes

@@ -10,7 +10,7 @@ import numpy as np
 
 from sessions.prediction import SED
 from sessions.statistics.correlations import Relation
-from sessions.statistics.mixed_model import MixedModel, Spread
+from sessions.statistics.mixed_model import MixedModel, Spread, Term
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.rivals import Rival
@@ -250,55 +250,47 @@ def planted_effects(
 
     `planted["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
     """
-    rows: list[EffectRecovery] = []
-    for one in descriptors:
-        rows += [*_slopes(one, planted["score"]), *_with_sed(one, planted), *_spreads(one, planted)]
-    return tuple(rows)
-
-
-def _slopes(one: DescriptorFindings, score: Mapping[str, Any]) -> list[EffectRecovery]:
-    slopes = {
-        INDEX: score["gain"],
-        FRICTION: score.get("friction", {}).get(one.descriptor, 0.0),
-        DRIFT: score["drift"],
-        CARRY_OVER: score["carry_over"],
-    }
-    terms = () if isinstance(one.on_friction, str) else one.on_friction.terms
-    return [
-        EffectRecovery(one.descriptor, t.name, slopes[t.name], t.estimate, t.low, t.high)
-        for t in terms
-        if t.name in slopes
-    ]
-
-
-def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[EffectRecovery]:
-    people = planted.get("people")
-    if not people:
-        return []
-    by_index = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
-    # A transducer's gains, of drag and of press, differ between visits as fingers do.
-    moisture = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
-    differ = None if isinstance(one.on_friction, str) else one.on_friction.spreads
-    level, slope, left = (None, None, None) if differ is None else (differ.level, differ.slope, differ.left)
-    spreads = (
-        (LEVELS, people["offset_spread"], level),
-        (SLOPES, by_index, slope),
-        (NOISE, people["judgement_noise"], left),
-        (FINGERS, moisture, one.fingers),
+    return tuple(
+        EffectRecovery(one.descriptor, name, truth[name], *ends)
+        for one in descriptors
+        for truth in [_planted_values(one.descriptor, planted)]
+        for name, ends in _estimates(one).items()
+        if name in truth
     )
-    return [EffectRecovery(one.descriptor, name, sd, s.sd, s.low, s.high) for name, sd, s in spreads if s is not None]
 
 
-def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[EffectRecovery]:
-    """Return how scores go with SEDs among people at large on these surfaces, beside the intervals for such people."""
-    relation = planted.get("relation", {}).get(one.descriptor)
-    if relation is None or one.repeated is None or one.repeated.people is None:
-        return []
-    rows = [EffectRecovery(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
-    if not isinstance(one.on_response, str):
-        term = one.on_response.term(SED_TERM)
-        rows.append(EffectRecovery(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
-    return rows
+def _planted_values(descriptor: str, planted: Mapping[str, Any]) -> dict[str, float]:
+    """Return what was planted of one descriptor, by the names in `UNITS`."""
+    score, people = planted["score"], planted.get("people")
+    values = {name: score[key] for name, key in ((INDEX, "gain"), (DRIFT, "drift"), (CARRY_OVER, "carry_over"))}
+    values[FRICTION] = score.get("friction", {}).get(descriptor, 0.0)
+    if relation := planted.get("relation", {}).get(descriptor):
+        values |= {WITHIN: relation["r"], SED_TERM: relation["slope"]}
+    if people:
+        values[LEVELS], values[NOISE] = people["offset_spread"], people["judgement_noise"]
+        values[SLOPES] = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
+        # A transducer's gains, of drag and of press, differ between visits as fingers do.
+        values[FINGERS] = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
+    return values
+
+
+def _estimates(one: DescriptorFindings) -> dict[str, tuple[float, float, float]]:
+    """Return the estimate and the ends of its interval of each effect that may be planted, by its name in `UNITS`.
+
+    How scores go with SEDs has the intervals for people at large on these surfaces.
+    """
+    terms: list[Term] = []
+    spreads: dict[str, Spread | None] = {}
+    if not isinstance(one.on_friction, str):
+        terms += one.on_friction.terms
+        if (differ := one.on_friction.spreads) is not None:
+            spreads = {LEVELS: differ.level, SLOPES: differ.slope, NOISE: differ.left}
+    if one.repeated is not None and one.repeated.people is not None:
+        terms.append(Term(WITHIN, one.repeated.r, *one.repeated.people, math.nan))
+        terms += () if isinstance(one.on_response, str) else one.on_response.terms[1:2]
+    spreads[FINGERS] = one.fingers
+    values = {name: (s.sd, s.low, s.high) for name, s in spreads.items() if s is not None}
+    return {term.name: (term.estimate, term.low, term.high) for term in terms} | values
 
 
 _FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}

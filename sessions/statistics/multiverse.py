@@ -75,8 +75,7 @@ class Path:
         return own == first and self.mu == rule and self.kinematics == kinematics
 
 
-CHOICES = ("filter", "window", "mu", "area", "receptor", "kinematics")
-CHOICE_LABELS: Mapping[str, str] = {
+CHOICE_LABELS: Mapping[str, str] = {  # of the fields of a path
     "filter": "cut-off of the forces' filter",
     "window": "steady window",
     "mu": "µ of the model",
@@ -84,7 +83,7 @@ CHOICE_LABELS: Mapping[str, str] = {
     "receptor": "response at the receptor",
     "kinematics": "strain of the model",
 }
-
+CHOICES = tuple(CHOICE_LABELS)
 
 _FIRST = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(AREAS)))
 _SMALL = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, AREAS, RECEPTORS))
@@ -264,8 +263,7 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
 class Spread:
     """The correlations of some paths as a distribution."""
 
-    paths: int
-    correlated: int  # of them with a correlation; the numbers below are theirs
+    correlated: int  # paths with a correlation; the numbers below are theirs
     distinct: int  # of these correlations, as many differ by more than `SAME`
     least: float
     lower: float  # quartile
@@ -296,7 +294,7 @@ def spread(values: Sequence[float | None]) -> Spread | None:
     for value in numbers:
         if value - distinct[-1] > SAME:
             distinct.append(value)
-    return Spread(len(values), len(numbers), len(distinct), least, lower, median, upper, greatest)
+    return Spread(len(numbers), len(distinct), least, lower, median, upper, greatest)
 
 
 def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread | None, bool], ...]:

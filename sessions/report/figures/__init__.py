@@ -1,9 +1,9 @@
 """The figures of a report: every picture with its caption and its numbers."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from sessions.report.contents import Report
+from sessions.report.contents import PredictionFinding, Report
 from sessions.report.figures.courses import (
     MU,
     NORMAL,
@@ -51,14 +51,6 @@ def _plate(report: Report, name: str) -> Plate:
     return plate(name, words + model, _PANELS[name](report))
 
 
-def _course(report: Report) -> Panels:
-    return () if report.course is None else (course_panel(report.course, report.strokes),)
-
-
-def _scores(report: Report) -> Panels:
-    return map(score_panel, report.experiments)
-
-
 def _of_strokes(*quantities: StrokeQuantity) -> Callable[[Report], Panels]:
     """Return what draws a panel for each quantity of the strokes of each experiment; those of none come last."""
 
@@ -76,29 +68,21 @@ def _fingers(report: Report) -> Panels:
     return (panel for field in report.fields for panel in finger_panels(field, levels))
 
 
-def _responses(report: Report) -> Panels:
-    by_experiment = by_key((p.experiment, p) for p in report.predictions)
-    return (response_panel(own, name) for name, own in by_experiment.items())
-
-
-def _relations(report: Report) -> Panels:
-    by_experiment = by_key((p.experiment, p) for p in report.predictions)
-    return (relation_panel(one, by_experiment.get(one.name, ())) for one in report.experiments)
-
-
-def _paths(report: Report) -> Panels:
-    return (paths_panel(e.name, e.paths, shown_response(report.response).label) for e in report.experiments)
+def _predictions_of(report: Report) -> Mapping[str, Sequence[PredictionFinding]]:
+    return by_key((p.experiment, p) for p in report.predictions)
 
 
 _OF_THE_MODEL = {"finger", "response", "relation"}
 _PANELS: Mapping[str, Callable[[Report], Panels]] = {
-    "course": _course,
-    "scores": _scores,
+    "course": lambda report: () if report.course is None else (course_panel(report.course, report.strokes),),
+    "scores": lambda report: map(score_panel, report.experiments),
     "friction": _of_strokes(MU),
     "speed": _of_strokes(SPEED),
     "forces": _of_strokes(NORMAL, TANGENTIAL),
     "finger": _fingers,
-    "response": _responses,
-    "relation": _relations,
-    "paths": _paths,
+    "response": lambda report: (response_panel(own, name) for name, own in _predictions_of(report).items()),
+    "relation": lambda report: (relation_panel(e, _predictions_of(report).get(e.name, ())) for e in report.experiments),
+    "paths": lambda report: (
+        paths_panel(e.name, e.paths, shown_response(report.response).label) for e in report.experiments
+    ),
 }

@@ -140,7 +140,8 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
         first, last = stroke.steady or (math.inf, -math.inf)
         inside = (first <= trace.origin + trace.time) & (trace.origin + trace.time <= last)
         level: float | None = getattr(stroke, of.level)
-        text = _name(stroke) + (f", {of.word} {level:.3g} over the steady window" if level is not None else "")
+        text = f"stroke {stroke.number}" + ("" if stroke.index is None else f", index {stroke.index}")
+        text += f", {of.word} {level:.3g} over the steady window" if level is not None else ""
         style = "solid" if level is not None else (0, (3, 2))
         axes.plot(trace.time, values, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
         axes.plot(trace.time, np.where(inside, values, np.nan), color=shade, linewidth=2.2, solid_capstyle="butt")
@@ -159,10 +160,6 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
     if len(labels) <= MOST_LABELLED:
         label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
     return tuple(rows)
-
-
-def _name(stroke: StrokeFinding) -> str:
-    return f"stroke {stroke.number}" + (f", index {stroke.index}" if stroke.index is not None else "")
 
 
 PRESSED = 1.0  # the model presses for 1 s, then slides [s]

@@ -55,24 +55,21 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
 
 
 def _visits(study: StudyFindings) -> Table | None:
-    rows = tuple(_visit_row(visit, study) for visit in study.visits)
+    def row(visit: Visit) -> Row:
+        out = ["nothing"] if visit.session in dict(study.copies) else []
+        out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
+        return (
+            visit.session,
+            visit.subject,
+            f"{sum(row.score is not None for row in visit.rows)} of {len(visit.rows)}",
+            str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE,
+            "yes" if visit.complete else "no",
+            sum(bool(row.flaws) for row in visit.rows),
+            "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}"),
+        )
+
     columns = "session | subject | answers | strokes with SED | ended as planned | flawed trials | counted"
-    return table("table-visits", caption("study-visits"), columns, [("", rows)])
-
-
-def _visit_row(visit: Visit, study: StudyFindings) -> Row:
-    out = ["nothing"] if visit.session in dict(study.copies) else []
-    out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
-    counted = "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}")
-    return (
-        visit.session,
-        visit.subject,
-        f"{sum(row.score is not None for row in visit.rows)} of {len(visit.rows)}",
-        str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE,
-        "yes" if visit.complete else "no",
-        sum(bool(row.flaws) for row in visit.rows),
-        counted,
-    )
+    return table("table-visits", caption("study-visits"), columns, [("", map(row, study.visits))])
 
 
 def _scores(study: StudyFindings) -> Table | None:
