@@ -4,12 +4,13 @@ import functools
 import math
 
 import numpy as np
+from report_session import plan
 
 from sessions.prediction import Fields, History, Skin
 from sessions.prediction.stored import Alternative, SedInterval, variants
+from sessions.report import experiments
 from sessions.report.contents import (
     Course,
-    Experiment,
     Fact,
     Field,
     GroundTruth,
@@ -18,10 +19,9 @@ from sessions.report.contents import (
     StrokeFinding,
     Trace,
 )
-from sessions.statistics.correlations import relation
-from sessions.statistics.multiverse import PATHS, PathTrial, path_findings
-from sessions.statistics.rivals import rivals_of_means
-from sessions.statistics.scores import Score, ScoreTable, mean_scores, score_matrix
+from sessions.statistics.multiverse import PATHS
+from sessions.statistics.scores import Score, ScoreTable
+from sessions.statistics.visit import TrialRow, Visit
 
 # The published Tables 1 and 2, and SEDs of the small-strain reference where it has them, else between its neighbours.
 TABLES = {
@@ -61,43 +61,28 @@ def tables(subjects=10):
     ]
 
 
-def experiment(descriptor, score_tables):
-    rows = TABLES[descriptor]
-    means = tuple(m for m in mean_scores(score_tables) if m.descriptor == descriptor)
-    seds = [rows[m.index][3] for m in means]
-    return Experiment(
-        name=descriptor,
-        descriptor=descriptor,
-        scale_ends=("not at all", "as much as I can imagine"),
-        indices=tuple(rows),
-        scores=means,
-        answers={
-            subject: tuple(scores.get(i) for i in rows)
-            for subject, scores in score_matrix(score_tables, descriptor).items()
-        },
-        score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
-        index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
-        rivals=rivals_of_means({m.index: m.mean for m in means}, _series(rows)),
-        paths=path_findings(
-            [
-                PathTrial("", i, {mean.index: mean.mean for mean in means}.get(i), "maximum", along(i, row[3]))
-                for i, row in rows.items()
-            ],
-            "small",
-            within=False,
-        ),
+def experiments_of(score_tables):
+    """Return the experiments of a visit that the scores are not of, to all surfaces in their order."""
+    rows = tuple(
+        TrialRow(
+            trial=number,
+            block=descriptor,
+            descriptor=descriptor,
+            index=index,
+            code=f"K{number}",
+            direction=DIRECTION[descriptor],
+            repetition=1,
+            place=0,
+            before=None,
+            outcome="presented",
+            score=None,
+            rule="maximum",
+            **dict(zip(("mu", "tau_max", "speed", "sed"), TABLES[descriptor][index], strict=True)),
+            paths=along(index, TABLES[descriptor][index][3]),
+        )
+        for number, (descriptor, index) in enumerate(((d, i) for d, rows in TABLES.items() for i in rows), 1)
     )
-
-
-def _series(rows):
-    """Return the made-up quantities of each surface, those of `stroke` and `prediction`."""
-    return {
-        "SED": {i: row[3] for i, row in rows.items()},
-        "µ of the model": {i: row[0] for i, row in rows.items()},
-        "τ max": {i: row[1] for i, row in rows.items()},
-        "speed": {i: row[2] for i, row in rows.items()},
-        "µ static": {},
-    }
+    return experiments(plan("P99"), score_tables, Visit("P99-forces", "P99", "p", "", True, True, rows, (), {}))
 
 
 def along(index, sed):
@@ -284,7 +269,6 @@ def example(**changes):
 @functools.cache
 def _contents():
     """What is in it: made once, for correlations of every subject take a second."""
-    score_tables = tables()
     numbered = [(d, i) for d, rows in TABLES.items() for i in rows]
     strokes = tuple(stroke(k, *surface) for k, surface in enumerate(numbered, 1))
     t = np.arange(0, 110, 0.05)
@@ -300,7 +284,7 @@ def _contents():
         "excluded": ("Take 1 of trial 3 was discarded by the experimenter: slipped off.",),
         "remarks": ("Trial 7 has no score: the subject did not answer.",),
         "flaws": (Fact("speed_not_measurable", "The centre of pressure moves in steps.", "trial 7"),),
-        "experiments": tuple(experiment(d, score_tables) for d in TABLES),
+        "experiments": experiments_of(tables()),
         "course": Course(t, force, 0.5 * force),
         "strokes": strokes,
         "predictions": tuple(prediction(k, *surface) for k, surface in enumerate(numbered, 1)),

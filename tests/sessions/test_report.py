@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from report_session import CALIBRATION, INFO, PROVENANCE, SimulatedClock, record
+from report_session import record
+from stand_ins import CALIBRATION, INFO
 
+from drivers.clock import SimulatedClock
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
-from sessions.recording import Recording, SessionWriter
+from sessions.recording import Recording, SessionWriter, provenance
 from sessions.report import Further, findings
 from sessions.report.contents import GroundTruth
 from sessions.report.figures.relation import relation_panel
@@ -59,7 +61,8 @@ def record_foreign(folder, *, press=2.0):
         model="force plate",
         calibration=dataclasses.replace(CALIBRATION, raw_unit="N, N mm", matrix=np.eye(6)),
     )
-    writer = SessionWriter.create(folder, plan, info, PROVENANCE, clock=SimulatedClock())
+    clock = SimulatedClock()
+    writer = SessionWriter.create(folder, plan, info, provenance(clock), clock=clock)
     counter = np.arange(len(time))
     writer.readings(ReadingBlock(counter, counter, 0 * counter, time, (time * 1e9).astype(np.int64), wrench))
     writer.event("ended", data={})

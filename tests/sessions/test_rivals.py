@@ -24,7 +24,7 @@ from sessions.statistics.correlations import (
     steiger_z,
 )
 from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
-from sessions.statistics.rivals import MODEL, MODEL_MU, Rival, RivalTrial, rivals_of_means, rivals_within
+from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, Rival, RivalTrial, rivals_of_means, rivals_within
 from sessions.statistics.within_subjects import repeated_correlation
 from solver import Finger, solve_many
 from solver.scene.published import scenes as published_scenes
@@ -300,12 +300,13 @@ def test_weights_are_those_of_the_published_rule():
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
     report = example()
     rivals_table = next(table for table in tables(report)["rivals"] if table.name == "table-rivals")
-    assert [row[0].text for row in rivals_table.groups[0].rows] == [MODEL, MODEL_MU, "µ static", "τ max", "speed"]
+    assert [row[0].text for row in rivals_table.groups[0].rows] == [MODEL, *FIELDS]
     assert len(rivals_table.caption.split()) <= 60
     picture_text = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
     assert "τ max +0.95" in picture_text
-    in_data = asdict(report)["experiments"][0]["rivals"][1]["contrast"]
-    assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
+    rivals = report.experiments[0].rivals
+    at = [rival.name for rival in rivals].index(MODEL_MU)
+    assert asdict(report)["experiments"][0]["rivals"][at]["contrast"]["z"] == rivals[at].contrast.z
     sentences = " ".join(distinctions(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in sentences
     needed = required_cases(*correlations_of(report.experiments[0]))
