@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from dataclasses import astuple
 from operator import attrgetter
 from typing import Any
 
@@ -133,7 +133,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     points = [(means[p.index], n, shown.ends(p)) for p, n in pairs if n is not None and p.index in means]
     if len(points) < 2:
         return None
-    figure_sheet = _two_columns()
+    figure_sheet = sheet(328, 300, widths=(1.0, 0.18))
     axes, from_zero = figure_sheet.axes
     related = experiment.score_relation
     rising = related is not None and (related.slope or 0.0) > 0.0
@@ -183,13 +183,6 @@ def relation_words(experiment: Experiment) -> str:
     if related.low is not None and related.high is not None:
         words += f" ({correlation(related.low)} to {correlation(related.high)})"
     return words + f", n = {related.n}"
-
-
-def _two_columns() -> Sheet:
-    drawn = sheet(328, 300)
-    drawn.axes[0].remove()
-    grid = drawn.figure.add_gridspec(1, 2, width_ratios=(1.0, 0.18))
-    return replace(drawn, axes=tuple(drawn.figure.add_subplot(grid[0, column]) for column in (0, 1)))
 
 
 def _on_line(related: Relation, score: float) -> float:

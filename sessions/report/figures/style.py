@@ -131,14 +131,19 @@ def look(*, simulated: bool = False) -> Generator[None]:
         _SIMULATED.reset(before)
 
 
-def sheet(width: float, height: float, heights: tuple[float, ...] = (1.0,), *, share_x: bool = False) -> Sheet:
-    """Return an empty picture of that size [CSS px, 96 an inch] with one axes under another; call inside `look`."""
+def sheet(
+    width: float,
+    height: float,
+    heights: Sequence[float] = (1.0,),
+    widths: Sequence[float] = (1.0,),
+    *,
+    share_x: bool = False,
+) -> Sheet:
+    """Return an empty picture of that size [CSS px, 96 an inch] with axes in rows and columns; call inside `look`."""
     figure = Figure(figsize=(width / 96, height / 96), dpi=POINTS, layout="constrained")
-    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    axes: list[Axes] = []
-    for row in range(len(heights)):
-        axes.append(figure.add_subplot(grid[row, 0], sharex=axes[0] if share_x and axes else None))
-    return Sheet(figure, tuple(axes))
+    grid = figure.add_gridspec(len(heights), len(widths), height_ratios=heights, width_ratios=widths)
+    axes = grid.subplots(sharex=share_x, squeeze=False)
+    return Sheet(figure, tuple(axes.flat))
 
 
 def shades(colour: str, n: int) -> tuple[str, ...]:
