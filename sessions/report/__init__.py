@@ -11,7 +11,6 @@ from sessions.prediction import BY_NAME, SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.stored import model_facts
 from sessions.prediction.surface_series import other_signs
-from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
 from sessions.report.contents import Experiment, Fact, GroundTruth, Report
@@ -64,7 +63,7 @@ def findings(
         alone,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
         head=_head(recording, tables),
-        versions=tuple(Fact(name, version) for name, version in software_versions().items()),
+        versions=facts.versions(),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
         excluded=(

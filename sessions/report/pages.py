@@ -20,6 +20,7 @@ from sessions.file_access import remedy, write_whole
 from sessions.prediction import QUANTITIES, SED
 from sessions.report import study_prose
 from sessions.report.contents import Report
+from sessions.report.facts import versions
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.relation import study_plates
 from sessions.report.prose import distinctions, doubts, question, summary
@@ -173,6 +174,7 @@ def study_page(study: StudyFindings, name: str) -> str:
         study=study,
         name=name,
         prose=study_prose,
+        versions=versions(),
         trials=sum(len(visit.rows) for visit in study.visits),
         trials_csv=trials_csv(study),
         columns_csv=columns_csv(study),

@@ -9,7 +9,6 @@ from itertools import chain
 
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import UNKNOWNS
-from sessions.recording.head import software_versions
 from sessions.report.contents import Fact
 from sessions.report.facts import area_words, calibration_words, model_words
 from sessions.report.prose import OTHER_FINGERS, friction_question
@@ -248,11 +247,6 @@ def model_facts(study: StudyFindings) -> list[Fact]:
             whose = "" if len(values) == 1 else f"in {_first_few(sessions)}"
             facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))
     return facts
-
-
-def versions() -> list[Fact]:
-    """Return the versions that made the page."""
-    return [Fact(name, version) for name, version in software_versions().items()]
 
 
 def again(study: StudyFindings) -> list[Fact]:

@@ -19,21 +19,19 @@ _LINE = 44  # characters that a line of a picture's title has room for
 Compared = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
 
 
-def rivals_table(compared: Compared, quantity: str, model: str) -> Table | None:
-    """Return what was measured beside a quantity of the model in each group; `model` says in short which model it is.
+def rival_tables(compared: Compared, quantity: str, model: str) -> tuple[Table | None, Table | None]:
+    """Return what was measured beside a quantity of the model in each group, and the model's other quantities.
 
-    The model's other quantities stand in `responses_table`.
+    `model` says in short which model it is.
     """
     within = "Steiger (1980), within subjects by the jackknife" if _weighed(compared) else "Steiger (1980)"
     aic = "AIC: crossed mixed models. " if _weighed(compared) else ""
-    words = caption("rivals", label=quantity, model=model, within=within, aic=aic)
-    return _table("table-rivals", words, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
-
-
-def responses_table(compared: Compared, quantity: str, model: str) -> Table | None:
-    """Return the model's other quantities beside one of them, as `rivals_table` has what was measured."""
-    words = caption("responses", model=model, label=quantity)
-    return _table("table-responses", words, compared, quantity, lambda name: name != quantity and name in RESPONSES)
+    measured = caption("rivals", label=quantity, model=model, within=within, aic=aic)
+    responses = caption("responses", model=model, label=quantity)
+    return (
+        _table("table-rivals", measured, compared, quantity, lambda name: name == quantity or name not in RESPONSES),
+        _table("table-responses", responses, compared, quantity, lambda name: name != quantity and name in RESPONSES),
+    )
 
 
 def _weighed(compared: Compared) -> bool:

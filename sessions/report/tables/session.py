@@ -18,7 +18,7 @@ from sessions.report.tables import (
     table,
 )
 from sessions.report.tables import predictions as of_predictions
-from sessions.report.tables.rivals import responses_table, rivals_table
+from sessions.report.tables.rivals import rival_tables
 from sessions.report.tables.scales import psychometric_table, session_functions
 from sessions.report.wording import (
     NONE,
@@ -283,7 +283,6 @@ def _spread(of: Spread | None, paths: int) -> Row:
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
     compared = [(e.name, e.rivals) for e in report.experiments]
-    quantity = BY_NAME[report.response].label
     sections = {
         "relation": (relation_table(report),),
         "strokes": (stroke_table(report), course_table(report)),
@@ -294,7 +293,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             of_predictions.variants_table(report),
             of_predictions.variant_forces_table(report),
         ),
-        "rivals": (rivals_table(compared, quantity, report.model), responses_table(compared, quantity, report.model)),
+        "rivals": rival_tables(compared, BY_NAME[report.response].label, report.model),
         "scores": (score_table(report), *answer_tables(report), psychometric_table(session_functions(report))),
         "afferent": (of_predictions.afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
 from sessions.report.tables import Cell, Row, Table, number_cell, range_cell, sections_of, table
-from sessions.report.tables.rivals import responses_table, rivals_table
+from sessions.report.tables.rivals import rival_tables
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table, study_model, trials_table
@@ -222,8 +222,7 @@ def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
         for one in study.descriptors
         for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
     ]
-    model, label = study_model(study), BY_NAME[study.response].label
-    return rivals_table(compared, label, model), responses_table(compared, label, model)
+    return rival_tables(compared, BY_NAME[study.response].label, study_model(study))
 
 
 def _of_means(name: str, related: Relation | None) -> Iterable[Row]:
