@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from solver._kernels.compiling import OPEN, SLIP, STICK
-from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, NestedState, Steps, errors
+from solver.accuracy.error_estimate import FROM_EDGES, PARTS, NestedState, Steps, errors, from_halving, order_of
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -133,7 +133,8 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
     if not missed and scene.solve.contrast_tolerance is None:
         return nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
-    parts *= FROM_HALVING * abs(float(nested.numbers[0] - numbers[0])) / max(float(parts.sum()), np.finfo(float).tiny)
+    change = abs(float(nested.numbers[0] - numbers[0]))
+    parts *= from_halving(order_of(scene)) * change / max(float(parts.sum()), np.finfo(float).tiny)
     before = np.flatnonzero(np.diff(state.state))
     columns = np.searchsorted(finger.geometry.lines.arcs, (finger.arcs[before] + finger.arcs[before + 1]) / 2.0) - 1
     np.add.at(parts, columns, FROM_EDGES * nested.of_edges[:, 0])

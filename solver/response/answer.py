@@ -85,7 +85,7 @@ def prediction(
         wall_s=solved.wall_s,
         setup_s=solved.setup_s,
         estimate_s=estimate_s,
-        row=Row(ROW, row, row_errors(row, nested)),
+        row=Row(ROW, row, row_errors(scene, row, nested)),
         responses=responses(numbers, off),
         model=left,
         audits=solved.audits,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
+from solver.accuracy.error_estimate import PARTS, edge_changes, half_width, order_of
 from solver.arrays import Array
 from solver.equilibrium import EquilibriumState, ForceLoad
 from solver.equilibrium.finger import KINDS, Finger
@@ -116,7 +116,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     def error(name: str, changed_by_edges: Array) -> Array:
         value, nested_value, *few = (getattr(one, name) for one in (usual, finer, *fewer))
         by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(few, PARTS.tolist(), strict=True))
-        return half_width(nested_value - few[0], changed_by_edges[None]) + by_steps
+        return half_width(nested_value - few[0], changed_by_edges[None], order_of(scene)) + by_steps
 
     return CourseNumbers(error("at", edges), error("rate", rate_edges))
 

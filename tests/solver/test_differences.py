@@ -10,11 +10,13 @@ from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve,
 from solver.accuracy.error_estimate import compared_sets, contrast_error
 from solver.scene.published import STICKINESS, scene
 
+PUBLISHED = scene(STICKINESS[0])
+
 
 def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
     names = ("sed_ending", "normal_force", "tangential_force", "indentation")
     nested_numbers = SimpleNamespace(numbers=np.array(nested), of_edges=np.array([edges]))
-    return SimpleNamespace(nested=nested_numbers, **dict(zip(names, numbers, strict=True)))
+    return SimpleNamespace(scene=PUBLISHED, nested=nested_numbers, **dict(zip(names, numbers, strict=True)))
 
 
 def test_what_halving_the_elements_changes_alike_in_all_surfaces_falls_out_of_their_differences():

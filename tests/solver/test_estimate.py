@@ -206,6 +206,14 @@ def test_an_answer_warns_where_no_trial_of_the_estimates_had_tissues_so_differen
     assert words in "".join(warnings)
 
 
+def test_the_error_at_a_corner_of_very_stiff_tissue_is_of_first_order_and_the_estimate_lies_above_it():
+    scene = random_scene("extreme", 204, "small")  # a dermis 130 times as stiff as the fat
+    truth = float(fine_numbers([scene])[:, 0, 0].mean())
+    prediction = solve(replace(scene, solve=replace(scene.solve, tolerance=0.01)))
+    error = abs(prediction.sed_ending / truth - 1.0)
+    assert 4 / 3 * abs(prediction.nested.numbers[0] / prediction.sed_ending - 1.0) < error < prediction.error_estimate
+
+
 def test_tissues_that_relax_warn_of_a_difference_in_stiffness_as_the_elastic_ones_that_they_relax_to():
     # With half its shear modulus relaxed, G = 0.08 and K = 0.1 MPa become G = 0.04 and K = 0.1: E = 0.105882.
     relaxing = Material(9.0 * 0.08 * 0.1 / 0.38, 0.14 / 0.76, prony=(Relaxation(0.5, 1.0),))
