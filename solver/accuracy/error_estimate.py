@@ -38,6 +38,8 @@ from solver.scene.tables import TISSUES, USUAL_TOLERANCE, Materials
 # convex corner of held and free tissue follow r^a, with a of 1/2 or more (Williams 1952, J. Appl. Mech. 19, 526), and
 # energies err by the power 2 a.
 ORDER, CORNER_ORDER = 2.0, 1.0
+# Largest ratio of stiffnesses of neighbouring tissues in the trials in which errors fall with the square [-].
+SECOND_ORDER = {"small": 100.0, "finite": 6.0}
 # Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
 # about the true place, at most half a node away; the width depends on it linearly.
 FROM_EDGES, WIDTH_FROM_EDGES = 1.0 / 3.0, 0.5
@@ -62,11 +64,12 @@ def from_halving(order: float) -> float:
 def order_of(scene: Scene) -> float:
     """Return the order of convergence that an estimate assumes for a scene.
 
-    It is that of corners where tissues differ more in stiffness than in trials of the estimates, or where skin stiffens
-    as it stretches.
+    It is that of corners where stiff skin carries the drag to the corner of bone and cut: beyond the stiffnesses for
+    which trials show second order, and where skin stiffens as it stretches.
     """
-    stiffens = scene.solve.kinematics == "finite" and any(t.law == "ogden" for t in scene.materials.by_region)
-    return CORNER_ORDER if stiffens or _stiffness_ratio(scene.materials)[0] > TRIED_RATIO else ORDER
+    kind = scene.solve.kinematics
+    stiffens = kind == "finite" and any(tissue.law == "ogden" for tissue in scene.materials.by_region)
+    return CORNER_ORDER if stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[kind] else ORDER
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -257,7 +260,7 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
 
 
 ROUND_OFF = 1e-12  # relative, of a stiffness
-TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
+TRIED_RATIO = 100.0  # the same in the trials where estimates hold [-]
 
 
 def stiffness_warning(scene: Scene) -> str:
