@@ -5,7 +5,7 @@ FILE and reads the rows that it holds already.
 """
 
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import msgspec
@@ -17,10 +17,9 @@ from solver.verification.survey.answers import SURFACES, Row, report, solve, tab
 
 Key = tuple[str, int, Kinematics]
 CAPTION = (
-    "Scenes from number {first} on, of each set; two answers each. Above: share of estimates at or above the true "
-    "error. Near: below ten times the larger of true error and 0.02 %. Missed unsaid: tolerances said to be met that "
-    "are not, without a warning. Ratio: median of estimate by error. Corrected: median of its error by the answer's. "
-    "Counted where the truth can tell."
+    "Two answers of each scene. Above: share of estimates at or above the true error. Near: below ten times the larger "
+    "of true error and 0.02 %. Missed unsaid: tolerances said to be met that are not, without a warning. Ratio: median "
+    "of estimate by error. Corrected: median of its error by the answer's. Counted where the truth can tell."
 )
 
 
@@ -51,7 +50,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--keep", type=Path, help="file of solved scenes")
-    parser.add_argument("--page", type=Path, help="write the table of all that is kept into this page of the docs")
+    parser.add_argument("--page", type=Path, help="write the rows of all that is kept into the table of this page")
     options = parser.parse_args()
     keys = [
         (options.family, number, options.kinematics) for number in range(options.first, options.first + options.scenes)
@@ -59,10 +58,17 @@ def main() -> None:
     for line in report(list(rows(keys, options.keep))):
         print(line)
     if options.page is not None:
-        every = sorted(read_rows(options.keep), key=lambda row: (row.kinematics != "small", row.family, row.number))
-        caption = CAPTION.format(first=min(row.number for row in every))
-        judgements = "\n".join([caption, "", *table(every)])
-        options.page.write_text(fill_marks(options.page.read_text("utf-8"), "judged", judgements), "utf-8")
+        text = options.page.read_text("utf-8")
+        judgements = "\n".join([CAPTION, "", *merge(text.splitlines(), table(read_rows(options.keep)))])
+        options.page.write_text(fill_marks(text, "judged", judgements), "utf-8")
+
+
+def merge(page: Sequence[str], rows: Iterable[str]) -> list[str]:
+    """Return the table of a page with new `rows` for their sets, sorted by strain and set; its header comes first."""
+    header, rule, *new = rows
+    by_set = {tuple(line.split(" | ")[:2]): line for line in (*page, *new) if line.startswith("| ")}
+    judged = [line for (_, *strain), line in sorted(by_set.items()) if strain in (["small"], ["finite"])]
+    return [header, rule, *sorted(judged, key=lambda line: line.split(" | ")[1] != "small")]
 
 
 if __name__ == "__main__":
