@@ -74,6 +74,11 @@ def _dispatch(arguments: list[str]) -> int:
     if name in HELP:
         _overview().print_help()
         return DONE
+    if name == "--version":
+        from sessions.recording.head import software_versions  # here: no verb needs it this early
+
+        print("daq-app", software_versions()["daq-app"])
+        return DONE
     if name not in VERBS:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
     verb = verb_module(name)
@@ -106,6 +111,7 @@ def _overview() -> argparse.ArgumentParser:
         description="Friction psychophysics: the experiment, the transducer, the finite-element finger.",
         epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example.\n"
         "'daq-app' alone opens the window, 'daq-app window SESSION' a session in it.\n"
+        "'daq-app --version' tells the program's version.\n"
         "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a file, "
         "3 done with named losses or flaws, 130 stopped",
         formatter_class=argparse.RawDescriptionHelpFormatter,

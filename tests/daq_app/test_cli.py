@@ -5,6 +5,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,6 +22,12 @@ def test_without_arguments_the_verbs_are_listed_and_the_command_line_counts_as_w
     assert run([]) == 2
     output = capsys.readouterr().err
     assert all(verb in output for verb in VERBS)
+
+
+def test_the_version_is_that_of_the_project(capsys):
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out == f"daq-app {project['version']}\n"
 
 
 def test_an_unknown_verb_is_one_sentence_and_exit_code_2(capsys):
