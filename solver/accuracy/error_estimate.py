@@ -273,7 +273,7 @@ def stiffness_warning(scene: Scene) -> str:
         return ""
     return (
         f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials up "
-        f"to {TRIED_RATIO:.0f} times; beyond, errors of up to four times the estimate were seen."
+        f"to {TRIED_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
     )
 
 
