@@ -97,7 +97,7 @@ class ScoreLine(QAbstractSlider):
     def place_of(self, position: float) -> QPointF:
         """Return where a position from 0 to 100 lies in the widget."""
         line, along = self._line(), position / 100.0
-        return QPointF(line.left() + (1.0 - along if self._mirrored else along) * line.width(), line.center().y())
+        return QPointF(line.left() + (1.0 - along if self.isRightToLeft() else along) * line.width(), line.center().y())
 
     def sizeHint(self) -> QSize:
         scale = self._pixels_per_mm
@@ -126,7 +126,7 @@ class ScoreLine(QAbstractSlider):
         if step is None:
             super().keyPressEvent(event)
             return
-        if self._mirrored and event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+        if self.isRightToLeft() and event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
             step = -step
         self._take(self.answer.step(self._now(), step))
 
@@ -186,10 +186,6 @@ class ScoreLine(QAbstractSlider):
         where = self._words(Text.UNANSWERED if score is None else Text.ANSWERED)
         self.setAccessibleDescription(where if score is None else where.format(score=f"{score:.0f}"))
 
-    @property
-    def _mirrored(self) -> bool:
-        return self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-
     def _line(self) -> QRectF:
         width = LENGTH * self._pixels_per_mm
         return QRectF((self.width() - width) / 2, 0, width, self.height())
@@ -197,7 +193,7 @@ class ScoreLine(QAbstractSlider):
     def _position(self, at: QPointF) -> float:
         line = self._line()
         along = 100.0 * (at.x() - line.left()) / line.width()
-        return 100.0 - along if self._mirrored else along
+        return 100.0 - along if self.isRightToLeft() else along
 
     def _resize(self) -> None:
         self.setFixedSize(self.sizeHint())
@@ -279,7 +275,7 @@ class ChoiceOfTwo(_Field):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
         back, on = Qt.Key.Key_Left, Qt.Key.Key_Right
-        if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
+        if self.isRightToLeft():
             back, on = on, back
         keys: dict[int, Which] = {Qt.Key.Key_1: "first", back: "first", Qt.Key.Key_2: "second", on: "second"}
         if event.key() in keys:
@@ -342,7 +338,7 @@ class PressBar(QWidget):
         box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         filled = QRectF(box)
         filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
-        if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
+        if self.isRightToLeft():
             filled.moveRight(box.right())
         painter.fillRect(filled, QColor(theme_of(self).act))
         painter.setPen(QPen(QColor(theme_of(self).quiet), 2))

@@ -76,11 +76,11 @@ class LivePlot(PaintedWidget):
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
         """Draw the columns with `now` [s, device time] at the right edge; `clock` [s] is for the scale's patience."""
         self._columns, self._now, self._marks = columns, now, tuple(marks)
-        least, greatest = _range(columns.values, self._rows)
-        scale = self._scale.following(least, greatest, clock)
-        if (scale.low, scale.high) != (self._scale.low, self._scale.high):
-            self.forget_ground()
-        self._scale = scale
+        shown = columns.values[list(self._rows)]
+        least, greatest = (float(end.reduce(shown, axis=None, initial=np.nan)) for end in (np.fmin, np.fmax))
+        before, self._scale = self._scale, self._scale.following(least, greatest, clock)
+        if (before.low, before.high) != (self._scale.low, self._scale.high):
+            self.redraw()
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -219,15 +219,6 @@ class LivePlot(PaintedWidget):
 
     def _colour(self, name: str) -> str:
         return name if name.startswith("#") else str(getattr(self.theme, name))
-
-
-def _range(values: Array, rows: Sequence[int]) -> tuple[float, float]:
-    """Return the least and the greatest known value of some rows; (inf, -inf) where there is none."""
-    chosen = values[list(rows)]
-    if not chosen.size:
-        return np.inf, -np.inf
-    least, greatest = float(np.fmin.reduce(chosen, axis=None)), float(np.fmax.reduce(chosen, axis=None))
-    return (np.inf, -np.inf) if np.isnan(least) else (least, greatest)
 
 
 def _number(value: float) -> str:

@@ -118,14 +118,11 @@ class PaintedWidget(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.forget_ground()
-
-    def forget_ground(self) -> None:
-        """Draw what stands still once more when the widget is next painted."""
-        self._ground = None
+        self.redraw()
 
     def redraw(self) -> None:
-        self.forget_ground()
+        """Draw all of it anew, with what stands still."""
+        self._ground = None
         self.update()
 
     def painter_on_ground(self) -> QPainter:

@@ -50,17 +50,14 @@ DARK = Tokens(
 )  # fmt: skip
 
 
-def current_tokens() -> Tokens:
-    """Return the theme the system asks for."""
+def chosen_tokens() -> Tokens:
+    """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
+    if (chosen := theme()) != "system":
+        return DARK if chosen == "dark" else LIGHT
     scheme = QGuiApplication.styleHints().colorScheme()
     if scheme == Qt.ColorScheme.Unknown:
         return DARK if QGuiApplication.palette().window().color().lightness() < 128 else LIGHT
     return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
-
-
-def chosen_tokens() -> Tokens:
-    """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
-    return {"light": LIGHT, "dark": DARK}.get(theme()) or current_tokens()
 
 
 def theme_of(widget: QWidget) -> Tokens:

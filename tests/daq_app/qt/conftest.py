@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QApplication
 from daq_app.qt.preferences import SCALE, choose, settings, type_scale
 from daq_app.qt.start import open_window
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import style_sheet
+from daq_app.qt.tokens import LIGHT, style_sheet
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
@@ -115,19 +115,18 @@ def type_size():
 
 @pytest.fixture
 def subject_page(application, type_size):
-    """Return a function that shows a view in a window for the subject, at a size of type."""
+    """Return a function that shows a view in a window for the subject, in the program's own style."""
     windows = []
 
-    def show_page(view, scale, size, direction=None, theme=None, hand=None):
+    def show_page(view, scale=1.0, direction=Qt.LayoutDirection.LeftToRight):
         type_size(scale)
         window = SubjectWindow(lambda: 0.0)
         windows.append(window)
-        window.setStyleSheet("" if theme is None else style_sheet(theme))
-        if direction is not None:
-            window.setLayoutDirection(direction)
-        window.resize(*size)
+        window.setStyleSheet(style_sheet(LIGHT))
+        window.setLayoutDirection(direction)
+        window.resize(1366, 768)
         window.show()
-        window.show_view(view, hand)
+        window.show_view(view, "right")
         for _ in range(3):
             application.processEvents()
         return window

@@ -9,6 +9,8 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter, QPicture
 
+from daq_app.qt.painting import PaintedWidget
+
 contrast = run_path(str(Path(__file__).parents[3] / "docs" / "looks.py"))["contrast"]  # of two colours
 ROUNDING = 2.0  # of a letter that leans over the edge of its advance [px]
 
@@ -31,8 +33,8 @@ class PaintedText:
 
 def painted_texts(widget):
     """Return every text that a widget paints, its ground painted anew."""
-    if hasattr(widget, "forget_ground"):
-        widget.forget_ground()
+    if isinstance(widget, PaintedWidget):
+        widget.redraw()
     with _noting() as texts:
         widget.grab()
     return [text for text in texts if text.words]

@@ -16,12 +16,6 @@ TRANSLATED = ("de", "fr", "ja", "ar")
 NAMES = ("{number}", "{count}", "{code}", "{low}", "{high}", "{score}")
 
 
-@pytest.fixture
-def show_page(subject_page):
-    """Return a function that shows the subject's page."""
-    return lambda view: subject_page(view, 1.0, (900, 560))
-
-
 @pytest.mark.parametrize("language", TRANSLATED)
 def test_each_file_has_every_text_with_its_words_in_braces(language):
     texts = translations(SUBJECT, language)
@@ -35,17 +29,17 @@ def test_a_language_that_the_program_does_not_speak_leaves_its_own_texts_english
     assert translator("nl")(SubjectText.NEXT) == "Next"
 
 
-def test_a_page_that_changes_its_language_has_every_word_in_the_new_one(show_page):
+def test_a_page_that_changes_its_language_has_every_word_in_the_new_one(subject_page):
     english = protocol("sensotact-friction").blocks[0]
-    page = show_page(SubjectView("line", "How sticky was it?", "", english.scale_ends, 0, (1, 1), "right", "en"))
+    page = subject_page(SubjectView("line", "How sticky was it?", "", english.scale_ends, 0, (1, 1), "right", "en"))
     german = protocol("sensotact-friction").in_language("de").blocks[0]
     page.show_view(SubjectView("line", german.question, "", german.scale_ends, 0, (1, 1), "right", "de"), None)
     texts = [part.text() for part in page.findChildren(QLabel) if part.isVisible() and part.text()]
     assert sorted(texts) == sorted([german.question, *german.scale_ends])
 
 
-def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(show_page):
-    page = show_page(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
+def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(subject_page):
+    page = subject_page(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
     line = page.line
     assert page.layoutDirection() == Qt.LayoutDirection.RightToLeft
     assert line.place_of(0.0).x() > line.place_of(100.0).x()
@@ -59,8 +53,8 @@ def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(show_page)
     assert page.next.text() == "التالي"
 
 
-def test_back_in_english_the_line_is_as_it_was(show_page):
-    page = show_page(SubjectView("line", "كم؟", "", ("a", "b"), 0, (1, 1), "right", "ar"))
+def test_back_in_english_the_line_is_as_it_was(subject_page):
+    page = subject_page(SubjectView("line", "كم؟", "", ("a", "b"), 0, (1, 1), "right", "ar"))
     page.show_view(SubjectView("line", "How?", "", ("a", "b"), 0, (2, 1)), None)
     assert page.line.place_of(0.0).x() < page.line.place_of(100.0).x()
     assert page.next.text() == "Next"
@@ -68,8 +62,8 @@ def test_back_in_english_the_line_is_as_it_was(show_page):
 
 @pytest.mark.parametrize("hand", ["left", "right"])
 @pytest.mark.parametrize("language", ["en", "ar"])
-def test_next_stands_where_the_answering_hand_is_in_every_language(show_page, language, hand):
-    page = show_page(SubjectView("line", "?", "", ("a", "b"), 0, (1, 1), hand, language))
+def test_next_stands_where_the_answering_hand_is_in_every_language(subject_page, language, hand):
+    page = subject_page(SubjectView("line", "?", "", ("a", "b"), 0, (1, 1), hand, language))
     page.line._take(page.line.answer.press(0.0, 50.0, "mouse").release())
     QApplication.processEvents()
     place = page.next.mapTo(page, page.next.rect().center()).x()
@@ -83,9 +77,9 @@ def test_a_character_that_no_font_draws_is_named():
 
 
 @pytest.mark.parametrize("language", TRANSLATED)
-def test_screen_readers_speak_the_language_of_the_page_and_tell_the_line_as_a_slider(show_page, language):
+def test_screen_readers_speak_the_language_of_the_page_and_tell_the_line_as_a_slider(subject_page, language):
     words = translator(language)
-    page = show_page(SubjectView("line", "?", ends=("low", "high"), key=(1, 1), language=language))
+    page = subject_page(SubjectView("line", "?", ends=("low", "high"), key=(1, 1), language=language))
     name = words(SubjectText.LINE).format(low="low", high="high")
     reader = QAccessible.queryAccessibleInterface(page.line)
     assert reader.role() == QAccessible.Role.Slider

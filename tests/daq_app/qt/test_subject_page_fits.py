@@ -25,16 +25,6 @@ LEFT_TO_RIGHT = Qt.LayoutDirection.LeftToRight
 READING = [(GERMAN, LEFT_TO_RIGHT), (JAPANESE, LEFT_TO_RIGHT), (ARABIC, RIGHT_TO_LEFT)]
 
 
-@pytest.fixture
-def page(subject_page):
-    """Return a function that shows a view in a window for the subject, in the program's own style."""
-
-    def show(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
-        return subject_page(view, scale, size, direction, tokens.LIGHT, "right")
-
-    return show
-
-
 def box(widget):
     window = widget.window()
     return QRect(widget.mapTo(window, widget.rect().topLeft()), widget.size())
@@ -42,16 +32,16 @@ def box(widget):
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
 @pytest.mark.parametrize(("text", "direction"), READING, ids=["German", "Japanese", "Arabic"])
-def test_a_long_instruction_is_seen_whole_with_the_bar_beneath_it(page, text, direction, scale):
-    window = page(SubjectView("read", text[:40], text, force=True), scale, direction)
+def test_a_long_instruction_is_seen_whole_with_the_bar_beneath_it(subject_page, text, direction, scale):
+    window = subject_page(SubjectView("read", text[:40], text, force=True), scale, direction)
     assert cut_off(window) == []
     boxes = [box(window._title), box(window._text), box(window.press)]
     assert all(window.rect().contains(rect) for rect in boxes)
     assert not any(upper.intersects(lower) for upper, lower in pairwise(boxes))
 
 
-def test_type_becomes_smaller_only_where_a_text_is_not_seen_whole(page):
-    short = page(SubjectView("read", "Please wait", "Keep your fingers off the surface."), 2.0)
+def test_type_becomes_smaller_only_where_a_text_is_not_seen_whole(subject_page):
+    short = subject_page(SubjectView("read", "Please wait", "Keep your fingers off the surface."), 2.0)
     assert short._title.font().pixelSize() == 2 * LARGER
     short.show_view(SubjectView("read", "Please wait", 2 * GERMAN), "right")
     assert short._title.font().pixelSize() < 2 * LARGER
@@ -61,9 +51,9 @@ def test_type_becomes_smaller_only_where_a_text_is_not_seen_whole(page):
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 @pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])
-def test_the_words_of_each_end_stand_beneath_it_and_are_seen_whole(page, direction, scale):
+def test_the_words_of_each_end_stand_beneath_it_and_are_seen_whole(subject_page, direction, scale):
     ends = ("pas du tout collante", "aussi collante que possible")
-    window = page(SubjectView("line", "À quel point ?", ends=ends, key=(1, 1)), scale, direction)
+    window = subject_page(SubjectView("line", "À quel point ?", ends=ends, key=(1, 1)), scale, direction)
     assert cut_off(window) == []
     line = window.line
     for position, words in zip((0.0, 100.0), ends, strict=True):
@@ -74,8 +64,8 @@ def test_the_words_of_each_end_stand_beneath_it_and_are_seen_whole(page, directi
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
-def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_whole(page, scale):
-    window = page(SubjectView("choice", "Which one?", key=(1, 1)), scale)
+def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_whole(subject_page, scale):
+    window = subject_page(SubjectView("choice", "Which one?", key=(1, 1)), scale)
     for button in (window.choice.first, window.choice.second):
         assert button.width() >= button.sizeHint().width()
         assert button.height() >= 96 * scale
