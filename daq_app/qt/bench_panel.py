@@ -104,8 +104,8 @@ class BenchPanel(Panel):
     def _show_devices(self, view: BenchView) -> None:
         typed = self._chosen_uri()
         self._choice.clear()
-        for device in view.devices:
-            self._choice.addItem(f"{device.name} · {device.detail}", device.uri)
+        for uri, words in view.devices:
+            self._choice.addItem(words, uri)
         wanted = view.uri or typed or "sim:"
         at = self._choice.findData(wanted)
         self._choice.setCurrentIndex(at)

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
-from daq_app.window.live_feed import LiveFeed, Load, together
+from daq_app.window.live_feed import LiveFeed, together
 from daq_app.window.live_model import Settle
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.state import (
@@ -107,9 +107,6 @@ class Bridge(QObject):
     def session_now(self) -> float:
         return self._clock() + self.session_offset
 
-    def post(self, message: Message) -> None:
-        self._from_threads.put(message)
-
     def send(self, message: Message) -> None:
         """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
         self._fold(message)
@@ -124,7 +121,7 @@ class Bridge(QObject):
     def search(self) -> None:
         """Look for transducers, without holding up the window."""
         self.send(Searching())
-        threading.Thread(target=lambda: self.post(DevicesFound(reachable())), daemon=True).start()
+        self._look_up(lambda: DevicesFound(reachable()))
 
     def poll(self) -> None:
         """Take what has come, and let it be drawn."""
@@ -160,11 +157,6 @@ class Bridge(QObject):
                 return
             case m.Device(info):
                 self.feed.device(info)
-                self._look_up_life(info.serial)
-            case m.HealthReport(peak=peak) if Load(peak).over != self.state.bench.peak.over:
-                self._look_up_own_life()
-            case m.Tared():
-                self._look_up_own_life()
             case m.NoDevice():
                 self.feed.device(None)
             case m.SessionBegun(plan=plan, clock_offset_ns=offset):
@@ -172,16 +164,17 @@ class Bridge(QObject):
                 self.model.follow(plan)
             case _:
                 pass
+        before = self.state.bench.peak.over
         self._fold(report)
         self._judge.heard(report, self.feed)
+        bench = self.state.bench
+        if bench.info is not None and (isinstance(report, m.Device | m.Tared) or bench.peak.over != before):
+            serial = bench.info.serial
+            self._look_up(lambda: LifeKnown(serial, life_of(serial)))  # from a file that grows for years
 
-    def _look_up_own_life(self) -> None:
-        if self.state.bench.info is not None:
-            self._look_up_life(self.state.bench.info.serial)
-
-    def _look_up_life(self, serial: str) -> None:
-        """Look up what a serial number has been through, without holding up the window: its file grows for years."""
-        threading.Thread(target=lambda: self.post(LifeKnown(serial, life_of(serial))), daemon=True).start()
+    def _look_up(self, what: Callable[[], Message]) -> None:
+        """Look something up in a thread, which does not hold up the window."""
+        threading.Thread(target=lambda: self._from_threads.put(what()), daemon=True).start()
 
     def _settle(self, judged: Judged) -> None:
         """Ask for the full solve of a stroke that was looked at."""

@@ -54,15 +54,6 @@ def greatest(six: tuple[float, ...]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceRow:
-    """A transducer that can be connected."""
-
-    uri: str
-    name: str
-    detail: str
-
-
-@dataclass(frozen=True, slots=True)
 class Bar:
     """How far one axis, or all together, is loaded."""
 
@@ -90,7 +81,7 @@ class BenchView:
     drift: str
     noise: str  # of the zero: that of the loudest force and torque
     life: tuple[tuple[str, str], ...]  # of its serial number
-    devices: tuple[DeviceRow, ...]
+    devices: tuple[tuple[str, str], ...]  # address and words of each that can be connected
     searching: bool
     search_words: str  # what a search came to; empty before the first
     uri: str
@@ -238,12 +229,12 @@ def _drift(bench: BenchState) -> str:
     return tr("{moved} since the first", moved=quantity(1000 * moved, 0, "mN"))
 
 
-def _devices(bench: BenchState) -> tuple[DeviceRow, ...]:
-    rows = [DeviceRow("sim:", tr("Simulated bench"), tr("always there"))]
+def _devices(bench: BenchState) -> tuple[tuple[str, str], ...]:
+    rows = [("sim:", f"{tr('Simulated bench')} · {tr('always there')}")]
     for device in bench.devices:
         if (info := device.info) is not None:
             detail = tr("serial {serial} · {source}", serial=info.serial, source=info.calibration.source)
-            rows.append(DeviceRow(device.uri, info.model, detail))
+            rows.append((device.uri, f"{info.model} · {detail}"))
     return tuple(rows)
 
 
