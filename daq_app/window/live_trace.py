@@ -93,7 +93,7 @@ class LiveTrace:
         a, b = self._positions(first, last)
         if b - a <= 2 * count:
             time, values = self._time[a:b].copy(), self._values[:, a:b].astype(np.float64)
-            return _with_gaps(time, values, np.flatnonzero(np.diff(time) > self._gap), 1)
+            return Columns(*broken(time, values, np.flatnonzero(np.diff(time) > self._gap) + 1))
         width = (last - first) / count
         if self._columns.width != width or self._columns.first > first:
             self._columns = self._no_columns(width, first)
@@ -137,7 +137,7 @@ class _Columns:
         """Return the least and the greatest value of each column, with gaps where readings are missing."""
         behind = np.flatnonzero(np.diff(self.numbers) > 1 + gap / self.width)
         at = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
-        return _with_gaps(at, self.pairs.astype(np.float64), behind, 2)
+        return Columns(*broken(at, self.pairs.astype(np.float64), 2 * (behind + 1)))
 
 
 def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -154,15 +154,10 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
     return pairs
 
 
-def _with_gaps(time: Array, values: Array, gaps: NDArray[np.int64], each: int) -> Columns:
-    """Return the columns with a nan behind those named in `gaps`; each column is `each` points."""
-    if not len(gaps):
-        return Columns(time, values)
-    return Columns(*broken(time, values, (gaps + 1) * each))
-
-
 def broken(time: Array, values: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return times (n,) and values (channels, n) with a nan before the places `at`: a line there is no reading."""
+    if not len(at):
+        return time, values
     times: Array = np.insert(time, at, time[at])
     return times, np.insert(values, at, np.nan, axis=1)
 
