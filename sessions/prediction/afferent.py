@@ -8,13 +8,14 @@ bound: what it adds is the course in time.
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from drivers.arrays import Array
 from sessions.prediction.options import BY_NAME
 from sessions.prediction.stored import Ends, SessionPrediction, TrialPrediction
+from sessions.strokes.stroke import Meaning, meanings
 from solver.quantities import NAMES, QUANTITIES, SED
 
 STEP = 1e-3  # [s]
@@ -23,6 +24,7 @@ SHOWN = 10  # every so many steps the rate is kept
 
 
 _EDIN_2004 = "Edin 2004, J. Neurophysiol. 92:3233"
+_SAAL_2023 = "Saal, Birznieks & Johansson 2023, eLife 89616"
 # The threshold of each family of quantities, in its unit: what 1 % strain makes in the published dermis, E = 0.08 MPa.
 _ENERGY = 4e-6, "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0.08 MPa"
 _STRAIN = 0.01, "1 % strain"
@@ -41,34 +43,28 @@ class AfferentSettings:
     follows x with the time constant: da/dt = (x - a) / adaptation_time.
     """
 
+    # Of each its unit ("": the quantity's own) and what it rests on; no authority is claimed for the numbers.
     quantity: str = SED.name
-    threshold: float = _ENERGY[0]
-    exponent: float = 1.0
-    background: float = 5.0
-    static_gain: float = 20.0
-    dynamic_gain: float = 4.0
-    adaptation_gain: float = 6.0
-    adaptation_time: float = 1.5
-    greatest_rate: float = 100.0
-    variation: float = 0.2
-    refractory: float = 2e-3
-    seed: int = 0
+    threshold: Annotated[float, Meaning("", f"that units fire from below 1 %: {_EDIN_2004}")] = _ENERGY[0]
+    exponent: Annotated[
+        float, Meaning("-", "1: rate follows the quantity; 0.5 with an energy: rate follows strain")
+    ] = 1.0
+    background: Annotated[float, Meaning("imp/s", f"that SA-2s fire at rest: {_SAAL_2023}")] = 5.0
+    static_gain: Annotated[float, Meaning("imp/s", "at the reference; sweep 5 to 40")] = 20.0
+    dynamic_gain: Annotated[
+        float, Meaning("imp/s per 1/s", f"that rate grows with strain rate: {_EDIN_2004}; sweep 0 to 15")
+    ] = 4.0
+    adaptation_gain: Annotated[
+        float, Meaning("imp/s", "below the static gain: these units never fall silent; sweep 0 to 15")
+    ] = 6.0
+    adaptation_time: Annotated[float, Meaning("s", "sweep 0.3 to 5")] = 1.5
+    greatest_rate: Annotated[float, Meaning("imp/s", f"peaks of 50 to 95 imp/s: {_EDIN_2004}")] = 100.0
+    variation: Annotated[float, Meaning("-", "coefficient of variation of intervals; sweep 0.1 to 0.4")] = 0.2
+    refractory: Annotated[float, Meaning("s", "sweep 1 to 5 ms")] = 2e-3
+    seed: Annotated[int, Meaning("-", "of the spike times")] = 0
 
 
-# Unit ("": the quantity's own), standing, and what it rests on. "assumed": no authority is claimed for the number.
-PARAMETERS: Mapping[str, tuple[str, str, str]] = {
-    "threshold": ("", "assumed", f"that units fire from below 1 %: {_EDIN_2004}"),
-    "exponent": ("-", "assumed", "1: rate follows the quantity; 0.5 with an energy: rate follows strain"),
-    "background": ("imp/s", "assumed", "that SA-2s fire at rest: Saal, Birznieks & Johansson 2023, eLife 89616"),
-    "static_gain": ("imp/s", "assumed", "at the reference; sweep 5 to 40"),
-    "dynamic_gain": ("imp/s per 1/s", "assumed", f"that rate grows with strain rate: {_EDIN_2004}; sweep 0 to 15"),
-    "adaptation_gain": ("imp/s", "assumed", "below the static gain: these units never fall silent; sweep 0 to 15"),
-    "adaptation_time": ("s", "assumed", "sweep 0.3 to 5"),
-    "greatest_rate": ("imp/s", "assumed", f"peaks of 50 to 95 imp/s: {_EDIN_2004}"),
-    "variation": ("-", "assumed", "coefficient of variation of intervals; sweep 0.1 to 0.4"),
-    "refractory": ("s", "assumed", "sweep 1 to 5 ms"),
-    "seed": ("-", "set", "of the spike times"),
-}
+PARAMETERS = meanings(AfferentSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,11 +203,11 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
         basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
         of_reference = {"name": "reference", "value": reference, "unit": quantity.unit}
         rows.append({**of_reference, "standing": "assumed", "basis": basis})
-    for name, (unit, standing, basis) in PARAMETERS.items():
+    for name, (unit, basis) in PARAMETERS.items():
         value: float = getattr(settings, name)
-        chosen = standing if value == getattr(usual, name) else "set"
+        standing = "assumed" if value == getattr(usual, name) and name != "seed" else "set"
         rests = f"{_THRESHOLDS[quantity.name][1]}; {basis}" if name == "threshold" else basis
-        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": chosen, "basis": rests})
+        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": standing, "basis": rests})
     return rows
 
 
