@@ -18,14 +18,13 @@ from sessions.run.steps import Event
 Line = tuple[str, int | None, dict[str, Any]]  # kind, number of the trial, data
 
 
-def kind_of(event: steps.Event) -> str:
+def kind_of(event: type[steps.Event]) -> str:
     """Return the kind an event is logged as: its name in small letters, or the one that the file format has for it.
 
-    >>> from sessions.run.steps import ContactOnset
-    >>> kind_of(ContactOnset())
+    >>> kind_of(steps.ContactOnset)
     'contact_onset'
     """
-    return _kind(type(event))
+    return _RECORDED_AS.get(event) or re.sub(r"(?<!^)(?=[A-Z])", "_", event.__name__).lower()
 
 
 def data_of(event: steps.Event) -> dict[str, Any]:
@@ -79,10 +78,6 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  whatever an event holds
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _kind(cls: type[steps.Event]) -> str:
-    return _RECORDED_AS.get(cls) or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
-
-
 _COMMANDS: dict[type[steps.Command], str] = {  # whose line holds all that the command does
     steps.StartTake: "take_started",
     steps.KeepTake: "take_kept",
@@ -92,7 +87,7 @@ _COMMANDS: dict[type[steps.Command], str] = {  # whose line holds all that the c
     steps.Tell: "told",
 }
 _RECORDED_AS: dict[type[steps.Event], str] = {steps.MagnitudeEstimate: "number_given", steps.PairedChoice: "chosen"}
-_EVENTS: dict[str, type[steps.Event]] = {_kind(cls): cls for cls in get_args(steps.Event)}
+_EVENTS: dict[str, type[steps.Event]] = {kind_of(event): event for event in get_args(steps.Event)}
 
 
 # What experimenter and subject do. All else that happens comes of readings and clock, and is found in them once more.

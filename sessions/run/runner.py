@@ -209,15 +209,15 @@ class _Run:
 
     def _take(self, event: Event) -> None:
         """Let the machine decide about an event, write both down, then show what it asks for."""
-        before = self._state
+        before, kind = self._state, kind_of(type(event))
         self._state, commands = advance(before, event)
         refusals = [command for command in commands if isinstance(command, Refuse)]
         if refusals:
-            data = {"event": kind_of(event), "sentence": refusals[0].sentence, "given": data_of(event)}
+            data = {"event": kind, "sentence": refusals[0].sentence, "given": data_of(event)}
             self.writer.event("refused", trial_in_hand(before), data)
             self.operator.show(refusals[0])
             return
-        logged = self.writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
+        logged = self.writer.event(kind, trial_in_hand(before), data_of(event), commit=False)
         for command in commands:
             if isinstance(command, AskRest):  # reckoned from the event it follows, whose instant a replay knows
                 self._rested_ns = None if command.duration is None else logged.time_ns + round(command.duration * 1e9)
