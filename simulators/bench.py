@@ -83,6 +83,7 @@ class Bench:
     def __init__(self, seed: int = 0, settings: BenchSettings | None = None) -> None:
         self.settings = settings or BenchSettings()
         self.seed = seed
+        self.serial = f"SIM{seed:05d}"  # of the transducer, where it has a wire
         self._lock = threading.Lock()
         self._mounted: Surface | None = None
         # Beginning [s], course and truth of each stroke; in order, never overlapping. Replaced, never changed.

@@ -61,7 +61,7 @@ class DigitalFtBox(LineBox):
         return f"digital-ft://{self.path}?parity=none"
 
     def _calibration(self) -> bytes:
-        serial = f"SIM{self._bench.seed:05d}".encode()[:8]
+        serial = self._bench.serial.encode()[:8]
         stated = np.vstack([FT32831[:3], FT32831[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
         ratings = np.concatenate([self._rated[:3], self._rated[3:] / 1000.0])
         names = (

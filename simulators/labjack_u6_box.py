@@ -326,7 +326,7 @@ class SimulatedBus(_Backend):
 def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningSimulator:
     box = LabJackU6Box(bench, clock, faults=faults)
     bus = usb_link.BACKEND = SimulatedBus([box])
-    uri = f"labjack-u6://?rate=300&cal={calibration_file(folder, f'SIM{bench.seed:05d}')}"
+    uri = f"labjack-u6://?rate=300&cal={calibration_file(folder, bench.serial)}"
 
     def forget() -> None:
         usb_link.BACKEND = None

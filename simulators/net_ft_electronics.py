@@ -197,7 +197,7 @@ class Electronics:
         self._bench = bench
         self._faults = faults
         self._rated = np.array(bench.settings.rated)
-        self.pages = Pages(f"SIM{bench.seed:05d}", self._rated, rate, product)
+        self.pages = Pages(bench.serial, self._rated, rate, product)
         self._ticks_a_second = product.ticks * (1.0 + rate_error)
         self._bias = np.zeros(6)  # software bias [N, N mm]
         self._powered = 0.0  # when the counter stood at _first_tick [s]

@@ -129,7 +129,7 @@ class _Task:
 def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningSimulator:
     library = SimulatedNidaqmx(bench, clock, faults)
     library.install()
-    uri = f"nidaq://Dev1?cal={calibration_file(folder, f'SIM{bench.seed:05d}')}"
+    uri = f"nidaq://Dev1?cal={calibration_file(folder, bench.serial)}"
     return RunningSimulator(uri, bench, library.now, unplug(faults), lambda: library.open, library.remove)
 
 

@@ -48,12 +48,8 @@ class SerialFtBox(LineBox):
         return (
             f"serial-ft://{self.path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
             f"&counts_per_Nm={COUNTS_PER_NM:g}&range_N={force:g}&range_Nm={torque:g}"
-            f"&serial={self._serial}&simulated=1"
+            f"&serial={self._bench.serial}&simulated=1"
         )
-
-    @property
-    def _serial(self) -> str:
-        return f"SIM{self._bench.seed:05d}"
 
     def power_up(self, now: float) -> None:
         """Forget what is not kept over power-off."""
@@ -70,7 +66,7 @@ class SerialFtBox(LineBox):
         """Send the banner and records that are due, and answer bytes as they come."""
         if self._ready_at is not None and now >= self._ready_at:
             self._ready_at = None
-            self._say(port, BANNER % self._serial.encode() + b">")
+            self._say(port, BANNER % self._bench.serial.encode() + b">")
         self._send_due(port, now)
         for byte in port.heard(self._until_due()):
             if self._ready_at is None:

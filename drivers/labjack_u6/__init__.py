@@ -1,8 +1,7 @@
 """The LabJack U6: finding the one an address names, and what is said around a stream of six gauge voltages."""
 
 import contextlib
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +44,8 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
     scans = wire.scan_clock(place.rate)
     conversation = _GaugeConversation(identity.serial, constants, scans)
     info = _info(place, place.calibration, identity, constants, scans)
-    return StreamingTransducer(info, partial(_again, place, identity.serial), conversation, clock, opening=deadline)
+    same = replace(place, serial=identity.serial)  # wherever it is plugged in when it is opened anew
+    return StreamingTransducer(info, lambda limit: _open_link(same, limit)[0], conversation, clock, opening=deadline)
 
 
 def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
@@ -89,11 +89,6 @@ def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identit
         raise LinkLost(f"{place.uri}: no {which} is plugged in; check its USB cable")
     ((one, identity),) = fitting.values()
     return UsbLink(one, _ENDPOINTS, place.uri), identity
-
-
-def _again(place: _Where, serial: int, deadline: Deadline) -> UsbLink:
-    """Open the same converter anew, wherever it is plugged in now."""
-    return _open_link(_Where(place.uri, serial, place.rate, place.calibration), deadline)[0]
 
 
 def _info(
