@@ -158,7 +158,9 @@ def test_a_box_on_a_busy_computer_sends_what_is_due_before_it_hears_another_star
         box._until_due = delay_once
         hold.wait()
         udp.send(START)
-        records += receive_records(udp, 300)
+        while records[-1][0] > 300 or len(records) < 305:  # more are due where this computer is busy itself
+            records += receive_records(udp, 1)
+            assert len(records) < 3000
     assert set(np.diff([ticks for _, ticks, *_ in records]).tolist()) == {35}
     assert [number for number, *_ in records].count(1) == 2
 
