@@ -5,7 +5,7 @@ import errno
 import importlib
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -96,7 +96,7 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
         subject_simulated="subject" in (head.simulated or ""),
         clock=StillClock(exported.events[-1].time_ns if exported.events else 0),
     )
-    try:
+    with closing(writer):
         readings = RecordedReadings(exported.blocks())
         for event in exported.events:  # in the order in which both were recorded
             for block in readings.blocks_up_to(event.readings):
@@ -115,8 +115,6 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
             problems.append("what was written is not what the export holds")
         for sentence in problems:
             writer.event("not_restored", data={"sentence": sentence}, commit=False)
-    finally:
-        writer.close()
     for name, content in exported.side_files.items():
         write_whole(folder / name, content)
     return tuple(problems)

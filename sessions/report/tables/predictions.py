@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sessions.prediction import SED
-from sessions.prediction.stored import Alternative, Ends, SedInterval
+from sessions.prediction.stored import Alternative, Ends, SedInterval, Variant
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.tables import Cell, Row, Rows, Table, estimate_cell, group_by_experiment, number_cell, table
 from sessions.report.wording import (
@@ -124,13 +124,11 @@ def _responding(p: PredictionFinding, shown: ShownResponse) -> Cell:
 
 def variants_table(report: Report) -> Table | None:
     """Return each trial's SED in every variant it was predicted in, side by side; strains one under another."""
-    ways = _ways(report)
-    if not ways:
-        return None
 
     def cell(one: Alternative) -> Cell:
         return _sed(one.sed, one.error_estimate, one.reason, one.interval, one.doubt)
 
+    ways = dict.fromkeys(variant.way for variant in _variants(report))
     legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
     words = caption("variants", legend=legend, how=_HOW)
@@ -139,9 +137,6 @@ def variants_table(report: Report) -> Table | None:
 
 def variant_forces_table(report: Report) -> Table | None:
     """Return the normal force of each variant, or the depth that the measured force presses it to."""
-    ways = _ways(report)
-    if not ways:
-        return None
 
     def cell(one: Alternative) -> Cell:
         pressed = one.variant.driven == "force"
@@ -153,22 +148,19 @@ def variant_forces_table(report: Report) -> Table | None:
         estimate = _Estimate(None if one.sed is None else value, error, one.reason, ends, why, one.doubt)
         return _cell(estimate, places(2), 2)
 
-    alternatives = [one.variant for p in report.predictions for one in p.alternatives]
-    units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in alternatives}
-    columns = " | ".join(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))
+    units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
+    columns = " | ".join(f"({n}) [{unit}]" for n, unit in enumerate(units.values(), 1))
     return _table(report, "table-beside-forces", caption("variant-forces"), columns, _by_strain(report, cell))
 
 
-def _ways(report: Report) -> tuple[str, ...]:
-    """Return the ways trials were predicted otherwise, the same at each strain."""
-    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
-    return tuple(dict.fromkeys(one.variant.way for one in first))
+def _variants(report: Report) -> list[Variant]:
+    """Return how trials were predicted otherwise, in the same ways at each strain; [] where none was."""
+    return [one.variant for one in next((p.alternatives for p in report.predictions if p.alternatives), ())]
 
 
 def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows]:
-    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
     groups: list[Rows] = []
-    for strain in dict.fromkeys(one.variant.kinematics for one in first):
+    for strain in dict.fromkeys(variant.kinematics for variant in _variants(report)):
 
         def row(p: PredictionFinding, strain: str = strain) -> Row:
             return tuple(cell(one) for one in p.alternatives if one.variant.kinematics == strain)
