@@ -126,12 +126,7 @@ def _other_answers(recording: "Recording") -> str:
 
 
 def distinct_sessions(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
-    """Return each session once, in the order first met.
-
-    >>> table = ScoreTable("a", "P01", False, ())
-    >>> len(distinct_sessions([table, table]))
-    1
-    """
+    """Return each session once, in the order first met."""
     return tuple(same[0] for same in by_key((table.session, table) for table in tables).values())
 
 
@@ -139,11 +134,6 @@ def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
     """Return one score a subject and stimulus: the mean of the subject's own repeats, over all its sessions.
 
     Trials are not subjects; pooling them would make intervals too narrow.
-
-    >>> first = ScoreTable("a", "P01", False, (Score("P01", "stickiness", 20, 10.0),))
-    >>> again = ScoreTable("b", "P01", False, (Score("P01", "stickiness", 20, 30.0),))
-    >>> subject_scores([first, again])
-    (Score(subject='P01', descriptor='stickiness', index=20, score=20.0),)
     """
     answers = by_key(
         ((table.subject, one.descriptor, one.index), one.score) for table in tables for one in table.scores

@@ -166,11 +166,7 @@ def differences(table: Table) -> tuple[Difference, ...]:
 
 
 def holm(ps: Sequence[float]) -> tuple[float, ...]:
-    """Return p values that allow for there being several (Holm 1979, Scand. J. Stat. 6:65).
-
-    >>> holm([0.01, 0.04, 0.03])
-    (0.03, 0.06, 0.06)
-    """
+    """Return p values that allow for there being several (Holm 1979, Scand. J. Stat. 6:65)."""
     adjusted, greatest = [0.0] * len(ps), 0.0
     for rank, place in enumerate(sorted(range(len(ps)), key=lambda i: ps[i])):
         greatest = max(greatest, min(1.0, (len(ps) - rank) * ps[place]))

@@ -20,7 +20,6 @@ from sessions.report.tables.session import paths_sentence, planted_table, relati
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.trials import omissions
-from sessions.report.wording import correlation
 
 FORCE = Variant("small", "computed", "force")
 DOUBT = "Tissue is turned inside out somewhere."
@@ -175,11 +174,6 @@ def test_the_error_bars_of_prediction_against_score_hold_what_the_uncertainty_of
     assert [row[high] for row in panel.rows] == pytest.approx(1.005 * seds)
     doubtful = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own])
     assert {row[low] for row in doubtful.rows} == {None}
-
-
-def test_a_difference_of_correlations_that_rounds_to_zero_has_no_minus_sign():
-    assert correlation(-0.004) == "+0.00"
-    assert correlation(-0.006) == "−0.01"
 
 
 def test_one_session_of_a_study_is_no_each():

@@ -23,7 +23,7 @@ from sessions.statistics.correlations import (
     required_cases,
     steiger_z,
 )
-from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
+from sessions.statistics.mixed_model import crossed_deviance
 from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, Rival, RivalTrial, rivals_of_means, rivals_within
 from sessions.statistics.within_subjects import repeated_correlation
 from solver import Finger, solve_many
@@ -291,10 +291,6 @@ def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
     x = draw.normal(size=50)
     y = np.array([16.0, 31.0, 38.0, 100.0, 105.2])[what] + 8.0 * draw.normal(size=10)[who] + 2.0 * draw.normal(size=50)
     assert math.isfinite(crossed_deviance([str(name) for name in who], what, y, x))
-
-
-def test_weights_are_those_of_the_published_rule():
-    assert akaike_weights([204.0, 202.0, 206.0]) == pytest.approx((0.2447, 0.6652, 0.0900), abs=1e-4)
 
 
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
