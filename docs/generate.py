@@ -40,16 +40,8 @@ def command_line() -> str:
     for name, does in main.VERBS.items():
         parsers.append((name, does, main.parser_of(name, main.verb_module(name))))
     for name, does, parser in parsers:
-        lines += [
-            f"## {name}",
-            "",
-            f"{does[0].upper()}{does[1:]}.",
-            "",
-            "```text",
-            parser.format_help().rstrip(),
-            "```",
-            "",
-        ]
+        text = parser.format_help().rstrip()
+        lines += [f"## {name}", "", f"{does[0].upper()}{does[1:]}.", "", "```text", text, "```", ""]
     return "\n".join(lines)
 
 
@@ -62,7 +54,8 @@ def scene_keys() -> str:
 def protocol_keys() -> str:
     """Return the keys of a protocol file, table by table."""
     module = importlib.import_module(PROTOCOL)
-    tables = [name for name, kind in vars(module).items() if _is_table(kind) and kind.__module__ == PROTOCOL]
+    kinds = [kind for kind in vars(module).values() if inspect.isclass(kind) and dataclasses.is_dataclass(kind)]
+    tables = [kind.__name__ for kind in kinds if kind.__module__ == PROTOCOL]
     return _keys("Keys of a protocol file", PROTOCOL, tables)
 
 
@@ -75,10 +68,6 @@ def _keys(title: str, module: str, tables: list[str]) -> str:
         rows = [(f"`{one.name}`", _default(one), _cell(meaning.get(one.name, ""))) for one in dataclasses.fields(table)]
         lines += looks.table(("key", "default", "meaning"), rows)
     return "\n".join(lines)
-
-
-def _is_table(kind: object) -> bool:
-    return inspect.isclass(kind) and dataclasses.is_dataclass(kind)
 
 
 def _default(one: "dataclasses.Field[object]") -> str:

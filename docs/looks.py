@@ -23,23 +23,15 @@ PAIRS = (  # what is written on what
 def page() -> str:
     """Return the page."""
     sizes = {"small": tokens.SMALL, "text": tokens.TEXT, "title": tokens.TITLE, "headline": tokens.HEADLINE}
-    lines = [
-        "# Looks of the window",
-        "",
-        "Made from `daq_app/qt/tokens.py`. Sizes are in device-independent pixels.",
-        "",
-    ]
+    about = "Made from `daq_app/qt/tokens.py`. Sizes are in device-independent pixels."
+    lines = ["# Looks of the window", "", about, ""]
     lines += table(("type", "size at 100 %", "at 200 %"), [(n, f"{s}", f"{2 * s}") for n, s in sizes.items()])
     lines += [f"Everything keeps to a grid of {tokens.GRID}. What is pressed is at least {tokens.TARGET} high.", ""]
     fields = [field.name for field in dataclasses.fields(tokens.Tokens) if field.name != "dark"]
     rows = [(name, *(f"`{getattr(theme, name)}`" for theme in THEMES.values())) for name in fields]
     lines += ["## Colours", "", *table(("token", *THEMES), rows)]
-    lines += [
-        "## Contrast",
-        "",
-        "Ratios as WCAG 2.1 has them. Text needs 4.5. A selected row is `on_act` on `act`.",
-        "",
-    ]
+    about = "Ratios as WCAG 2.1 has them. Text needs 4.5. A selected row is `on_act` on `act`."
+    lines += ["## Contrast", "", about, ""]
     contrasts = [
         (f"{a} on {b}", *(f"{contrast(getattr(t, a), getattr(t, b)):.1f}" for t in THEMES.values())) for a, b in PAIRS
     ]
@@ -92,8 +84,7 @@ def _parts() -> QWidget:
 
 
 def _luminance(name: str) -> float:
-    parts = [channel / 255 for channel in (QColor(name).red(), QColor(name).green(), QColor(name).blue())]
-    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in QColor(name).getRgbF()[:3]]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
