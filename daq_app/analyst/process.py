@@ -31,7 +31,7 @@ class _Server:
     """Does what is asked, one thing after the other, and the model's answers in between."""
 
     def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+        self._connection, self._say = connection, connection.send
         self._requests: deque[m.Ask] = deque()
         self._halted = False  # somebody stopped the model's answers
 
@@ -66,9 +66,6 @@ class _Server:
             except Exception as error:  # noqa: BLE001  likewise
                 self._halted = self._halted or request is None
                 self._say(m.Problem(sentence_of(error)))
-
-    def _say(self, message: m.Said) -> None:
-        self._connection.send(message)
 
     def _take(self) -> None:
         while self._connection.poll():

@@ -41,18 +41,15 @@ class Inbox:
     def _read(self) -> None:
         with suppress(OSError, m.BrokenMessage), open(self._reading, "rb", closefd=False) as pipe:
             for request in m.Codec(m.REQUESTS).read(pipe):
-                self._take(request)
+                if isinstance(request, m.Stop | m.Shutdown):
+                    if isinstance(request, m.Shutdown):
+                        self.leaving.set()
+                    self.stop_wanted.set()
+                    threading.Thread(target=self._nudge, name="nudge", daemon=True).start()
+                self._arrived.append(request)
         # A client that cannot be understood is as good as gone.
         self.client_gone.set()
         self.leaving.set()
-
-    def _take(self, request: m.Request) -> None:
-        if isinstance(request, m.Stop | m.Shutdown):
-            if isinstance(request, m.Shutdown):
-                self.leaving.set()
-            self.stop_wanted.set()
-            threading.Thread(target=self._nudge, name="nudge", daemon=True).start()
-        self._arrived.append(request)
 
     def _nudge(self) -> None:
         """Break off what the main thread waits for, again and again until it has noticed."""

@@ -6,9 +6,7 @@ the same press slid the other way.
 
 import argparse
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session
 from daq_app.cli.options import add_analysis, add_flag, add_number, add_shared, add_visit, area_law, numbers_by_key
@@ -66,8 +64,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(recording.simulated_sentence)
     if not console.as_json:
         _print(options, recording, analysis, prediction, afferent, console)
-    if firing:
-        console.say(*map(_parameter, firing["afferent"]["parameters"]))
+    for one in firing["afferent"]["parameters"] if firing else ():
+        name, kind = one["name"].replace("_", " "), f"{one['standing']}; {one['basis']}"
+        console.say(f"  {name} = {one['value']:g} {one['unit']} ({kind})")
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
     return FLAWED if unreadable or any(row.sed is None for row in prediction.trials) else DONE
@@ -121,8 +120,3 @@ def _afferent(options: argparse.Namespace) -> AfferentSettings:
         return settings_with(changes, options.afferent_seed, options.quantity)
     except ValueError as wrong:
         raise WrongValue(f"--afferent-set: {wrong}") from None
-
-
-def _parameter(one: Mapping[str, Any]) -> str:
-    name = one["name"].replace("_", " ")
-    return f"  {name} = {one['value']:g} {one['unit']} ({one['standing']}; {one['basis']})"

@@ -15,7 +15,6 @@ from daq_app.recorder.messages import People, ResumeSession
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import seal
 from sessions.recording.manifest import is_sealed
-from sessions.run.resuming import check_resumable
 
 EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"
 
@@ -38,7 +37,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.result({"session": str(folder), "sealed": True, "readings": sum(map(len, recording.blocks()))})
         console.say(f"{folder}: sealed as it is")
         return DONE if recording.end is not None and recording.end.get("complete") else FLAWED
-    check_resumable(recording)
     factor = float(recording.provenance["clock"]["factor"])
     if options.pace not in (None, factor):
         raise WrongValue(f"--pace {options.pace:g} is not allowed: the session began with {factor:g}")

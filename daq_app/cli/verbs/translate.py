@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from daq_app.console import DONE, Console, WrongValue
 from daq_app.window.subject import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
-from sessions.file_access import remedy, write_whole
+from sessions.file_access import name_failure, write_whole
 from sessions.plan.protocols import protocol
 from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
 from sessions.plan.protocols.protocol import Protocol
@@ -56,12 +56,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     else:
         if options.out.exists():
             raise WrongValue(f"--out {options.out} is there already: give a new file, or move that away")
-        try:
+        with name_failure(RecordingError, f"{options.out} cannot be written", new=True):
             write_whole(options.out, text.encode())
-        except OSError as error:
-            raise RecordingError(
-                f"{options.out} cannot be written ({error.strerror}); {remedy(error, new=True)}"
-            ) from error
     where = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
     console.result({"language": options.language, "missing": missing, **where})
     console.note(f"texts yet to be translated: {missing}" if missing else "every text is translated")

@@ -6,7 +6,6 @@ that was made before: what was concluded blind stays provable. It cannot be take
 
 import argparse
 import hashlib
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -47,7 +46,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     note(folder, "unblinded", {"by": options.by, "session": None if whole else path.resolve().name})
     names: list[str] = []
     for recording in chosen:
-        made_before = dict(_results_before(recording))
+        # Numbers and pages that were made of it while it was blinded.
+        derived = [path for path in sorted(recording.folder.iterdir()) if path.is_file() and path.name not in RECORDED]
+        results = [path for path in derived if path.suffix in (".json", ".jsonl", ".html")]
+        made_before = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in results}
         document = {"unblinded_utc": utc, "by": options.by, "made_before": made_before, "key": key.to_dict()}
         try:
             store_derived(recording.folder, UNBLINDING, document)
@@ -80,10 +82,3 @@ def _select(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording],
         else:
             chosen.append(recording)
     return chosen, refused
-
-
-def _results_before(recording: Recording) -> Iterator[tuple[str, str]]:
-    """Yield name and SHA-256 of each number and page that was made of a session while it was blinded."""
-    for path in sorted(recording.folder.iterdir()):
-        if path.is_file() and path.name not in RECORDED and path.suffix in (".json", ".jsonl", ".html"):
-            yield path.name, hashlib.sha256(path.read_bytes()).hexdigest()
