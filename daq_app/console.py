@@ -16,6 +16,7 @@ from typing import Any, NoReturn, TextIO
 from solver.progress import listening
 
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130  # exit codes
+OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")  # packages
 _COLUMNS = 80  # of a terminal that does not say how many it has
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
 
@@ -45,6 +46,11 @@ class WrongValue(Exception):
 
 class NotWritten(Exception):
     """What was said could not be written: why, where, and what to do."""
+
+
+def is_ours(error: Exception) -> bool:
+    """Say whether an error is of the program's own kinds, whose messages are sentences for people."""
+    return type(error).__module__.partition(".")[0] in OUR_OWN
 
 
 def takes_all(*streams: TextIO) -> None:

@@ -12,6 +12,7 @@ from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Pa
 from daq_app.analyst.session_words import picture_errors, sed_words
 from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history, reversal
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
+from daq_app.console import is_ours
 from daq_app.wording import tr
 from sessions.exchange import ExportSource, export
 from sessions.file_access import failure_sentence, write_whole
@@ -42,7 +43,6 @@ Progress = Callable[[float], bool]
 Urgent = Callable[[], bool]  # whether what is being done must be left for something else
 MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn between two reports of progress
-OWN = ("daq_app", "sessions", "solver")  # packages whose errors are sentences
 
 
 class Work:
@@ -333,8 +333,7 @@ def sentence_of(error: Exception) -> str:
     """Return a failure in a sentence."""
     if isinstance(error, OSError):
         return failure_sentence(error)
-    own = type(error).__module__.partition(".")[0] in OWN
-    return str(error) if own else f"{type(error).__name__}: {error}"
+    return str(error) if is_ours(error) else f"{type(error).__name__}: {error}"
 
 
 def _parts(sketch: Sketch) -> Parts:

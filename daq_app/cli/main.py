@@ -6,7 +6,7 @@ import sys
 import traceback
 from types import ModuleType
 
-from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, Parser, takes_all
+from daq_app.console import DONE, FAILED, OUR_OWN, STOPPED, WRONG, Console, Parser, is_ours, takes_all
 
 HELP = frozenset({"-h", "--help"})
 LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
@@ -47,7 +47,6 @@ _WRONG = (
     "simulators.serving.TimetableError",
     "solver.scene.tables.SceneError",
 )
-_OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")
 
 
 def run(arguments: list[str]) -> int:
@@ -143,10 +142,9 @@ def _failure(error: Exception) -> tuple[str, int]:
     sentence = " ".join(str(error).split())
     if len(sentence) > LONGEST:  # a damaged file put the middle into it
         sentence = f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"
-    kinds = [f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__]
-    if any(kind in _WRONG for kind in kinds):
+    if any(f"{kind.__module__}.{kind.__qualname__}" in _WRONG for kind in type(error).__mro__):
         return sentence, WRONG
-    if sentence and kinds[0].partition(".")[0] in _OUR_OWN:
+    if sentence and is_ours(error):
         return sentence, FAILED
     if isinstance(error, OSError):
         from sessions.file_access import failure_sentence  # here: a verb that is well needs none
@@ -155,7 +153,7 @@ def _failure(error: Exception) -> tuple[str, int]:
     if isinstance(error, UnicodeEncodeError):  # Python has bytes of a name that are no UTF-8 as lone surrogates
         around = error.object[max(error.start - 40, 0) : error.end + 20]
         return f"a name is not UTF-8 ({around!r}): rename the file or folder and run this again", FAILED
-    if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in _OUR_OWN:
+    if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in OUR_OWN:
         package = error.name.partition(".")[0]
         return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED

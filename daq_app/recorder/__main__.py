@@ -9,17 +9,15 @@ import signal
 import sys
 from collections.abc import Callable
 
+from daq_app.console import is_ours
 from daq_app.recorder import messages as m
 from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.display import Display
 from daq_app.recorder.pipes import Inbox, Outbox
 from daq_app.recorder.session import SessionSetup, begin, resume, run
 from drivers.clock import LONGEST_STEP, Clock, clock_at
-from drivers.transducer import DeviceFault, LinkLost, SetupError
-from sessions.recording import RecordingError
 
 LAST_WORDS = 2.0  # for the client to fetch the last reports [s]
-EXPECTED = (DeviceFault, LinkLost, NotNow, RecordingError, SetupError)  # what has a sentence for people
 
 
 def main(pace: float = 1.0) -> None:
@@ -89,10 +87,10 @@ class Recorder:
         """Do something asked for; what goes wrong is reported, and ends nothing else."""
         try:
             work()
-        except EXPECTED as error:
-            self._send(m.Failed(name, " ".join(str(error).split()), type(error).__name__))
         except Exception as error:  # noqa: BLE001  an error of ours must not take the recorder along
-            self._send(m.Failed(name, f"unexpected {type(error).__name__} ({error})", type(error).__name__))
+            kind = type(error).__name__
+            sentence = " ".join(str(error).split()) if is_ours(error) else f"unexpected {kind} ({error})"
+            self._send(m.Failed(name, sentence, kind))
 
 
 if __name__ == "__main__":
