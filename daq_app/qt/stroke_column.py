@@ -53,6 +53,7 @@ class StrokeColumn(QWidget):
         self._numbers = QFormLayout(inside)
         self._numbers.setContentsMargins(0, 0, 0, 0)
         self._numbers.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
+        self._numbers.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         self._scroll = scroll_area(inside)  # where there is little room the numbers are scrolled, never cut
         self._scroll.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._scroll.setAccessibleName(tr("numbers of the stroke and its prediction"))
@@ -86,7 +87,8 @@ class StrokeColumn(QWidget):
             while self._numbers.rowCount():
                 self._numbers.removeRow(0)
             for name, value in lines:
-                self._numbers.addRow(label(name, "quiet"), label(value, wrap=True))
+                self._numbers.addRow(label(name, "quiet"), number := WrappedLabel("value"))
+                number.show_text(value)
 
     def go_to_readings(self) -> None:
         """Go to the first reading of the steady window."""
