@@ -24,6 +24,7 @@ class Quantity:
     meaning: str  # one phrase
     small: Callable[[LocalState], Array]
     finite: Callable[[LocalState], Array]
+    signed: bool = True  # False: never below 0
 
     @property
     def shown_unit(self) -> tuple[str, float]:
@@ -57,7 +58,7 @@ def _finite_volumetric(at: LocalState) -> Array:
     return at.shear / 2.0 * shape(at.stiffening, dilated) + at.lame / 2.0 * at.dilatation**2
 
 
-SED = Quantity("sed", "SED", "MPa", "strain-energy density", _small_energy, _finite_energy)
+SED = Quantity("sed", "SED", "MPa", "strain-energy density", _small_energy, _finite_energy, signed=False)
 VOLUMETRIC = Quantity(
     "sed_volumetric",
     "SED of volume",
@@ -65,6 +66,7 @@ VOLUMETRIC = Quantity(
     "strain-energy density of the same change of volume, alike in all directions",
     _small_volumetric,
     _finite_volumetric,
+    signed=False,
 )
 DEVIATORIC = Quantity(
     "sed_deviatoric",
@@ -73,6 +75,7 @@ DEVIATORIC = Quantity(
     "strain-energy density less that of the change of volume",
     lambda at: _small_energy(at) - _small_volumetric(at),
     lambda at: _finite_energy(at) - _finite_volumetric(at),
+    signed=False,
 )
 
 
@@ -150,6 +153,7 @@ SHEAR = Quantity(
     "difference of the principal stretches in the plane: the greatest engineering shear at small strain",
     lambda at: 2.0 * _small_radius(at),
     _finite_difference,
+    signed=False,
 )
 SHEAR_ALONG = Quantity(
     "shear_along_skin",
@@ -158,6 +162,7 @@ SHEAR_ALONG = Quantity(
     "size of the tangent of the angle by which skin's tangent and normal leave their right angle",
     _small_shear_along,
     _finite_shear_along,
+    signed=False,
 )
 STRETCH_ALONG = Quantity(
     "stretch_along_skin",
@@ -213,15 +218,23 @@ def _principal(stress: Stress) -> tuple[Array, Array]:
     return np.maximum(middle + radius, zz), np.minimum(middle - radius, zz)
 
 
-def _of_stress(name: str, label: str, meaning: str, invariant: Callable[[Stress], Array]) -> Quantity:
+def _of_stress(
+    name: str, label: str, meaning: str, invariant: Callable[[Stress], Array], *, signed: bool = True
+) -> Quantity:
     """Return the quantity that is an `invariant` of the stress [MPa]."""
     return Quantity(
-        name, label, "MPa", meaning, lambda at: invariant(_small_stress(at)), lambda at: invariant(_finite_stress(at))
+        name,
+        label,
+        "MPa",
+        meaning,
+        lambda at: invariant(_small_stress(at)),
+        lambda at: invariant(_finite_stress(at)),
+        signed,
     )
 
 
 PRESSURE = _of_stress("pressure", "pressure", "mean of the three normal stresses, compression positive", _pressure)
-VON_MISES = _of_stress("von_mises", "von Mises stress", "von Mises stress", _von_mises)
+VON_MISES = _of_stress("von_mises", "von Mises stress", "von Mises stress", _von_mises, signed=False)
 GREATEST_STRESS = _of_stress(
     "principal_stress_greatest",
     "greatest principal stress",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from daq_app.wording import tr, tr_noop
 from solver.prediction import Skin, SkinLine
-from solver.quantities import FIELDS, SED
+from solver.quantities import FIELDS
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -23,7 +23,6 @@ FIELD_ERRORS = tr_noop(
     "Fields, at every place: no estimate of the mesh's or the model's error. The SED over the finger has both."
 )
 UNITS = {"MPa": ("kPa", 1000.0)}  # as people read them, and the factor
-NEVER_NEGATIVE = (SED.name, "von_mises", "displacement")
 Line = tuple[tuple[float, float], tuple[float, float]]  # its ends [mm]
 
 TISSUES = tr_noop(("epidermis", "dermis", "fat", "bone"))  # by the number of their region in the mesh
@@ -193,10 +192,7 @@ class FieldChoice:
 
 
 FIELD_CHOICES = (
-    *(
-        FieldChoice(one.name, one.label, *UNITS.get(one.unit, (one.unit, 1.0)), one.name not in NEVER_NEGATIVE)
-        for one in FIELDS
-    ),
+    *(FieldChoice(one.name, one.label, *UNITS.get(one.unit, (one.unit, 1.0)), one.signed) for one in FIELDS),
     FieldChoice("displacement", tr_noop("displacement from the bone"), "mm", 1.0, signed=False),
 )
 

@@ -46,6 +46,14 @@ def test_at_small_strain_a_small_rotation_changes_no_quantity(name):
 
 
 @EVERY_QUANTITY
+def test_a_quantity_is_below_zero_somewhere_unless_it_says_that_it_never_is(name):
+    grad = random_gradients(0.25, count=500)
+    quantity = BY_NAME[name]
+    for values in (quantity.small(state(grad, small=True)), quantity.finite(state(grad))):
+        assert (values.min() < 0.0) == quantity.signed
+
+
+@EVERY_QUANTITY
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_the_small_strain_form_is_the_limit_of_the_finite_one(name, law):
     """The part by which they differ falls with the strain, so ten times less strain leaves a tenth of it."""
