@@ -1,5 +1,6 @@
 """Device addresses as people type them, scheme://host?option=value&option=value, and what a driver does with one."""
 
+import math
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -35,6 +36,16 @@ class Address:
         if not (text.isascii() and text.isdecimal() and len(text) < 10 and lowest <= int(text) <= highest):
             raise AddressError(f"{self.uri}: {option}={text} must be a whole number from {lowest} to {highest}")
         return int(text)
+
+    def positive(self, option: str) -> float:
+        """Return an option that is a number above 0, nan where it is not given. Raises AddressError for another."""
+        text = self.options.get(option)
+        if text is None:
+            return math.nan
+        value = number(text)
+        if not 1e-9 < value < 1e9:
+            raise AddressError(f"{self.uri}: {option}={text[:40]} must be a number above 0")
+        return value
 
     def word(self, option: str, words: tuple[Word, ...]) -> Word:
         """Return an option that is one of `words`, the first where it is not given. Raises AddressError for another."""

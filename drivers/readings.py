@@ -1,6 +1,6 @@
 """Raw readings: the blocks a transducer gives, and the records that a decoder makes of a stream."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Protocol
 
@@ -65,7 +65,7 @@ class Records:
     damaged: Indices  # (n,) records that came broken between the one before and this one
 
     @staticmethod
-    def of(raw: list[tuple[int, ...]], status: list[int], damaged: list[int]) -> "Records":
+    def of(raw: Sequence[tuple[float, ...]], status: list[int], damaged: list[int]) -> "Records":
         """Return records from lists."""
         return Records(
             np.array(raw, np.float64).reshape(-1, 6), np.array(status, np.int64), np.array(damaged, np.int64)

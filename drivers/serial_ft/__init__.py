@@ -12,7 +12,6 @@ from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline, Link
-from drivers.notation import number
 from drivers.readings import RecordDecoder
 from drivers.serial_ft import wire
 from drivers.serial_link import SerialLink, port_of
@@ -127,13 +126,13 @@ def _where(address: Address) -> _Where:
     port = port_of(address)
     form = address.word("format", ("binary", "ascii"))
     baud = address.number("baud", 0, 300, 921600)
-    counts = [_above_zero(address, option) for option in ("counts_per_N", "counts_per_Nm")]
+    counts = [address.positive(option) for option in ("counts_per_N", "counts_per_Nm")]
     if not np.all(np.isfinite(counts)):
         raise SetupError(
             f"{address.uri}: the controller cannot tell its units; add ?counts_per_N=...&counts_per_Nm=... "
             "as they stand in the calibration sheet"
         )
-    ranges = np.repeat([_above_zero(address, "range_N"), 1000.0 * _above_zero(address, "range_Nm")], 3)
+    ranges = np.repeat([address.positive("range_N"), 1000.0 * address.positive("range_Nm")], 3)
     calibration = Calibration(
         address.options.get("serial", ""),
         "counts",
@@ -142,17 +141,6 @@ def _where(address: Address) -> _Where:
         "counts per unit as the address says",
     )
     return _Where(address, port, (baud,) if baud else BAUDS, form == "binary", calibration)
-
-
-def _above_zero(address: Address, option: str) -> float:
-    """Return a number option, nan where it is not given. Raises SetupError where it is no number above 0."""
-    text = address.options.get(option)
-    if text is None:
-        return math.nan
-    value = number(text)
-    if not 1e-9 < value < 1e9:
-        raise SetupError(f"{address.uri}: {option}={text[:40]} must be a number above 0")
-    return value
 
 
 @dataclass(eq=False)
