@@ -4,6 +4,7 @@ import contextlib
 import os
 import select
 import shutil
+import struct
 import tempfile
 import threading
 from collections.abc import Callable
@@ -48,12 +49,15 @@ class PseudoTerminal:
 
     def plug_in(self) -> None:
         """Let the port be there (again), raw."""
-        import tty  # exists where pseudo-terminals do
+        import fcntl  # these exist where pseudo-terminals do
+        import termios
+        import tty
 
         if self.is_plugged:
             return
         self._ours, self._theirs = os.openpty()  # theirs stays open too, or the port would hang up between two readers
         tty.setraw(self._theirs)
+        fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))  # what is read begins with a byte of control
         os.set_blocking(self._ours, False)
         Path(self.path).unlink(missing_ok=True)
         Path(self.path).symlink_to(os.ttyname(self._theirs))
@@ -70,19 +74,35 @@ class PseudoTerminal:
 
     def heard(self, timeout: float) -> bytes:
         """Return what the other side has sent, waiting up to `timeout` real seconds for it."""
+        self._obey()
         self._flush()
         ready, _, _ = select.select([self._ours], [], [], timeout)
-        if not ready:
-            return b""
-        try:
-            return os.read(self._ours, 4096)
-        except OSError:
-            return b""
+        return self._read() if ready else b""
 
     def say(self, data: bytes) -> None:
         """Send `data`. What the other side has not read beyond ROOM bytes is lost, as on a line."""
+        self._obey()
         self._waiting += data[: max(ROOM - len(self._waiting), 0)]
         self._flush()
+
+    def _read(self) -> bytes:
+        """Return what was sent; where a reader threw away what had come for it, as on opening, so is what waits."""
+        import termios  # exists where pseudo-terminals do
+
+        try:
+            data = os.read(self._ours, 4096)
+        except OSError:
+            return b""
+        if data[:1] == b"\0":
+            return data[1:]
+        if data and data[0] & termios.TIOCPKT_FLUSHREAD:
+            self._waiting.clear()
+        return b""
+
+    def _obey(self) -> None:
+        """Read a byte of control, where there is one."""
+        if self.is_plugged and select.select([], [], [self._ours], 0.0)[2]:
+            self._read()
 
     def _flush(self) -> None:
         """Pass on what the system's own few kilobytes have room for."""

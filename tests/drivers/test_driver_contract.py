@@ -26,6 +26,7 @@ from driver_courses import (
 from daq_app.simulation.wiring import connect
 from drivers.catalog import DRIVERS, reachable
 from drivers.clock import PacedClock
+from drivers.clock_recovery import rate_of_least_late
 from drivers.transducer import SetupError
 from sessions.recording.head import info_from_dict, info_to_dict
 from simulators.serving import SIMULATORS
@@ -111,6 +112,13 @@ def test_an_undisturbed_stream_is_whole(calm_course, name):
         assert abs(drift) < 0.05 * block.time[-1] + 0.1 * simulator(name).factor
     assert np.all(np.diff(block.time) > 0.0)
     assert np.all(np.diff(block.received_ns) >= 0)
+
+
+@pytest.mark.parametrize("name", LIVE)
+def test_the_rate_it_states_is_the_one_at_which_readings_come(calm_course, name):
+    course = calm_course(name)
+    arrivals = list(zip(course.blocks[0].sequence.tolist(), course.blocks[0].received_ns.tolist(), strict=True))
+    assert course.info.rate == pytest.approx(rate_of_least_late(arrivals), rel=0.1)
 
 
 @pytest.mark.parametrize("name", LIVE)

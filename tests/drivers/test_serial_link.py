@@ -14,7 +14,7 @@ from drivers.digital_ft import open_digital_ft, wire
 from drivers.serial_ft import open_serial_ft
 from drivers.serial_link import SerialLink, port_of
 from drivers.transducer import LinkLost, SetupError
-from simulators.simulator import PseudoTerminal
+from simulators.simulator import ROOM, PseudoTerminal
 
 needs_terminals = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
 
@@ -182,3 +182,16 @@ def test_a_port_that_vanishes_while_its_waiting_time_is_set_is_lost(port_calls, 
     with pytest.raises(LinkLost, match="/dev/ttyUSB7 is gone"):
         link.receive(0.1)
     assert len(port_calls) == 1
+
+
+@needs_terminals
+def test_what_a_simulated_device_sent_before_its_port_was_opened_is_lost_as_on_a_real_one(terminal):
+    terminal.say(bytes(ROOM))  # more than the system holds
+    link = SerialLink(terminal.path, 38400)
+    terminal.say(b"new")
+    heard = b""
+    while not heard.endswith(b"new"):
+        terminal.heard(0.01)
+        heard += link.receive(0.1) or b""
+    assert heard == b"new"
+    link.close()
