@@ -9,6 +9,7 @@ from daq_app.accuracy_page.page import PAGES as TABLES
 from daq_app.accuracy_page.page import fill_marks
 from daq_app.cli.main import VERBS
 from drivers.catalog import DRIVERS
+from sessions.exchange import FORMATS
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -46,7 +47,16 @@ def test_readme_names_every_verb():
 
 def test_readme_names_an_address_of_every_driver():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert not [driver.name for driver in DRIVERS if f"| `{driver.name}://" not in readme]
+    without = [driver.name for driver in DRIVERS if f"| `{driver.name}://" not in readme]
+    assert not without, "README.md has no row in its table of devices for these"
+
+
+def test_every_export_is_named_in_readme_and_on_the_page_of_exports():
+    (readme_row,) = re.findall(r"\| `export SESSION.*", (ROOT / "README.md").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "how-to" / "export-and-import.md").read_text(encoding="utf-8")
+    for name in FORMATS:
+        assert re.search(rf"\b{name}\b", readme_row), f"README.md, row of the verb export: {name} is not named"
+        assert f"| `{name}` |" in page, f"docs/how-to/export-and-import.md: the table has no row for {name}"
 
 
 def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():

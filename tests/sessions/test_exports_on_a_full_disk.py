@@ -17,9 +17,9 @@ def source(tmp_path_factory):
 
 @pytest.fixture
 def no_large_file():
-    """No file may grow beyond 20 kB, as where a disk is full: the system tells it at whichever write crosses that."""
+    """No file may grow beyond 500 bytes, as where a disk is full: the system says so at the write that crosses it."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (500, before[1]))
     yield
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 

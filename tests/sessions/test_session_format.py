@@ -62,7 +62,7 @@ def test_every_data_set_of_the_copy_is_told(session_folder):
 
 def test_every_kind_of_event_is_told(session_folder):
     kinds = {kind for (kind,) in rows(session_folder, "SELECT kind FROM events")}
-    possible = {event_log._kind(kind) for kind in get_args(Event)}
+    possible = {event_log.kind_of(kind) for kind in get_args(Event)}
     assert kinds | possible | set(COUNTS) <= NAMED
 
 
