@@ -11,6 +11,7 @@ from simulated_session import Session
 
 from drivers.transducer import COUNTS
 from sessions.plan.plan import Rests, Visibility
+from sessions.plan.protocols import plan, protocol
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -22,6 +23,7 @@ from sessions.plan.protocols.protocol import (
 from sessions.recording.archive import seal
 from sessions.run import event_log
 from sessions.run.steps import Event
+from sessions.toml_file import SettingsError
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [DOCS / "session-format.md", *sorted((DOCS / "session-format").glob("*.md"))]
@@ -81,3 +83,18 @@ def test_every_key_of_a_protocol_is_told():
     for prefix, kind in tables.items():
         for name in kind.__dataclass_fields__:
             assert f"`{prefix}{name}`" in page or f"[{name}]" in page
+
+
+def test_the_least_protocol_of_the_page_needs_every_line_that_may_not_be_left_out(tmp_path):
+    page = (DOCS / "how-to" / "add-a-protocol.md").read_text(encoding="utf-8")
+    lines = re.search(r"```toml\n(.*?)```", page, re.DOTALL).group(1).splitlines()
+    path = tmp_path / "least.toml"
+    path.write_text("\n".join(lines))
+    (block,) = plan(protocol(path), "S01", 1).blocks
+    assert sorted(trial.stimulus.index for trial in block.trials) == [0, 0, 50, 50, 100, 100]
+    for at, line in enumerate(lines):
+        path.write_text("\n".join(lines[:at] + lines[at + 1 :]))
+        if "may be left out" in line or " = " not in line:
+            continue
+        with pytest.raises(SettingsError, match=line.split(" = ")[0]):
+            protocol(path)
