@@ -103,7 +103,7 @@ def _end_with_parent() -> None:
 
 
 def press_ctrl_c() -> None:
-    """Send the main thread what Ctrl-C sends it, which also ends its sleep."""
+    """Send the main thread what Ctrl-C sends it, which also ends its sleep where the system can."""
     main_thread = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main_thread is not None:
         signal.pthread_kill(main_thread, signal.SIGINT)

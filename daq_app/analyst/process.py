@@ -20,9 +20,8 @@ URGENT = (m.Stop, m.Move, m.Undo)  # asks for which the model's answers are left
 def run(connection: Connection, folder: str) -> None:
     """Analyse and predict the session in `folder`, and do what is asked for until the window is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(
-        signal.SIGTERM, lambda _signal, _frame: sys.exit(0)
-    )  # what is half written is taken back before the end
+    # What is half written is taken back before the end.
+    signal.signal(signal.SIGTERM, lambda _signal, _frame: sys.exit(0))
     with suppress(EOFError, OSError):
         _Server(connection).serve(Path(folder))
 

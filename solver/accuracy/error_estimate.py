@@ -260,7 +260,7 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
 
 
 ROUND_OFF = 1e-12  # relative, of a stiffness
-TRIED_RATIO = 100.0  # the same in the trials where estimates hold [-]
+TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
 
 
 def stiffness_warning(scene: Scene) -> str:
