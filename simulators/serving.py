@@ -5,6 +5,7 @@ The list reads itself from the modules of this package. A test that is run on ev
 
 import itertools
 import pkgutil
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -99,7 +100,7 @@ def load_timetable(path: Path) -> Timetable:
         strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
         return Timetable(tuple(strokes), tuple(script.fault), script.repeat)
     except (msgspec.ValidationError, ValueError) as error:
-        raise TimetableError(f"{path}: {error}") from None
+        raise TimetableError(f"{path}: {_unknown_key(str(error)) or error}") from None
 
 
 class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -121,6 +122,17 @@ class _Script(msgspec.Struct, forbid_unknown_fields=True):
     stroke: list[_StrokeEntry] = []  # msgspec copies an empty default for each instance
     fault: list[Fault] = []
     repeat: Time = 0.0
+
+
+def _unknown_key(message: str) -> str:
+    """Return which key msgspec does not know, and what is allowed in its place; "" where it says something else."""
+    unknown = re.fullmatch(r"Object contains unknown field `(.*?)`(?: - at `\$\.((\w+)\[\d+\])`)?", message, re.DOTALL)
+    if unknown is None:
+        return ""
+    key, entry, table = unknown.groups()
+    known = msgspec.structs.fields({"stroke": _StrokeEntry, "fault": Fault}.get(table, _Script))
+    where = f"{entry}." if entry else ""
+    return f"{where}{key} is not known; allowed here: {', '.join(field.encode_name for field in known)}"
 
 
 def _surface(entry: _StrokeEntry) -> Surface:
