@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from sessions.file_access import leaves
 from sessions.plan.plan import SessionPlan
-from sessions.toml_file import from_toml, text_of
+from sessions.toml_file import SettingsError, from_toml, text_of
 from solver import Friction, Loading, Scene
 from solver.quantities import QUANTITIES, Quantity
 from solver.scene.published import SCALE
@@ -70,13 +71,16 @@ def finger_in(path: Path) -> tuple[Scene, str]:
     """Return the scene whose finger, materials, receptor and tolerance a file gives, and what of it is not taken.
 
     The file may lack friction and loading. "" where all that it holds is taken. Raises FileNotFoundError, and
-    SettingsError for anything wrong in what is taken.
+    SettingsError for anything wrong in what is taken, or where nothing is.
     """
     text = text_of(path)
     scene = from_toml(text, Scene, str(path), instead=_OF_TRIALS)
     document = tomllib.loads(text)
     ignored = [f"[{name}]" for name in _OF_TRIALS if name in document]
     ignored += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
+    of_others = ("title", *(f"{name}." for name in _OF_TRIALS), *(f"solve.{name}" for name in _OF_OPTIONS))
+    if all(name.startswith(of_others) for name, _ in leaves(document)):
+        raise SettingsError(f"{path} tells nothing of a finger; give it [finger] or [materials], or name no file")
     if not ignored:
         return scene, ""
     are = "is" if len(ignored) == 1 else "are"
