@@ -255,9 +255,11 @@ class ModelColumn(QWidget):
         """Write the history that is shown as a film, and say what came of it."""
         assert self._film is not None
         before, self._filming = self._at, True
-        sentence = write_film(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
-        self._filming, self._at = False, before
-        self._paint()
+        try:
+            sentence = write_film(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
+        finally:
+            self._filming, self._at = False, before
+            self._paint()
         self._say(sentence)
 
     def _finger_page(self) -> QWidget:

@@ -17,7 +17,7 @@ from qt_events import wheel
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import rows, selected_row
-from daq_app.qt.plots import ALL_TRIALS, FIXED, FieldBar
+from daq_app.qt.plots import ALL_TRIALS, FIXED, OWN, FieldBar
 from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame
 from tests.sessions.report_example import example
 
@@ -271,6 +271,23 @@ def test_a_film_that_is_cancelled_leaves_no_file(window, tmp_path):
     window.model.write_film(tmp_path / "film.gif")
     assert "The film was cancelled" in window._words.accessibleName()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_fails_unexpectedly_leaves_the_state_and_the_colours_that_were_shown(window, tmp_path, monkeypatch):
+    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.model.fields.ranges.setCurrentIndex(OWN)
+    before = window.model.finger.look.range
+
+    def run_out(canvas, head, show, *_):
+        show(0)
+        raise MemoryError
+
+    monkeypatch.setattr("daq_app.qt.model_column.write_film", run_out)
+    with pytest.raises(MemoryError):
+        window.model.write_film(tmp_path / "film.gif")
+    assert "Step 4 of 4" in window.model.finger.accessibleName()
+    assert window.model.finger.look.range == before
+    window.model.fields.ranges.setCurrentIndex(ALL_TRIALS)
 
 
 def two_fingers(application, window, factor=1.5):
