@@ -81,17 +81,17 @@ class SimulatedClock:
 
     factor = 0.0
 
-    def __init__(self) -> None:
-        self._now_ns = 1_000_000_000
+    def __init__(self, at_ns: int = 1_000_000_000) -> None:
+        self.at_ns = at_ns  # the time, which reading this does not move [ns]
 
     def now_ns(self) -> int:
         """Return the simulated time [ns]."""
-        self._now_ns += 1000
-        return self._now_ns
+        self.at_ns += 1000
+        return self.at_ns
 
     def sleep(self, seconds: float) -> None:
         """Let `seconds` of simulated time pass at once."""
-        self._now_ns += int(max(seconds, 0.0) * 1e9)
+        self.at_ns += int(max(seconds, 0.0) * 1e9)
 
 
 class StillClock:

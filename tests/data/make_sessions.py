@@ -15,7 +15,7 @@ import numpy as np
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "sessions")]
 
-from stand_ins import Hands, SimulatedClock, StandIn  # noqa: E402
+from stand_ins import Hands, ResumableClock, StandIn  # noqa: E402
 
 from sessions.plan.protocols import plan, protocol  # noqa: E402
 from sessions.recording import SessionWriter, provenance  # noqa: E402
@@ -43,7 +43,7 @@ class Slider(StandIn):
 
 def record(folder, in_second_stroke):
     """Run one session of two trials, and call `in_second_stroke` when the second stroke is asked for."""
-    clock = SimulatedClock()
+    clock = ResumableClock()
     whole = plan(protocol("sensotact-friction"), "G01", 3)
     short = replace(whole, blocks=tuple(replace(block, trials=block.trials[:1]) for block in whole.blocks))
     transducer = Slider(clock, lost=(40, 41))
@@ -55,7 +55,7 @@ def record(folder, in_second_stroke):
     def stroke(_):
         if transducer.touches:
             in_second_stroke()
-        transducer.touches.append((clock.ns + 300_000_000, clock.ns + 1_300_000_000, NORMAL))
+        transducer.touches.append((clock.at_ns + 300_000_000, clock.at_ns + 1_300_000_000, NORMAL))
         return ()
 
     run_session(short, writer, Hands(clock, transducer, {AskStroke: stroke}), transducer)

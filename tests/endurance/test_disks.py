@@ -19,10 +19,10 @@ import sys, shutil
 from pathlib import Path
 sys.path[:0] = ["tests/sessions"]
 from failing_session import PLAN, RESERVE
-from stand_ins import INFO, Hands, StandIn, SimulatedClock
+from stand_ins import INFO, Hands, StandIn, ResumableClock
 from sessions.recording import SessionWriter, provenance
 from sessions.run.runner import run_session
-clock = SimulatedClock()
+clock = ResumableClock()
 folder = Path(sys.argv[1]) / "s"
 writer = SessionWriter.create(folder, PLAN, INFO, provenance(clock), clock=clock, reserve=RESERVE)
 device = StandIn(clock)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from recordings import change, new_writer, readings
 from simulated_session import Session
-from stand_ins import INFO, SimulatedClock
+from stand_ins import INFO, ResumableClock
 
 from sessions.exchange import ExportSource, export
 from sessions.exchange.import_csv import import_csv
@@ -26,7 +26,7 @@ def whole(folder):
 
 def torn(folder):
     """Nothing simulated, texts beyond ASCII, lost readings, a silence, odd numbers, a damaged block, and no end."""
-    clock = SimulatedClock()
+    clock = ResumableClock()
     writer = new_writer(folder, info=replace(INFO, simulated=False), clock=clock)
     writer.event("take_started", 1, {"take": 1}, time_ns=50)
     for first, later, received in ((0, 0.0, 100), (110, 0.0, 200), (210, 30.0, 300), (310, 30.0, 400)):

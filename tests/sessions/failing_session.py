@@ -1,7 +1,7 @@
 """A session in simulated time on a disk that fails, and ways to fail."""
 
 from faulty_disk import FULL, IOERR_WRITE, OK, faulty_disk
-from stand_ins import INFO, Hands, SimulatedClock, StandIn
+from stand_ins import INFO, Hands, ResumableClock, StandIn
 
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
@@ -21,7 +21,7 @@ class OnADisk:
         self.end = self.error = None
         self.safe_events = []
         self.acknowledged = 0
-        clock = SimulatedClock()
+        clock = ResumableClock()
         with faulty_disk(fail) as disk:
             try:
                 writer = SessionWriter.create(folder, PLAN, INFO, provenance(clock), clock=clock, reserve=RESERVE)

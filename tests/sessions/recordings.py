@@ -6,7 +6,7 @@ import struct
 from contextlib import closing
 
 import numpy as np
-from stand_ins import INFO, SimulatedClock
+from stand_ins import INFO, ResumableClock
 
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
@@ -25,7 +25,7 @@ PLAN = SessionPlan(
 
 
 def new_writer(folder, *, info=INFO, plan=PLAN, clock=None, subject_simulated=False):
-    clock = clock or SimulatedClock()
+    clock = clock or ResumableClock()
     return SessionWriter.create(folder, plan, info, provenance(clock), subject_simulated=subject_simulated, clock=clock)
 
 

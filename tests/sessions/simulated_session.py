@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 
-from stand_ins import INFO, Hands, SimulatedClock, StandIn
+from stand_ins import INFO, Hands, ResumableClock, StandIn
 
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
@@ -16,7 +16,7 @@ class Session:
     """A session in simulated time, run when called."""
 
     def __init__(self, folder, *, forces=True, instead=None, **transducer):
-        self.clock = SimulatedClock()
+        self.clock = ResumableClock()
         self.plan = plan(PAPER, "S01", 3, forces=forces)
         info = INFO if forces else None
         self.writer = SessionWriter.create(
@@ -43,8 +43,8 @@ def resume(folder, **transducer):
     check_resumable(recording)
     last = recording.last_block()
     now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
-    clock, gap = continue_clock(recording, last, SimulatedClock(5_000), now.astimezone(UTC))
-    simulated_clock = SimulatedClock(clock.now_ns())
+    clock, gap = continue_clock(recording, last, ResumableClock(5_000), now.astimezone(UTC))
+    simulated_clock = ResumableClock(clock.now_ns())
     device = StandIn(simulated_clock, **transducer)
     at = resumption(recording.plan, recording.events)
     writer = SessionWriter.open(folder, simulated_clock)

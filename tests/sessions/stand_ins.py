@@ -3,6 +3,7 @@
 import numpy as np
 
 from drivers.calibration import Calibration
+from drivers.clock import SimulatedClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.run import steps
@@ -16,21 +17,10 @@ INFO = TransducerInfo(
 )
 
 
-class SimulatedClock:
-    """A clock that moves when slept on, and by one microsecond at every look."""
+class ResumableClock(SimulatedClock):
+    """A simulated clock that is recorded as a real one, so that its session can go on."""
 
     factor = 1.0
-
-    def __init__(self, now_ns=1_000_000_000):
-        self.ns = now_ns
-
-    def now_ns(self):
-        self.ns += 1000
-        return self.ns
-
-    def sleep(self, seconds):
-        assert seconds >= 0
-        self.ns += int(seconds * 1e9)
 
 
 class StandIn:
@@ -66,7 +56,7 @@ class StandIn:
         self.stop()
 
     def read(self, timeout):
-        due = int((self.clock.ns - self.began_ns) * 1e-9 * RATE) if self.streaming else self.sent
+        due = int((self.clock.at_ns - self.began_ns) * 1e-9 * RATE) if self.streaming else self.sent
         if due == self.sent and timeout:
             self.clock.sleep(timeout)
         if self.link_lost_after is not None:
@@ -97,7 +87,7 @@ class Hands:
 
     def show(self, command):
         self.shown.append(command)
-        now = self.clock.ns
+        now = self.clock.at_ns
         make = self.instead.get(type(command))
         events = make(command) if make else None
         for event in self.answers(command, now) if events is None else events:
@@ -129,6 +119,6 @@ class Hands:
         self.transducer.touches.append((now + 300_000_000, now + 900_000_000, newtons))
 
     def poll(self):
-        due = [event for at, event in self.events if at <= self.clock.ns]
-        self.events = [(at, event) for at, event in self.events if at > self.clock.ns]
+        due = [event for at, event in self.events if at <= self.clock.at_ns]
+        self.events = [(at, event) for at, event in self.events if at > self.clock.at_ns]
         return due

@@ -1,5 +1,5 @@
 from simulated_session import PAPER, Session, once
-from stand_ins import Hands, SimulatedClock
+from stand_ins import Hands, ResumableClock
 
 from sessions.plan.protocols import VisitSetting, plan
 from sessions.recording import Recording, SessionWriter, provenance
@@ -28,7 +28,7 @@ def test_what_a_terminal_cannot_tell_of_an_answer_is_empty_and_not_invented(tmp_
 def test_the_plan_keeps_both_hands_and_leaves_them_open_where_nobody_stated_them(tmp_path):
     assert plan(PAPER, "S01", 3).stroking_hand is None
     paper_plan = plan(PAPER, "S01", 3, forces=False, setting=VisitSetting(stroking_hand="right", answering_hand="left"))
-    clock = SimulatedClock()
+    clock = ResumableClock()
     writer = SessionWriter.create(tmp_path / "s", paper_plan, None, provenance(clock), clock=clock)
     run_session(paper_plan, writer, Hands(clock), None)
     assert Recording.open(tmp_path / "s").plan == paper_plan

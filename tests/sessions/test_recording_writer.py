@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from recordings import PLAN, new_writer, read_plainly, readings, record_session, rows
-from stand_ins import CALIBRATION, INFO, SimulatedClock
+from stand_ins import CALIBRATION, INFO, ResumableClock
 
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording, RecordingError, Setting, provenance
@@ -102,7 +102,7 @@ def test_a_rate_or_range_that_nobody_knows_is_null_in_the_file_and_nan_when_read
 
 def test_provenance_holds_versions_clock_and_marked_settings_and_no_name_of_person_or_computer():
     head = provenance(
-        SimulatedClock(), [Setting("height", 20.0, "mm", "measured"), Setting("filter", "none", "", "default")]
+        ResumableClock(), [Setting("height", 20.0, "mm", "measured"), Setting("filter", "none", "", "default")]
     )
     assert head["settings"] == {
         "height": {"value": 20.0, "unit": "mm", "origin": "measured"},
@@ -203,7 +203,7 @@ def test_the_names_of_new_folders_are_safe_before_anything_is_recorded_in_them(t
 
 
 def test_readings_are_committed_once_a_second_of_the_session_clock(tmp_path):
-    clock = SimulatedClock()
+    clock = ResumableClock()
     writer = new_writer(tmp_path / "s", clock=clock)
     safe = []
     for i in range(500):  # 5 s at 100 blocks a second

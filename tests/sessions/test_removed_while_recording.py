@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from recordings import PLAN, new_writer, readings
 from simulated_session import Session, resume
-from stand_ins import SimulatedClock
+from stand_ins import ResumableClock
 
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
@@ -123,7 +123,7 @@ def test_a_second_mishap_is_survived_like_the_first(tmp_path):
 
 
 def test_a_resumed_session_is_looked_after_too(tmp_path):
-    clock = SimulatedClock()
+    clock = ResumableClock()
     writer = new_writer(tmp_path / "s", clock=clock)
     writer.readings(readings(0, 10))
     writer.close()
@@ -188,7 +188,7 @@ def test_a_session_that_can_be_written_nowhere_is_never_called_safe(tmp_path, mo
 
 
 def test_a_visit_that_only_scores_is_rescued_too(tmp_path):
-    clock = SimulatedClock()
+    clock = ResumableClock()
     plan = replace(PLAN, forces=False)
     writer = SessionWriter.create(tmp_path / "s", plan, None, provenance(clock), clock=clock)
     shutil.rmtree(tmp_path / "s")

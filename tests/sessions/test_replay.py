@@ -5,7 +5,7 @@ from dataclasses import replace as replace_fields
 import pytest
 from recordings import change, rows
 from simulated_session import once, resume
-from stand_ins import INFO, Hands, SimulatedClock, StandIn
+from stand_ins import INFO, Hands, ResumableClock, StandIn
 
 from drivers.transducer import LinkLost, SetupError
 from sessions.exchange.import_csv import import_csv
@@ -51,7 +51,7 @@ def record_session(
     **transducer,
 ):
     """Record a session in simulated time, `most` trials a block; `stop` is asked with the number of readings sent."""
-    clock = SimulatedClock()
+    clock = ResumableClock()
     session_plan = plan(protocol, "S01", 3, forces=forces, phases=phases)
     session_plan = replace_fields(
         session_plan, blocks=tuple(replace_fields(b, trials=b.trials[:most]) for b in session_plan.blocks)
@@ -201,7 +201,7 @@ def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_pa
         def show(self, command):
             if isinstance(command, AskMount) and not self.transducer.touches:
                 for i in range(48):  # a hand that leans on it now and then, for 14 s
-                    at = self.clock.ns + i * 300_000_000
+                    at = self.clock.at_ns + i * 300_000_000
                     self.transducer.touches.append((at, at + 100_000_000, 1.0))
             super().show(command)
 
@@ -350,15 +350,15 @@ def test_a_resumed_session_that_was_altered_is_found(tmp_path):
 
 
 def test_a_replaying_transducer_gives_each_reading_as_long_after_the_start_as_it_came(whole):
-    clock = SimulatedClock(5_000_000_000_000)
+    clock = ResumableClock(5_000_000_000_000)
     transducer = ReplayTransducer(whole, clock, "replay:whole")
     transducer.start()
-    start_ns = clock.ns
+    start_ns = clock.at_ns
     expected = whole.readings()
     blocks = []
     while transducer.health.received < len(expected):
         block = transducer.read(0.02)
-        assert not len(block) or block.received_ns[-1] <= clock.ns
+        assert not len(block) or block.received_ns[-1] <= clock.at_ns
         blocks.append(block)
     with pytest.raises(LinkLost, match="ends here"):
         transducer.read(0.02)
@@ -374,11 +374,11 @@ def test_a_replaying_transducer_gives_each_reading_as_long_after_the_start_as_it
 def test_a_recording_without_readings_is_no_transducer(tmp_path):
     recording = record_session(tmp_path / "session", forces=False)
     with pytest.raises(SetupError, match="holds no readings"):
-        ReplayTransducer(recording, SimulatedClock(), "replay:x")
+        ReplayTransducer(recording, ResumableClock(), "replay:x")
 
 
 def test_a_replayed_transducer_records_a_session_of_its_own(whole, tmp_path):
-    clock = SimulatedClock(9_000_000_000_000)
+    clock = ResumableClock(9_000_000_000_000)
     device = ReplayTransducer(whole, clock, "replay:whole")
     session_plan = plan(PAPER, "S02", 4)
     writer = SessionWriter.create(tmp_path / "new", session_plan, device.info, provenance(clock), clock=clock)

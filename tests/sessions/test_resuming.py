@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from killed_process import fork, kill, lines_of, read_reports, whole_session
 from recordings import change
 from simulated_session import Session, resume
-from stand_ins import INFO, SimulatedClock
+from stand_ins import INFO, ResumableClock
 from walks import FORCES, steps, walks
 
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter
@@ -151,7 +151,7 @@ def test_a_session_whose_transducer_was_lost_goes_on_as_often_as_it_is_lost(tmp_
 
 
 def test_a_session_on_time_that_moves_when_it_is_waited_on_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(SimulatedClock, "factor", 0.0)
+    monkeypatch.setattr(ResumableClock, "factor", 0.0)
     Session(tmp_path / "s", link_lost_after=1000).run()
     with pytest.raises(RecordingError, match="ran on simulated time without a pace"):
         check_resumable(Recording.open(tmp_path / "s"))
@@ -170,14 +170,14 @@ def test_ended_and_sealed_sessions_are_refused(tmp_path):
         check_resumable(recording)
     seal(tmp_path / "s")
     with pytest.raises(RecordingError, match="is sealed"):
-        SessionWriter.open(tmp_path / "s", SimulatedClock())
+        SessionWriter.open(tmp_path / "s", ResumableClock())
 
 
 def test_a_session_that_is_still_written_is_not_resumed(tmp_path):
     session = Session(tmp_path / "s")
     session.writer.event("started")
     with pytest.raises(RecordingError, match="in use"):
-        SessionWriter.open(tmp_path / "s", SimulatedClock())
+        SessionWriter.open(tmp_path / "s", ResumableClock())
     session.writer.close()
 
 
@@ -201,7 +201,7 @@ def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forw
     Session(tmp_path / "s", link_lost_after=1000).run()
     recording = Recording.open(tmp_path / "s")
     earlier = datetime.fromisoformat(recording.provenance["created_utc"]) + later
-    clock, gap = continue_clock(recording, recording.last_block(), SimulatedClock(7), earlier)
+    clock, gap = continue_clock(recording, recording.last_block(), ResumableClock(7), earlier)
     assert gap.duration is None
     assert clock.now_ns() > recording.events[-1].time_ns
 
@@ -210,13 +210,13 @@ def test_the_time_that_opening_the_device_takes_is_no_part_of_the_next_gap(tmp_p
     Session(tmp_path / "s", link_lost_after=1000).run()
     recording = Recording.open(tmp_path / "s")
     at = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(minutes=10)
-    clock, gap = continue_clock(recording, recording.last_block(), SimulatedClock(7), at)
+    clock, gap = continue_clock(recording, recording.last_block(), ResumableClock(7), at)
     resumed_ns = clock.now_ns()
     writer = SessionWriter.open(tmp_path / "s", clock)
     writer.event("resumed", data=resumed_data(gap, INFO, {}), time_ns=resumed_ns + 5_000_000_000)
     writer.close()
     recording = Recording.open(tmp_path / "s")
-    clock, _ = continue_clock(recording, recording.last_block(), SimulatedClock(7), at + timedelta(minutes=1))
+    clock, _ = continue_clock(recording, recording.last_block(), ResumableClock(7), at + timedelta(minutes=1))
     assert clock.now_ns() - resumed_ns == pytest.approx(60e9, abs=1e6)
 
 

@@ -245,7 +245,7 @@ def test_a_further_stroke_before_the_score_is_recorded_and_flagged(tmp_path):
     def answer_late(_):
         if untouched:
             untouched.pop()
-            now = session.clock.ns
+            now = session.clock.at_ns
             session.hands.stroke(now)
             session.hands.events.append((now + 1_500_000_000, Scored(50.0)))
             return []
@@ -262,7 +262,7 @@ def test_no_zero_is_taken_while_something_touches_and_somebody_is_told(tmp_path)
 
     def leaning(_):
         if not session.transducer.touches:  # a hand that comes and goes for 8 s
-            at = session.clock.ns
+            at = session.clock.at_ns
             for i in range(20):
                 begin = at + i * 400_000_000
                 session.transducer.touches.append((begin, begin + 200_000_000, 1.0))
@@ -316,8 +316,8 @@ def test_a_clock_that_jumps_ahead_while_the_computer_slept_costs_nothing_and_the
     session = Session(tmp_path / "s")
 
     def asleep(_):
-        if session.clock.ns < 100e9:
-            session.clock.ns += 100_000_000_000
+        if session.clock.at_ns < 100e9:
+            session.clock.at_ns += 100_000_000_000
 
     session.hands.instead[AskScore] = asleep
     recording = session.run()

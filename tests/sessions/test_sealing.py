@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from stand_ins import Hands, SimulatedClock
+from stand_ins import Hands, ResumableClock
 
 from daq_app.cli.main import run
 from sessions.plan.protocols import Body, plan
@@ -30,7 +30,7 @@ def session(request, tmp_path):
     study = open_study(folder)
     place = study.place(member, study_key(folder))
     session_plan = plan(study.protocol, "P01", study.session_seed(member.slot), place=place, forces=False)
-    clock = SimulatedClock()
+    clock = ResumableClock()
     writer = SessionWriter.create(
         folder / "P01", session_plan, None, provenance(clock), subject_simulated=True, clock=clock
     )

