@@ -1,7 +1,7 @@
 """Plots that the wheel zooms and the mouse moves; a field of the finger as a curve, and which field it is."""
 
 from collections.abc import Callable, Sequence
-from math import floor, log10
+from math import ceil, floor, log10
 from typing import Any
 
 import numpy as np
@@ -89,11 +89,19 @@ class ZoomedPlot(pg.PlotWidget):
             style_axis(item.getAxis(side), tokens, font(SMALL))
 
     def name_across(self, words: str) -> None:
-        """Name the horizontal axis in one or two lines, under its numbers."""
+        """Name the horizontal axis in at most two lines, under its numbers."""
         axis: Any = self.getPlotItem().getAxis("bottom")
         name_axis(axis, words)
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
-        axis.setHeight(round(above + axis.label.boundingRect().height()))
+        axis.setHeight(round(above + (axis.label.boundingRect().height() if words else 0.0)))
+
+    def name_up(self, words: str) -> None:
+        """Name the vertical axis, which is never shorter than its name; the horizontal one is named before."""
+        item: Any = self.getPlotItem()
+        left, bottom = item.getAxis("left"), item.getAxis("bottom")
+        name_axis(left, words)
+        name_length = left.label.boundingRect().width()
+        self.setMinimumHeight(max(self.minimumHeight(), ceil(name_length + bottom.minimumHeight()) + 2))  # its margins
 
     def show_numbers(self, *, shown: bool) -> None:
         """Show the numbers along both axes, or none: a plot of nothing has no scale."""

@@ -11,6 +11,7 @@ from daq_app.qt import tokens
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.parts import WrappedLabel
 from daq_app.qt.plots import ZoomedPlot
+from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import TextTable
 from tests.daq_app.qt.painted_text import contrast
 
@@ -99,3 +100,15 @@ def test_numbers_of_a_low_plot_do_not_lie_on_each_other(height, greatest):
     apart = [(b - a) * height / greatest for a, b in pairwise(always)]
     assert min(apart, default=line) >= line
     assert height < 90 or len(always) >= 3
+
+
+def test_the_name_of_a_vertical_axis_is_whole_in_the_lowest_plot_of_a_stroke(application):
+    view = StrokeView(tokens.LIGHT)
+    view.resize(view.minimumSizeHint())
+    view.show()
+    application.processEvents()
+    for plot in view.findChildren(ZoomedPlot):
+        axis = plot.getPlotItem().getAxis("left")
+        along, name = axis.sceneBoundingRect(), axis.label.sceneBoundingRect()
+        assert along.top() - 1.0 <= name.top() < name.bottom() <= along.bottom() + 1.0
+    view.hide()
