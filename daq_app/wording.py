@@ -57,6 +57,13 @@ def tr_noop(texts: T) -> T:
     return texts
 
 
+COUNT_WORDS: Mapping[str, str] = tr_noop({  # of a transducer's `Health`, by the names of its counts
+    "received": "received", "lost": "lost", "repeated": "repeated", "late": "late", "malformed": "malformed",
+    "stalled": "stalled", "restarted": "restarted", "saturated": "saturated", "doubtful": "doubtful", "noted": "noted",
+    "off_units": "in other units", "off_rate": "rate changes",
+})  # fmt: skip
+
+
 def quantity(value: float | None, digits: int, unit: str = "") -> str:
     """Return a number with its unit and a true minus sign, never a minus zero; a dash where it is not known.
 

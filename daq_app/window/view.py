@@ -11,14 +11,12 @@ from daq_app.window.live_feed import AXES, LOADS
 from daq_app.window.state import AppState, BenchState, Dismissed, Message
 from daq_app.window.subject import SubjectView, Translate, mirror_view, subject_view
 from daq_app.window.view_course import CourseView, course_view
-from daq_app.wording import number, quantity, sentence, tr, tr_noop
+from daq_app.wording import COUNT_WORDS, number, quantity, sentence, tr, tr_noop
 from drivers.transducer import TransducerInfo
 
 NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
-COUNTED = tr_noop((
-    "lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "noted", "off_units",
-))  # fmt: skip
+COUNTED = tuple(name for name in COUNT_WORDS if name not in ("received", "off_rate"))  # the rate has its own sentence
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
@@ -114,7 +112,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
         silent=bench.link == "lost" or _is_silent(bench),
-        counters=(*((name, f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
+        counters=(*((COUNT_WORDS[name], f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
         drift=_drift(bench),
@@ -165,7 +163,7 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
 def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
     """Return what was counted of the stream, in words."""
     counts = asdict(bench.health)
-    troubles = [f"{counts[name]} {tr(name)}" for name in COUNTED if counts[name]]
+    troubles = [f"{counts[name]} {tr(COUNT_WORDS[name])}" for name in COUNTED if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
     if troubles := [*troubles, *bench.health.flagged, *rate]:
         return "look", ", ".join(troubles)

@@ -13,13 +13,15 @@ import pytest
 from hostile_devices import net_ft
 
 from daq_app.cli.main import run
+from daq_app.cli.verbs import devices
 from daq_app.recorder.messages import HealthReport
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connect
 from daq_app.window.state import BenchState, bench_after
 from daq_app.window.view import bench_view
+from daq_app.wording import COUNT_WORDS
 from drivers.clock import RealClock
-from drivers.transducer import Health
+from drivers.transducer import COUNTS, Health
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.run.runner import run_session
@@ -94,6 +96,20 @@ def test_the_window_names_a_fault_of_the_device():
     assert view.lamp == "wrong"
     assert "gauge excitation current too low" in view.lamp_words
     assert ("doubtful", "200") in view.counters
+
+
+def test_every_count_of_a_transducer_s_health_is_shown_in_words():
+    assert set(COUNT_WORDS) == {"received", *COUNTS}
+    report = HealthReport(Health(received=200, off_units=12), 200.0, (0.0,) * 7, (0.0,) * 7, 200)
+    view = bench_view(bench_after(BenchState(link="open"), report), recording=True)
+    assert view.lamp_words == "12 in other units"
+    assert "_" not in "".join(name for name, _ in view.counters)
+
+
+def test_a_probe_prints_the_counts_in_words(capsys, monkeypatch):
+    monkeypatch.setattr(devices, "PROBED", 0.2)
+    assert run(["devices", "probe", "sim:"]) == 0
+    assert ", in other units 0, rate changes 0, lag " in capsys.readouterr().out
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals reach a process otherwise on this system")

@@ -13,7 +13,7 @@ import numpy as np
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connect
-from daq_app.wording import number
+from daq_app.wording import COUNT_WORDS, number
 from drivers.catalog import DRIVERS, Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
@@ -112,8 +112,8 @@ def _probe(uri: str, console: Console) -> int:
     console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
     console.say(f"calibration: {info.calibration.source}")
     console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
-    counts = {name: value for name, value in asdict(health).items() if name not in ("lag_ms", "rate_words", "flagged")}
-    console.say(", ".join(f"{name} {value}" for name, value in counts.items()) + f", lag {health.lag_ms:.1f} ms")
+    counts = ", ".join(f"{words} {getattr(health, name)}" for name, words in COUNT_WORDS.items())
+    console.say(f"{counts}, lag {health.lag_ms:.1f} ms")
     if health.flagged:
         console.say(f"the status of readings said: {flagged_words(health.flagged)}")
     if health.rate_words:
@@ -122,7 +122,7 @@ def _probe(uri: str, console: Console) -> int:
         columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
         rows = [[axis, number(m), number(sd, 2), unit] for axis, m, sd, unit in columns]
         console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
-    flawed = any(counts[name] for name in FLAWS) or not len(readings)
+    flawed = any(getattr(health, name) for name in FLAWS) or not len(readings)
     return FLAWED if flawed else DONE
 
 
