@@ -23,7 +23,7 @@ _LUMP = 2048  # but where so many came at one go: there the computer was busy, a
 _FIRST = 3.0  # until a device that never sent a record is given up, beyond what bringing it to stream takes
 _QUIET = 0.3  # without a whole record, after which the device is asked to stream again
 _SILENCE = 5.0  # without a whole record, after which it is given up
-_LOOKS = 12  # at a rate that is to be measured, until two running say the same
+_LOOKS = 12  # at a rate that is to be measured, until one says what those before it did
 _ALIKE = 0.03  # rates that differ by less are said to be the same [-]
 _BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the last one again and again
 
@@ -56,9 +56,9 @@ def measured_rate(
 ) -> float:
     """Return how many records a second of the session's clock come [Hz], from `seconds` of streaming [real s].
 
-    Good to a few per cent. Where it is neither the rate `stated` nor what the stream up to half a time before said, the
-    computer may have been busy, and the stream is watched for longer, up to the deadline. Raises LinkLost when hardly
-    any records come, and what `conversation.begin` raises.
+    Good to a few per cent. Where it is not the rate `stated`, and the last half of the time says another than all
+    before it, the computer may have been busy: the stream is watched for longer, up to the deadline. Raises LinkLost
+    when hardly any records come, and what `conversation.begin` raises.
     """
     decoder = conversation.decoder()
     came: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
@@ -66,7 +66,7 @@ def measured_rate(
     try:
         data: bytes | None = conversation.begin(deadline.bound(link))
         for look in range(_LOOKS):
-            part = deadline.within(seconds / 2.0)
+            part, earlier = deadline.within(seconds / 2.0), len(came)
             while True:
                 more = len(decoder.feed(data).status) if data else 0
                 if more:
@@ -75,8 +75,8 @@ def measured_rate(
                 data = link.receive(TICK)
                 if part.remaining <= 0.0:
                     break
-            before, rate = rate, rate_of_least_late(came)
-            alike = look and (abs(rate / stated - 1.0) < _ALIKE or abs(rate / before - 1.0) < _ALIKE)
+            before, latest, rate = rate, rate_of_least_late(came[earlier:]), rate_of_least_late(came)
+            alike = look and (abs(rate / stated - 1.0) < _ALIKE or abs(latest / before - 1.0) < _ALIKE)
             if alike or deadline.remaining <= 0.0:
                 break
     finally:

@@ -11,11 +11,13 @@ from drivers import threaded
 from drivers.calibration import Calibration
 from drivers.clock import RealClock
 from drivers.clock_recovery import ClockRecovery
+from drivers.deadline import Deadline
 from drivers.readings import Records
-from drivers.streaming import StreamingTransducer
+from drivers.streaming import StreamingTransducer, measured_rate
 from drivers.transducer import SetupError, TransducerInfo
 
 RATE = 200.0
+HALF = 0.2  # of the time for which a rate is measured [real s]
 BUSY = 1.0  # for how long the computer does something else, well beyond what a device may be quiet [real s]
 
 
@@ -86,6 +88,22 @@ def test_a_device_is_not_taken_to_be_silent_while_this_computer_was_busy():
     transducer.stop()
     assert line.waits > 10
     assert transducer.health.restarted == 0
+
+
+class SlowStart(Line):
+    """A line whose reader keeps up with 0.7 of the records at first, then with none, and then with all."""
+
+    def receive(self, timeout):
+        time.sleep(min(timeout, 0.01))
+        passed = time.monotonic() - self.began
+        due = self.sent_count if HALF < passed < 2.5 * HALF else int(passed * RATE * (0.7 if passed < HALF else 1.0))
+        data, self.sent_count = bytes(due - self.sent_count), due
+        return data or None
+
+
+def test_a_rate_is_not_confirmed_by_a_stretch_in_which_nothing_came():
+    rate = measured_rate(SlowStart(), PlainConversation(), RealClock(), 2.0 * HALF, Deadline(20.0))
+    assert rate == pytest.approx(RATE, rel=0.05)
 
 
 class LateThread(threading.Thread):
