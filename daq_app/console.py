@@ -44,6 +44,10 @@ class WrongValue(Exception):
     """The command line or a value in a file was wrong: exit code 2."""
 
 
+class RecordingKept(KeyboardInterrupt):
+    """The user stopped what had recorded something by then; the message says where that is: exit code 3."""
+
+
 class NotWritten(Exception):
     """What was said could not be written: why, where, and what to do."""
 

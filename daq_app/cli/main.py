@@ -6,7 +6,19 @@ import sys
 import traceback
 from types import ModuleType
 
-from daq_app.console import DONE, FAILED, OUR_OWN, STOPPED, WRONG, Console, Parser, is_ours, takes_all
+from daq_app.console import (
+    DONE,
+    FAILED,
+    FLAWED,
+    OUR_OWN,
+    STOPPED,
+    WRONG,
+    Console,
+    Parser,
+    RecordingKept,
+    is_ours,
+    takes_all,
+)
 
 HELP = frozenset({"-h", "--help"})
 LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
@@ -55,8 +67,8 @@ def run(arguments: list[str]) -> int:
     try:
         takes_all(sys.stdin, sys.stdout, sys.stderr)
         return _dispatch(arguments)
-    except KeyboardInterrupt:
-        return _report("stopped", STOPPED)
+    except KeyboardInterrupt as stop:
+        return _report(str(stop) or "stopped", FLAWED if isinstance(stop, RecordingKept) else STOPPED)
     except BrokenPipeError:
         return FAILED  # whoever read our output has gone; there is nobody to tell
     except Exception as error:  # noqa: BLE001  the last resort: no traceback reaches a user

@@ -9,7 +9,8 @@ very many more, each with a finger of its own, judge these surfaces in orders of
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from daq_app.console import Console
+from daq_app.console import Console, RecordingKept
 from daq_app.simulation.wiring import INPUT, Connection, SimulatedPeople, connect, planted_surface
 from drivers.clock import Clock, SimulatedClock
 from sessions.file_access import holds_something, write_json
@@ -57,7 +58,7 @@ def conduct(
     """Run the session of these people into `folder` and seal it, however it ended, unless it can be resumed.
 
     With `durable` False nothing waits for the disk. Raises RecordingError when the folder cannot be used or the disk
-    takes no more.
+    takes no more, and KeyboardInterrupt where the user stopped it, after it was sealed.
     """
     transducer = None if people.connected is None else people.connected.transducer
     info = None if transducer is None else transducer.info
@@ -72,7 +73,25 @@ def conduct(
     end = run_session(plan, writer, people, transducer, settings=run, progress=show)
     if end.cause not in RESUMABLE:
         seal(writer.folder)
+    if end.cause == "stopped":
+        raise KeyboardInterrupt
     return end
+
+
+@contextmanager
+def recordings_in(out: Path) -> Generator[None]:
+    """Let recordings be made in `out`, new or empty; who stops them is told that they are kept there.
+
+    Raises RecordingError where `out` holds something, RecordingKept in place of KeyboardInterrupt where it does then.
+    """
+    if holds_something(out):
+        raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not holds_something(out):
+            raise
+        raise RecordingKept(f"stopped; what was recorded is in {out}") from None
 
 
 class StudyCutShort(Exception):
@@ -168,8 +187,6 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
 
     The same seed gives the same readings and answers. Raises RecordingError where `out` cannot be used.
     """
-    if holds_something(out):
-        raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
     planted = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
     (out / DAMAGED).mkdir()
     (out / DAMAGED / LIVE_FILE).write_bytes((out / "S01" / LIVE_FILE).read_bytes()[:1000])

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import sqlite3
 import stat
 import zlib
@@ -20,6 +21,8 @@ from recordings import PLAN, TRIAL, new_writer, record_session
 
 from daq_app.cli.main import run
 from daq_app.cli.verbs import demo
+from daq_app.console import Console
+from daq_app.simulation import synthetic
 from sessions.plan.plan import Stimulus
 from sessions.recording import Recording, archive
 from sessions.recording.schema import COLUMNS
@@ -298,7 +301,11 @@ def test_an_export_that_does_not_come_back_is_said_to_be_one(tmp_path, capsys, n
     assert "is an export for other programs alone; give one as csv, bids or hdf5" in capsys.readouterr().err
 
 
-def test_a_demonstration_that_is_stopped_after_it_recorded_says_where_that_is(tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize(
+    ("words", "making"),
+    [(["demo"], (demo, "simulated_study")), (["study", "--synthetic", "1"], (synthetic, "synthetic_study"))],
+)
+def test_a_verb_that_is_stopped_after_it_recorded_says_where_that_is(tmp_path, capsys, monkeypatch, words, making):
     def stop(*_):
         raise KeyboardInterrupt
 
@@ -306,11 +313,19 @@ def test_a_demonstration_that_is_stopped_after_it_recorded_says_where_that_is(tm
         record_session(out / "S01")
         stop()
 
-    monkeypatch.setattr(demo, "simulated_study", study)
-    assert run(["demo", "--out", str(tmp_path / "demo")]) == 3
-    assert f"what was recorded is in {tmp_path / 'demo'}" in capsys.readouterr().err
-    monkeypatch.setattr(demo, "simulated_study", stop)
-    assert run(["demo", "--out", str(tmp_path / "none")]) == 130
+    monkeypatch.setattr(*making, study)
+    assert run([*words, "--out", str(tmp_path / "kept")]) == 3
+    assert capsys.readouterr().err.endswith(f"daq-app: stopped; what was recorded is in {tmp_path / 'kept'}\n")
+    monkeypatch.setattr(*making, stop)
+    assert run([*words, "--out", str(tmp_path / "none")]) == 130
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals reach a process otherwise on this system")
+def test_a_stop_within_a_simulated_visit_ends_the_study_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(Console, "progress", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    assert run(["study", "--synthetic", "1", "--out", str(tmp_path)]) == 3
+    assert [folder.name for folder in tmp_path.iterdir()] == ["S01"]
+    assert Recording.open(tmp_path / "S01").end["cause"] == "stopped"
 
 
 def test_a_report_takes_no_scores_twice(session, tmp_path, capsys):

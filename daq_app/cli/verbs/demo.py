@@ -14,12 +14,11 @@ from typing import Any
 from daq_app.batch.derived import analyse_session, predict_session
 from daq_app.cli.options import add_flag, add_seed
 from daq_app.console import DONE, FLAWED, Console, table
-from daq_app.simulation.synthetic import Study, StudyCutShort, simulated_study
+from daq_app.simulation.synthetic import Study, StudyCutShort, recordings_in, simulated_study
 from daq_app.wording import number
 from drivers.clock import LONGEST_STEP, clock_at
-from sessions.file_access import holds_something
 from sessions.prediction import PredictionOptions, SessionPrediction
-from sessions.recording import Recording, RecordingError
+from sessions.recording import Recording
 from sessions.statistics.scores import mean_scores
 from sessions.strokes import Analysis
 
@@ -35,15 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    if holds_something(out):
-        raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
-    try:
+    with recordings_in(out):
         return _demonstrate(options, out, console)
-    except KeyboardInterrupt:
-        if not holds_something(out):
-            raise
-        console.note(f"daq-app: stopped; what was recorded is in {out}")
-        return FLAWED
 
 
 def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> int:

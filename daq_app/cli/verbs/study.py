@@ -181,7 +181,21 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return print_power(options, console)
     if options.depths is not None:
         raise WrongValue("--depths are those of simulated studies: give --power too")
-    folder, out = _places(options, console)
+    if (options.folder is None) == (options.synthetic is None):
+        raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
+    if options.synthetic is None:
+        return _pool(options, options.folder, options.out or options.folder / "pooled", console)
+    # Simulators are loaded only where they are asked for.
+    from daq_app.simulation.synthetic import recordings_in, synthetic_study
+
+    folder = options.out or Path("synthetic-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    with recordings_in(folder):
+        synthetic_study(folder, options.synthetic, console)
+        return _pool(options, folder, folder / "pooled", console)
+
+
+def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console) -> int:
+    """Pool the sessions in `folder`, and write what comes of it into `out`."""
     sessions = session_folders(folder)
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
@@ -215,19 +229,6 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
         return check_ground_truth(json_value(read_within_limit(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
-
-
-def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
-    """Return where the sessions lie and where the result goes; makes the synthetic study where one is asked for."""
-    if (options.folder is None) == (options.synthetic is None):
-        raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
-    if options.synthetic is None:
-        return options.folder, options.out or options.folder / "pooled"
-    from daq_app.simulation.synthetic import synthetic_study  # simulators are loaded only where they are asked for
-
-    folder = options.out or Path("synthetic-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    synthetic_study(folder, options.synthetic, console)
-    return folder, folder / "pooled"
 
 
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
