@@ -17,6 +17,7 @@ from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, phase
 from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
+from sessions.recording.recovery import is_in_use
 from sessions.recording.storage import check_room, need
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
@@ -256,7 +257,7 @@ def _protocol(form: SessionForm) -> Protocol:
 
 
 def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
-    """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
+    """Return the sessions below a folder (or a study in it) that were cut short and can go on, the newest first."""
     unfinished: list[UnfinishedSession] = []
     places: dict[Path, float] = {}
     with suppress(OSError):  # a folder that cannot be read, or that goes meanwhile
@@ -265,9 +266,9 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
     for place in sorted(places, key=lambda place: -places[place]):
         if len(unfinished) == SHOWN:
             break
-        if is_sealed(place.parent):
-            continue
         try:
+            if is_sealed(place.parent) or is_in_use(place):
+                continue
             recording = Recording.open(place.parent)
             check_resumable(recording)
         except (RecordingError, OSError):

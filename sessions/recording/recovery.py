@@ -25,6 +25,7 @@ FRAME = struct.Struct(">6I")  # page number, pages after a commit (else 0), two 
 BIG_ENDIAN_SUMS = 0x377F0683
 LITTLE_ENDIAN_SUMS = 0x377F0682
 PAGE_SIZES = frozenset(2**power for power in range(9, 17))  # that SQLite knows [bytes]
+_SHARED_BYTES = (510, 0x40000002)  # how many, and from where: SQLite's SHARED_SIZE and SHARED_FIRST (os.h)
 _HOLE = (0, 0, 0, 0, 0, 0)  # a frame where nothing was ever written
 
 
@@ -172,6 +173,23 @@ def _new_folders(session: Path) -> Iterator[Path]:
         numbers = itertools.chain([""], (f"-{number}" for number in itertools.count(2)))
         names = (place / f"{session.name}-rescued{number}" for number in numbers)
         yield next(folder for folder in names if not folder.exists())
+
+
+def is_in_use(live: Path) -> bool:
+    """Say whether another program has a live file open, as its recorder has; False where the system does not tell.
+
+    As long as SQLite has a file with a write-ahead log open, it shares a lock on these bytes. Raises OSError.
+    """
+    if os.name != "posix":
+        return False
+    import fcntl
+
+    with live.open("rb+") as file:
+        try:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, *_SHARED_BYTES)
+        except (BlockingIOError, PermissionError):
+            return True
+    return False
 
 
 def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:

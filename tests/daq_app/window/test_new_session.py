@@ -1,9 +1,11 @@
+import os
 import time
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 import pytest
+from killed_process import fork, kill, lines_of
 from recordings import PLAN, TRIAL, new_writer
 
 from daq_app.recorder.messages import People, StartSession
@@ -102,6 +104,21 @@ def test_sessions_that_were_cut_short_are_listed_whatever_else_lies_in_the_folde
     (tmp_path / "gone" / "session.sqlite").symlink_to(tmp_path / "nowhere")
     assert [session.folder for session in unfinished_sessions(tmp_path)] == [tmp_path / "P01"]
     assert unfinished_sessions(tmp_path / ("x" * 300)) == ()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="another program would have to be started otherwise")
+def test_a_session_that_another_window_records_is_not_said_to_be_cut_short(tmp_path):
+    def record(report):
+        writer = new_writer(tmp_path / "P01")
+        writer.event("begin")
+        report("begun")
+        time.sleep(60.0)
+
+    process, reports = fork(record)
+    assert lines_of(reports, 1)
+    assert unfinished_sessions(tmp_path) == ()
+    kill(process)
+    assert [session.folder for session in unfinished_sessions(tmp_path)] == [tmp_path / "P01"]
 
 
 def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():
