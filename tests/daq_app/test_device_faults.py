@@ -100,7 +100,7 @@ def test_the_window_names_a_fault_of_the_device():
 
 def test_every_count_of_a_transducer_s_health_is_shown_in_words():
     assert set(COUNT_WORDS) == {"received", *COUNTS}
-    report = HealthReport(Health(received=200, off_units=12), 200.0, (0.0,) * 7, (0.0,) * 7, 200)
+    report = HealthReport(Health(received=200, off_units=12), 200.0, (0.0,) * 7, (0.0,) * 7, 0)
     view = bench_view(bench_after(BenchState(link="open"), report), recording=True)
     assert view.lamp_words == "12 in other units"
     assert "_" not in "".join(name for name, _ in view.counters)
