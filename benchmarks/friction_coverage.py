@@ -24,7 +24,7 @@ from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import Analysis, analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws, drag_direction
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
-from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
+from simulators.bench import RATED, Bench, BenchSettings, StrokeGroundTruth
 from simulators.stroke import CONTACT_AREA, paper_surfaces
 from simulators.subject import SimulatedSubject
 
@@ -144,14 +144,14 @@ class Visit:
             for name, (low, high, reported, truth) in ends.items()
         }
 
-    def _truth(self, planted: PlantedStroke) -> Truth:
+    def _truth(self, planted: StrokeGroundTruth) -> Truth:
         steady = np.linspace(*planted.steady, FINE)
         whole = np.linspace(planted.touch, planted.end, FINE)
         tangential = np.hypot(*self._true_wrench(whole, planted)[:, :2].T)
         mu = planted.mu * (1.0 if self._trouble.level else float(self._factor(steady, planted).mean()))
         return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": planted.speed}
 
-    def _factor(self, time: Array, planted: PlantedStroke) -> Array:
+    def _factor(self, time: Array, planted: StrokeGroundTruth) -> Array:
         """Return friction over the surface's own (n,) [-] at `time` (n,) [s]."""
         factor = np.ones_like(time)
         if self._trouble.wander:
@@ -167,7 +167,7 @@ class Visit:
             factor *= (pressed / planted.peak_normal_force) ** self._trouble.law
         return factor
 
-    def _true_wrench(self, time: Array, planted: PlantedStroke) -> Array:
+    def _true_wrench(self, time: Array, planted: StrokeGroundTruth) -> Array:
         """Return the true wrench (n, 6) [N, N mm] in the face's frame."""
         plain = self._bench.true_wrench(time)
         more = plain[:, :2] * (self._factor(time, planted) - 1.0)[:, None]

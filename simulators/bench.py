@@ -55,7 +55,7 @@ class BenchSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class PlantedStroke:
+class StrokeGroundTruth:
     """What was truly done in one stroke. Times are the bench's [s]."""
 
     surface: Surface
@@ -65,11 +65,11 @@ class PlantedStroke:
     speed: float  # mean over the steady slide [mm/s]
     direction: int
     touch: float  # first contact
-    onset: float  # planted N first exceeds three standard deviations of the noise
+    onset: float  # the true N first exceeds three standard deviations of the noise
     slip: float  # the whole contact slides from here on
     peak: float  # of the normal force
     steady: tuple[float, float]  # full speed and full press
-    lift: float  # planted N last exceeds three standard deviations of the noise
+    lift: float  # the true N last exceeds three standard deviations of the noise
     end: float  # last contact
 
 
@@ -87,7 +87,7 @@ class Bench:
         self._lock = threading.Lock()
         self._mounted: Surface | None = None
         # Beginning [s], course and truth of each stroke; in order, never overlapping. Replaced, never changed.
-        self._strokes: tuple[tuple[float, Course, PlantedStroke], ...] = ()
+        self._strokes: tuple[tuple[float, Course, StrokeGroundTruth], ...] = ()
         self._rotation = _rotation(*self.settings.tilt)
         draw = np.random.default_rng([seed, 1])
         limits = np.repeat([self.settings.drift_force, self.settings.drift_torque], 3)
@@ -101,8 +101,8 @@ class Bench:
         with self._lock:
             self._mounted = surface
 
-    def begin_stroke(self, stroke: Stroke, at: float) -> PlantedStroke:
-        """Let a stroke over the mounted stimulus begin at time `at` [s]; return what it plants.
+    def begin_stroke(self, stroke: Stroke, at: float) -> StrokeGroundTruth:
+        """Let a stroke over the mounted stimulus begin at time `at` [s]; return its ground truth.
 
         Raises ValueError when nothing is mounted or the stroke before has not ended by then.
         """
@@ -113,13 +113,13 @@ class Bench:
             if self._strokes and at < self._strokes[-1][0] + self._strokes[-1][1].lift:
                 raise ValueError(f"a stroke cannot begin at {at} s: the one before has not ended")
             course = Course(stroke, surface.mu, surface.holds)
-            planted = self._planted_stroke(at, course, surface)
-            self._strokes = (*self._strokes, (at, course, planted))
-        return planted
+            ground_truth = self._stroke_ground_truth(at, course, surface)
+            self._strokes = (*self._strokes, (at, course, ground_truth))
+        return ground_truth
 
-    def ground_truth(self) -> tuple[PlantedStroke, ...]:
+    def ground_truth(self) -> tuple[StrokeGroundTruth, ...]:
         """Return the ground truth of every stroke begun so far, in order."""
-        return tuple(planted for _, _, planted in self._strokes)
+        return tuple(ground_truth for _, _, ground_truth in self._strokes)
 
     def true_wrench(self, times: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the finger truly exerts at `times` (n,) [s], without any error."""
@@ -142,7 +142,7 @@ class Bench:
         wrench += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
         return wrench + _white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
 
-    def _planted_stroke(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
+    def _stroke_ground_truth(self, begun: float, course: Course, surface: Surface) -> StrokeGroundTruth:
         start, stop = course.steady
         travel = course.position(np.array([start, stop]))
         limit = 3.0 * self.settings.noise_force
@@ -151,7 +151,7 @@ class Bench:
         releasing = np.linspace(course.lift, course.lift - RELEASE, 12001)
         lift = releasing[np.argmax(course.normal_force(releasing) > limit)]
         peak = course.stroke.peak_normal_force
-        return PlantedStroke(
+        return StrokeGroundTruth(
             surface=surface,
             mu=course.mu,
             tau_max=course.mu * peak / CONTACT_AREA,

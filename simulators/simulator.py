@@ -227,7 +227,7 @@ class Simulator:
     factor: float  # times as fast as real it can run on a computer that has much else to do
     tells: tuple[Kind, ...] = LINE_FAULTS  # faults that can happen on this wire and that a driver can tell
     hides: tuple[Kind, ...] = ("stall",)  # faults that can happen and that no driver can tell
-    statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be planted one after the other
+    statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be set one after the other
     unshown: float = 0.0  # share of damaged records that no check on this wire shows
     on_ports: bool = True  # of this computer, so that any program can open it (`daq-app simulate`)
     at_start: bool = False  # a status is sent in full only where it is set when a stream begins

@@ -1,4 +1,4 @@
-"""Stimuli with planted friction, the ten that the paper reports, and the course of a simulated stroke over one."""
+"""Stimuli of known friction, the ten that the paper reports, and the course of a simulated stroke over one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ from sessions.plan.plan import Frame, Trial
 from sessions.recording import Recording
 from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
-from simulators.bench import Bench, PlantedStroke
+from simulators.bench import Bench, StrokeGroundTruth
 from simulators.net_ft_box import NetFtBox
 from simulators.serving import WIRES as WIRES  # the verb serves them
 from simulators.serving import serve as serve
@@ -106,12 +106,12 @@ class SimulatedHand:
         self.stroked: list[Trial] = []  # in order, a trial once for each take
 
     @property
-    def strokes(self) -> dict[int, PlantedStroke]:
-        """Return what the bench planted in the last stroke of each trial, by its number."""
+    def strokes(self) -> dict[int, StrokeGroundTruth]:
+        """Return the ground truth of the last stroke of each trial, by its number."""
         assert self.connected is not None
         assert self.connected.bench is not None
-        planted = self.connected.bench.ground_truth()
-        return {trial.number: stroke for trial, stroke in zip(self.stroked, planted, strict=True)}
+        ground_truth = self.connected.bench.ground_truth()
+        return {trial.number: stroke for trial, stroke in zip(self.stroked, ground_truth, strict=True)}
 
     def show(self, command: steps.Command) -> None:
         """Do what the command asks a hand for."""

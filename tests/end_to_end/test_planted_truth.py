@@ -16,7 +16,7 @@ from sessions.strokes import AnalysisSettings
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.contacts import ContactDetector, Lift, Onset
 from sessions.strokes.forces import normal_force
-from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
+from simulators.bench import RATED, Bench, BenchSettings, StrokeGroundTruth
 from simulators.stroke import paper_surfaces
 from simulators.subject import SimulatedSubject
 
@@ -31,7 +31,7 @@ class Visit:
     """One subject's ten strokes: what was recorded and what was planted, in the same order."""
 
     parts: list[tuple[Trial, ReadingBlock]]
-    strokes: list[PlantedStroke]
+    strokes: list[StrokeGroundTruth]
 
     def analyse(self):
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in self.parts)),)

@@ -27,7 +27,7 @@ def plan(subject="P01", *, forces=True, per_block=5):
 
 
 def record(folder, *, seed=1, subject="P01", forces=True, per_block=5, discard=None):
-    """Write a session; return the folder and what was planted, a list of (trial, PlantedStroke)."""
+    """Write a session; return the folder and what was planted, a list of (trial, StrokeGroundTruth)."""
     clock = SimulatedClock()
     session_plan = plan(subject, forces=forces, per_block=per_block)
     writer = SessionWriter.create(
