@@ -6,7 +6,6 @@ The list reads itself from the modules of this package. A test that is run on ev
 import itertools
 import pkgutil
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -18,7 +17,6 @@ import msgspec
 import simulators
 from drivers.arrays import Array
 from drivers.clock import clock_at
-from drivers.transducer import SetupError
 from simulators.bench import Bench, BenchSettings
 from simulators.faults import Fault, Faults, Time
 from simulators.simulator import RunningSimulator, Simulator
@@ -87,20 +85,14 @@ def usual_timetable() -> Timetable:
     return Timetable(tuple((6.0 * i, surface) for i, surface in enumerate(surfaces)), repeat=6.0 * len(surfaces))
 
 
-def load_timetable(path: Path) -> Timetable:
-    """Return the timetable in a TOML file. Raises SetupError where there is none, TimetableError where it is wrong."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise SetupError(f"{path} cannot be read ({(error.strerror or 'refused').lower()}); check its name") from None
-    except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits, brackets on end
-        raise TimetableError(f"{path} is not TOML: {error}") from None
+def timetable_in(table: Mapping[str, object], where: str) -> Timetable:
+    """Return the timetable in the tables of a TOML file, which messages call `where`. Raises TimetableError."""
     try:
         script = msgspec.convert(table, _Script)
         strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
         return Timetable(tuple(strokes), tuple(script.fault), script.repeat)
     except (msgspec.ValidationError, ValueError) as error:
-        raise TimetableError(f"{path}: {_unknown_key(str(error)) or error}") from None
+        raise TimetableError(f"{where}: {_unknown_key(str(error)) or error}") from None
 
 
 class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -158,13 +150,12 @@ WIRES = tuple(name for name, simulator in SIMULATORS.items() if simulator.on_por
 
 
 def serve(
-    name: str, *, seed: int = 0, factor: float = 1.0, script: Path | None = None, **settings: object
+    name: str, *, seed: int = 0, factor: float = 1.0, timetable: Timetable | None = None, **settings: object
 ) -> RunningSimulator:
-    """Return a device of WIRES that serves this computer until it is closed, stroked as a script says.
+    """Return a device of WIRES that serves this computer until it is closed, stroked as a timetable says.
 
-    `settings` are its own. Time runs `factor` times as fast as real. Raises SetupError when a port cannot be had or the
-    script is missing, TimetableError when the script is wrong.
+    `settings` are its own. Time runs `factor` times as fast as real. Raises SetupError when a port cannot be had.
     """
-    timetable = usual_timetable() if script is None else load_timetable(script)
+    timetable = timetable or usual_timetable()
     faults = Faults(timetable.faults, seed=seed, repeat=timetable.repeat)
     return SIMULATORS[name].start(ScriptedBench(seed, timetable), clock_at(factor), faults, Path(), **settings)

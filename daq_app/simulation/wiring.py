@@ -17,6 +17,7 @@ from simulators.bench import Bench, StrokeGroundTruth
 from simulators.net_ft_box import NetFtBox
 from simulators.serving import WIRES as WIRES  # the verb serves them
 from simulators.serving import serve as serve
+from simulators.serving import timetable_in as timetable_in
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 

@@ -108,6 +108,21 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
     assert output.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("content", "code", "words"),
+    [
+        (bytes(5 * 2**20), 1, "it holds more than 4 MB"),
+        (b"\xff", 2, "byte 0 is no UTF-8 text; save the file as UTF-8"),
+        (b"repeat = [", 2, "this is not TOML"),
+        (b"strokes = 1", 2, "strokes is not known; allowed here: stroke, fault, repeat"),
+    ],
+)
+def test_a_script_of_a_simulated_device_is_refused_as_every_other_file_is(tmp_path, capsys, content, code, words):
+    (tmp_path / "script.toml").write_bytes(content)
+    assert run(["simulate", "net-ft", "--script", str(tmp_path / "script.toml")]) == code
+    assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["none.csv", "none.h5"])
 def test_a_file_to_be_imported_that_is_not_there_is_said_to_be_so(tmp_path, capsys, name):
     assert run(["import", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1
