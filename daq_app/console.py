@@ -222,10 +222,14 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  argparse's own
         """Take what argparse takes."""
         super().__init__(*args, **kwargs)
-        self._negative_number_matcher = re.compile(r"-\.?\d")  # argparse's own takes -1e-3 for an option
+        # argparse's own takes -1e-3 and -inf for options
+        self._negative_number_matcher = re.compile(r"-(\.?\d|inf$|nan$)", re.IGNORECASE)
 
     def error(self, message: str) -> NoReturn:
         """Raise WrongValue."""
+        if wrong := re.fullmatch(r"argument (\S+): invalid (int|float) value: (.*)", message, re.DOTALL):
+            kind = "a whole number" if wrong[2] == "int" else "a number"
+            message = f"{wrong[1]} {wrong[3]} is not allowed: it must be {kind}"
         raise WrongValue(f"{message}; '{self.prog} --help' explains")
 
     def print_help(self, file: object = None) -> None:  # noqa: ARG002  argparse's own

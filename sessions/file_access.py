@@ -103,7 +103,7 @@ def failure_sentence(error: OSError) -> str:
     """
     if error.filename is None or error.strerror is None:
         return str(error)
-    return f"{error.filename}: {error.strerror.lower()}; {remedy(error, new=True)}"
+    return f"{error.filename}: {error.strerror[:1].lower()}{error.strerror[1:]}; {remedy(error, new=True)}"
 
 
 @contextmanager

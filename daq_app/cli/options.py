@@ -29,13 +29,16 @@ def within(
     usual = f"a whole number from {ends}" if kind is int else ends
 
     def read(text: str) -> float:
-        value = kind(text)
+        try:
+            value = kind(text)
+        except ValueError:
+            value, shown = math.nan, repr(text)
+        else:
+            shown = str(value) if kind is int else f"{value:g}"
         if not least <= value <= greatest:
-            shown = value if kind is int else f"{value:g}"
             raise WrongValue(f"{name} {shown} is not allowed: {words or usual}")
         return value if per == 1 else value / per
 
-    read.__name__ = kind.__name__  # argparse names it where a text is no number
     return read
 
 

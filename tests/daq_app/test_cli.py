@@ -109,6 +109,20 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
 
 
 @pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["study", "a", "--workers", "many"], "--workers 'many' is not allowed: a whole number from 1 to 1024"),
+        (["solve", "a", "--row", "deep"], "--row 'deep' is not allowed: it must be a number; 'daq-app solve --help'"),
+        (["decide", "a", "--drop", "--trial", "1.5"], "--trial '1.5' is not allowed: it must be a whole number;"),
+        (["simulate", "net-ft", "--factor", "-inf"], "--factor -inf is not allowed: 0.01 to 1000"),
+    ],
+)
+def test_what_is_no_number_is_refused_with_what_is_allowed(arguments, words, capsys):
+    assert run(arguments) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
     ("content", "code", "words"),
     [
         (bytes(5 * 2**20), 1, "it holds more than 4 MB"),

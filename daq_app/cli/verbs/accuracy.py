@@ -70,14 +70,16 @@ def _docs(options: argparse.Namespace, page_tables: "Mapping[str, Table]") -> di
 
 def _measure_or_restore(options: argparse.Namespace, console: Console) -> "RunResults":
     """Measure, or return the results of an earlier run. Raises WrongValue for a file that holds none."""
-    from sessions.file_access import json_object, read_within_limit
+    from sessions.file_access import json_object, name_failure, read_within_limit
     from sessions.recording.head import software_versions
     from solver.verification.measuring import measure, restore
     from solver.verification.request import Host
 
     if options.data is None:
         return measure(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))
+    with name_failure(OSError, f"{options.data} cannot be read"):
+        content = read_within_limit(options.data)
     try:
-        return restore(json_object(read_within_limit(options.data)))
+        return restore(json_object(content))
     except (ValueError, KeyError, TypeError) as error:
         raise WrongValue(f"{options.data} is no accuracy.json of this program ({error}); give another file") from error
