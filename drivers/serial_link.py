@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 import serial
 from serial.tools import list_ports
 
-from drivers.address import Address
+from drivers.address import Address, AddressError
 from drivers.transducer import LinkLost, SetupError
 
 Parity = Literal["none", "even"]
@@ -99,7 +99,7 @@ def port_of(address: Address) -> str:
     parts = urlsplit(address.uri)
     port = unquote(parts.netloc + parts.path if parts.path != "/" else parts.netloc)
     if not port:
-        raise SetupError(f"{address.uri} names no port; write for example {address.scheme}:///dev/ttyUSB0")
+        raise AddressError(f"{address.uri} names no port; write for example {address.scheme}:///dev/ttyUSB0")
     return port
 
 

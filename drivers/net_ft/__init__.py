@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.address import Address, Driver, check_options
+from drivers.address import Address, AddressError, Driver, check_options
 from drivers.clock import Clock
 from drivers.deadline import Deadline
 from drivers.links import UdpLink, http_get, resolve, tcp_answer
@@ -58,7 +58,7 @@ def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
 def _where(address: Address, deadline: Deadline) -> _Where:
     check_options(address, _OPTIONS)
     if not address.host:
-        raise SetupError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
+        raise AddressError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
     return _Where(
         address,
         http_port=address.number("http", 80, 1, 65535),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.address import Address, Driver, at, check_options
+from drivers.address import Address, AddressError, Driver, at, check_options
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
@@ -16,7 +16,7 @@ from drivers.readings import RecordDecoder
 from drivers.serial_ft import wire
 from drivers.serial_link import SerialLink, port_of
 from drivers.streaming import StreamingTransducer, measured_rate
-from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
+from drivers.transducer import DeviceFault, LinkLost, TransducerInfo
 
 # All in real seconds.
 _SETTLED = 0.05  # of silence behind a prompt that show it is one, and no byte of a record
@@ -128,7 +128,7 @@ def _where(address: Address) -> _Where:
     baud = address.number("baud", 0, 300, 921600)
     counts = [address.positive(option) for option in ("counts_per_N", "counts_per_Nm")]
     if not np.all(np.isfinite(counts)):
-        raise SetupError(
+        raise AddressError(
             f"{address.uri}: the controller cannot tell its units; add ?counts_per_N=...&counts_per_Nm=... "
             "as they stand in the calibration sheet"
         )

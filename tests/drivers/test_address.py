@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.address import check_options, parse_address
+from drivers.address import AddressError, check_options, parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import RealClock
 from drivers.transducer import LinkLost, SetupError
@@ -86,6 +86,14 @@ def test_any_text_is_an_address_or_refused_in_a_sentence(text):
 )
 def test_an_address_that_cannot_be_opened_is_refused_in_a_sentence(uri, reason):
     with pytest.raises(SetupError, match=reason):
+        open_transducer(uri, RealClock())
+
+
+@pytest.mark.parametrize(
+    "uri", ["net-ft://", "serial-ft://", "serial-ft:///dev/ttyUSB0", "digital-ft://", "labjack-u6://"]
+)
+def test_an_address_that_lacks_something_is_a_wrong_address(uri):
+    with pytest.raises(AddressError):
         open_transducer(uri, RealClock())
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import socket
-import tomllib
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from drivers.catalog import open_transducer
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError
 from simulators.faults import Fault
-from simulators.serving import ScriptedBench, Timetable, TimetableError, serve, timetable_in, usual_timetable
+from simulators.serving import ScriptedBench, Timetable, TimetableError, load_timetable, serve, usual_timetable
 from simulators.stroke import Surface, paper_surfaces
 
 SCRIPT = """
@@ -38,8 +37,18 @@ share = 0.25
 """
 
 
-def test_a_script_gives_strokes_in_order_and_faults():
-    timetable = timetable_in(tomllib.loads(SCRIPT), "script")
+@pytest.fixture
+def write_script(tmp_path):
+    def write(text):
+        path = tmp_path / "script.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_a_script_gives_strokes_in_order_and_faults(write_script):
+    timetable = load_timetable(write_script(SCRIPT))
     assert timetable.strokes == (
         (2.0, paper_surfaces()["stickiness", 100]),
         (8.0, Surface(0.5, "scripted", 0, 0.02, 25.0, -1, holds=False)),
@@ -51,6 +60,10 @@ def test_a_script_gives_strokes_in_order_and_faults():
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
+        ("repeat = ", "not TOML"),
+        (f"repeat = {'[' * 2000}", "not TOML"),
+        (f"repeat = {'1' * 5000}", "not TOML"),
+        ("\ufeffstrokes = 1", "strokes"),  # the mark that some editors begin a file with
         ("strokes = 1", "strokes is not known; allowed here: stroke, fault, repeat"),
         ("[[stroke]]\nat = -1\nmu = 0.5", "at"),
         ("[[stroke]]\nat = 1\nmu = nan", "mu"),
@@ -72,11 +85,17 @@ def test_a_script_gives_strokes_in_order_and_faults():
             "[[fault]]\nkind = 'lose'\nstart = 1",
             r"fault\[0\]\.start is not known; allowed here: kind, from, to, ",
         ),
+        ("\ufeff\x00", "not TOML"),
     ],
 )
-def test_a_wrong_script_is_refused_in_a_sentence_that_names_file_and_value(text, reason):
-    with pytest.raises(TimetableError, match=rf"script\.toml: .*{reason}"):
-        timetable_in(tomllib.loads(text), "script.toml")
+def test_a_wrong_script_is_refused_in_a_sentence_that_names_file_and_value(write_script, text, reason):
+    with pytest.raises(TimetableError, match=rf"script\.toml.*{reason}"):
+        load_timetable(write_script(text))
+
+
+def test_a_missing_script_is_refused_in_a_sentence(tmp_path):
+    with pytest.raises(SetupError, match=r"none\.toml cannot be read"):
+        load_timetable(tmp_path / "none.toml")
 
 
 def test_a_bench_is_stroked_as_its_timetable_says_again_and_again():
@@ -104,15 +123,8 @@ def test_without_a_script_the_papers_ten_surfaces_are_stroked():
     assert [surface for _, surface in usual_timetable().strokes] == list(paper_surfaces().values())
 
 
-def test_a_served_box_is_opened_by_its_address_and_carries_out_its_script():
-    simulator = serve(
-        "net-ft",
-        ports=(0, 0, 0),
-        rate=1000,
-        seed=4,
-        factor=20.0,
-        timetable=timetable_in(tomllib.loads(SCRIPT), "script"),
-    )
+def test_a_served_box_is_opened_by_its_address_and_carries_out_its_script(write_script):
+    simulator = serve("net-ft", ports=(0, 0, 0), rate=1000, seed=4, factor=20.0, script=write_script(SCRIPT))
     try:
         transducer = open_transducer(simulator.uri, PacedClock(20.0))
         assert (transducer.info.rate, transducer.info.serial) == (1000.0, "SIM00004")
