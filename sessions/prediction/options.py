@@ -78,7 +78,7 @@ def finger_in(path: Path) -> tuple[Scene, str]:
     document = tomllib.loads(text)
     ignored = [f"[{name}]" for name in _OF_TRIALS if name in document]
     ignored += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
-    of_others = ("title", *(f"{name}." for name in _OF_TRIALS), *(f"solve.{name}" for name in _OF_OPTIONS))
+    of_others = ("title", *_OF_TRIALS, *(f"solve.{name}" for name in _OF_OPTIONS))
     if all(name.startswith(of_others) for name, _ in leaves(document)):
         raise SettingsError(f"{path} tells nothing of a finger; give it [finger] or [materials], or name no file")
     if not ignored:
