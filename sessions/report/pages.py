@@ -107,7 +107,7 @@ def check_replaceable(path: Path) -> None:
         with path.open("rb") as file:
             start = file.read(len(HEAD))
     except OSError as error:
-        raise ReportError(f"{path} cannot be read ({error.strerror}): choose another file") from error
+        raise ReportError(f"{path} cannot be written over ({error.strerror}): choose another file") from error
     if start not in (b"", HEAD.encode()):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
 
