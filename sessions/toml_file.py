@@ -107,8 +107,8 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
         if isinstance(value, float) and not math.isfinite(value):
             raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
         nested = _member_with_places(form)
-        if isinstance(value, Mapping) and isinstance(nested, inspect.DataclassType):
-            allowed = [field.name for field in nested.fields]
+        if isinstance(value, Mapping) and isinstance(nested, inspect.DataclassType | inspect.StructType):
+            allowed = [field.encode_name for field in nested.fields]
             for name in cast("Mapping[str, Any]", value):
                 if name not in allowed:
                     full = _join_key(key, name)
@@ -132,7 +132,7 @@ def _places(value: Any, form: inspect.Type | None, key: str) -> Iterator[tuple[s
 
 def _member_with_places(form: inspect.Type | None) -> inspect.Type | None:
     """Return the member of a union that holds other values, or the type itself where it is no union."""
-    kinds = (inspect.DataclassType, inspect.VarTupleType, inspect.TupleType)
+    kinds = (inspect.DataclassType, inspect.StructType, inspect.ListType, inspect.VarTupleType, inspect.TupleType)
     types = form.types if isinstance(form, inspect.UnionType) else (form,)
     return next((one for one in types if isinstance(one, kinds)), None)
 
@@ -140,9 +140,9 @@ def _member_with_places(form: inspect.Type | None) -> inspect.Type | None:
 def _inside(form: inspect.Type | None, part: str | int) -> inspect.Type | None:
     """Return the type at a name or a position inside a type; None where it has none there."""
     match _member_with_places(form), part:
-        case inspect.DataclassType(fields=fields), str():
-            return next((field.type for field in fields if field.name == part), None)
-        case inspect.VarTupleType(item_type=item), int():
+        case inspect.DataclassType(fields=fields) | inspect.StructType(fields=fields), str():
+            return next((field.type for field in fields if field.encode_name == part), None)
+        case inspect.VarTupleType(item_type=item) | inspect.ListType(item_type=item), int():
             return item
         case inspect.TupleType(item_types=items), int():
             return items[min(part, len(items) - 1)]
@@ -184,14 +184,19 @@ def _in_words(form: inspect.Type | None) -> str:
 
     >>> _in_words(inspect.type_info(tuple[float, float])), _in_words(inspect.type_info(float | None))
     ('a list of 2, each a number', 'a number')
+    >>> _in_words(inspect.FloatType(gt=0.0, le=1e6)), _in_words(inspect.FloatType(ge=0.0))
+    ('a number above 0 and at most 1e+06', 'a number at least 0')
     """
     match form:
         case inspect.UnionType(types):
             return " or ".join(_in_words(choice) for choice in types if not isinstance(choice, inspect.NoneType))
         case inspect.LiteralType(values):
             return " or ".join(f'"{value}"' for value in values)
-        case inspect.VarTupleType(item):
+        case inspect.VarTupleType(item) | inspect.ListType(item):
             return f"a list, each {_in_words(item)}"
+        case inspect.FloatType(gt=above, ge=least, le=most):
+            ends = {"above": above, "at least": least, "at most": most}
+            return f"a number {' and '.join(f'{w} {end:g}' for w, end in ends.items() if end is not None)}".rstrip()
         case inspect.TupleType(items):
             return f"a list of {len(items)}, each {_in_words(items[0])}"
         case _:
@@ -199,11 +204,11 @@ def _in_words(form: inspect.Type | None) -> str:
 
 
 _WORDS: Mapping[type[inspect.Type | None], str] = {
-    inspect.FloatType: "a number",
     inspect.IntType: "a whole number",
     inspect.StrType: "text in quotes",
     inspect.BoolType: "true or false",
     inspect.DataclassType: "a table",
+    inspect.StructType: "a table",
 }
 
 

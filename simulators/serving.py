@@ -5,7 +5,6 @@ The list reads itself from the modules of this package. A test that is run on ev
 
 import itertools
 import pkgutil
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -85,16 +84,6 @@ def usual_timetable() -> Timetable:
     return Timetable(tuple((6.0 * i, surface) for i, surface in enumerate(surfaces)), repeat=6.0 * len(surfaces))
 
 
-def timetable_in(table: Mapping[str, object], where: str) -> Timetable:
-    """Return the timetable in the tables of a TOML file, which messages call `where`. Raises TimetableError."""
-    try:
-        script = msgspec.convert(table, _Script)
-        strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
-        return Timetable(tuple(strokes), tuple(script.fault), script.repeat)
-    except (msgspec.ValidationError, ValueError) as error:
-        raise TimetableError(f"{where}: {_unknown_key(str(error)) or error}") from None
-
-
 class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     """One [[stroke]]: a surface of the paper by descriptor and index, or any other by mu and the rest."""
 
@@ -108,23 +97,18 @@ class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     holds: bool = True
 
 
-class _Script(msgspec.Struct, forbid_unknown_fields=True):
-    """The whole file."""
+class Script(msgspec.Struct, forbid_unknown_fields=True):
+    """A whole timetable file."""
 
     stroke: list[_StrokeEntry] = []  # msgspec copies an empty default for each instance
     fault: list[Fault] = []
     repeat: Time = 0.0
 
 
-def _unknown_key(message: str) -> str:
-    """Return which key msgspec does not know, and what is allowed in its place; "" where it says something else."""
-    unknown = re.fullmatch(r"Object contains unknown field `(.*?)`(?: - at `\$\.((\w+)\[\d+\])`)?", message, re.DOTALL)
-    if unknown is None:
-        return ""
-    key, entry, table = unknown.groups()
-    known = msgspec.structs.fields({"stroke": _StrokeEntry, "fault": Fault}.get(table, _Script))
-    where = f"{entry}." if entry else ""
-    return f"{where}{key} is not known; allowed here: {', '.join(field.encode_name for field in known)}"
+def timetable_in(script: Script) -> Timetable:
+    """Return the timetable that a script describes. Raises TimetableError."""
+    strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
+    return Timetable(tuple(strokes), tuple(script.fault), script.repeat)
 
 
 def _surface(entry: _StrokeEntry) -> Surface:

@@ -13,11 +13,12 @@ from sessions.plan.plan import Frame, Trial
 from sessions.recording import Recording
 from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
+from sessions.toml_file import load_toml
 from simulators.bench import Bench, StrokeGroundTruth
 from simulators.net_ft_box import NetFtBox
 from simulators.serving import WIRES as WIRES  # the verb serves them
+from simulators.serving import Script, Timetable, TimetableError, timetable_in
 from simulators.serving import serve as serve
-from simulators.serving import timetable_in as timetable_in
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
@@ -43,6 +44,15 @@ class Connection:
         if self.bench is None:
             return self.recorded_frame
         return Frame("-z", "set", self.bench.settings.height, "set")
+
+
+def load_timetable(path: Path) -> Timetable:
+    """Return the timetable in a TOML file. Raises OSError, SettingsError, and TimetableError that names the file."""
+    script = load_toml(path, Script)
+    try:
+        return timetable_in(script)
+    except TimetableError as wrong:
+        raise TimetableError(f"{path}: {wrong}") from wrong
 
 
 @contextmanager

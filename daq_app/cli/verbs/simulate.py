@@ -12,9 +12,8 @@ from pathlib import Path
 
 from daq_app.cli.options import add_number, add_seed
 from daq_app.console import Console, WrongValue
-from daq_app.simulation.wiring import WIRES, serve, timetable_in
+from daq_app.simulation.wiring import WIRES, load_timetable, serve
 from sessions.plan.protocols.protocol import LARGEST_SEED
-from sessions.toml_file import tables_in, text_of
 
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
 BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
@@ -44,10 +43,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, BAUDS))}")
     if options.wire == "net-ft":
         settings["ports"] = tuple(settings.pop(name, usual) for name, usual in PORTS.items())
-    if options.script is not None:
-        where = str(options.script)
-        settings["timetable"] = timetable_in(tables_in(text_of(options.script), where), where)
-    box = serve(options.wire, **settings, seed=options.seed, factor=options.factor)
+    timetable = None if options.script is None else load_timetable(options.script)
+    box = serve(options.wire, **settings, seed=options.seed, factor=options.factor, timetable=timetable)
     try:
         console.result({"address": box.uri, "simulated": True})
         console.say(f"SIMULATED {options.wire} at {box.uri}")
