@@ -1,7 +1,7 @@
 """Plots that the wheel zooms and the mouse moves; a field of the finger as a curve, and which field it is."""
 
 from collections.abc import Callable, Sequence
-from math import ceil, floor, log10
+from math import floor, log10
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,12 @@ LARGEST = 1e6  # in a number field: far beyond any stress or strain of tissue
 
 
 class RoomyAxis(pg.AxisItem):
-    """A vertical axis whose numbers are no nearer to each other than a line of them is high."""
+    """A vertical axis with a whole name, whose numbers are no nearer to each other than a line of them is high."""
+
+    def resizeEvent(self, event: object = None) -> None:
+        """Centre the name; one longer than the axis begins at its top, and ends beside the numbers under the plot."""
+        pg.AxisItem.resizeEvent(self, event)
+        self.label.setY(max(self.label.y(), self.label.boundingRect().width()))
 
     def tickSpacing(self, least: float, greatest: float, size: float) -> list[tuple[float, float]]:  # noqa: N802  Qt's
         """Return spacings and offsets of the numbers on `size` pixels, the widest first."""
@@ -89,19 +94,11 @@ class ZoomedPlot(pg.PlotWidget):
             style_axis(item.getAxis(side), tokens, font(SMALL))
 
     def name_across(self, words: str) -> None:
-        """Name the horizontal axis in at most two lines, under its numbers."""
+        """Name the horizontal axis in one or two lines, under its numbers."""
         axis: Any = self.getPlotItem().getAxis("bottom")
         name_axis(axis, words)
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
-        axis.setHeight(round(above + (axis.label.boundingRect().height() if words else 0.0)))
-
-    def name_up(self, words: str) -> None:
-        """Name the vertical axis, which is never shorter than its name; the horizontal one is named before."""
-        item: Any = self.getPlotItem()
-        left, bottom = item.getAxis("left"), item.getAxis("bottom")
-        name_axis(left, words)
-        name_length = left.label.boundingRect().width()
-        self.setMinimumHeight(max(self.minimumHeight(), ceil(name_length + bottom.minimumHeight()) + 2))  # its margins
+        axis.setHeight(round(above + axis.label.boundingRect().height()))
 
     def show_numbers(self, *, shown: bool) -> None:
         """Show the numbers along both axes, or none: a plot of nothing has no scale."""

@@ -105,10 +105,10 @@ class StrokeView(QWidget):
         self._time = np.empty(0)
         self._columns = [np.empty(0)] * 3
         self._raw: RawReadings | None = None
-        names = (tr("N and T [N]"), ""), ("µ = T/N [-]", tr("time since contact [s]"))
-        self._plots = [_plot(tokens, *up_and_across) for up_and_across in names]
+        self._plots = [_plot(tokens, name) for name in (tr("N and T [N]"), "µ = T/N [-]")]
         for plot in self._plots:
             plot.reset, plot.read = self.show_all, self._read
+        self._plots[0].getPlotItem().getAxis("bottom").setLabel("")
         self._plots[1].setXLink(self._plots[0])
         self._windows = [
             pg.LinearRegionItem(brush=sheer(tokens.act, 36), pen=pg.mkPen(None), movable=False, span=(0, 1))
@@ -149,7 +149,7 @@ class StrokeView(QWidget):
         self._columns = [self._time] * 3 if trace is None else [trace.normal, trace.tangential, trace.mu]
         for plot in self._plots:
             plot.show_numbers(shown=len(self._time) > 0)
-        self._plots[1].name_across(tr("time since contact [s]") if len(self._time) else word)
+        self._plots[1].setLabel("bottom", tr("time since contact [s]") if len(self._time) else word)
         self.show_edges()
         if other:
             self._raw = None
@@ -243,9 +243,9 @@ class StrokeView(QWidget):
         return line
 
 
-def _plot(tokens: Tokens, up: str, across: str) -> Any:  # noqa: ANN401  pyqtgraph has no types
+def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no types
     plot = ZoomedPlot(tokens)
-    plot.getPlotItem().showGrid(x=False, y=True, alpha=0.15)
-    plot.name_across(across)
-    plot.name_up(up)
+    item = plot.getPlotItem()
+    item.showGrid(x=False, y=True, alpha=0.15)
+    item.setLabel("left", name)
     return plot

@@ -106,9 +106,10 @@ def test_the_name_of_a_vertical_axis_is_whole_in_the_lowest_plot_of_a_stroke(app
     view = StrokeView(tokens.LIGHT)
     view.resize(view.minimumSizeHint())
     view.show()
-    application.processEvents()
     for plot in view.findChildren(ZoomedPlot):
-        axis = plot.getPlotItem().getAxis("left")
-        along, name = axis.sceneBoundingRect(), axis.label.sceneBoundingRect()
-        assert along.top() - 1.0 <= name.top() < name.bottom() <= along.bottom() + 1.0
+        plot.show_numbers(shown=True)
+        for _ in range(5):  # the axes have found their sizes
+            application.processEvents()
+        name = plot.getPlotItem().getAxis("left").label.sceneBoundingRect()
+        assert plot.sceneRect().top() <= name.top() < name.bottom() <= plot.sceneRect().bottom()
     view.hide()
