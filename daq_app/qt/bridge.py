@@ -180,7 +180,7 @@ class Bridge(QObject):
         """Ask for the full solve of a stroke that was looked at."""
         session, stroke, friction = self.state.session, judged.quality.stroke, judged.quality.friction
         if session and friction and stroke and stroke.steady and stroke.normal_force:
-            self.model.settle(Settle(judged.trial, session.plan, friction, stroke.normal_force, stroke.steady))
+            self.model.settle(Settle(session.plan, friction, stroke.normal_force, stroke.steady))
 
     def _fold(self, message: Message) -> None:
         self.state = fold(self.state, message)

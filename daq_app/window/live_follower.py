@@ -179,12 +179,12 @@ def _solve_settled(
         if seen is not None:
             lost = place_of_greatest_shortening(seen.rest, seen.picture.nodes, seen.picture.faces) if failed else None
             row, picture, depth = seen.row, replace(seen.picture, lost=lost), seen.depth
-        return SettledSolve(request.trial, None, None, provisional, row, picture, depth, kinematics, why)
+        return SettledSolve(request.steady, None, None, provisional, row, picture, depth, kinematics, why)
     fields = fields_of(prediction)
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
     return SettledSolve(
-        request.trial, prediction.sed_ending, known_error(prediction, prediction.error_estimate), provisional,
+        request.steady, prediction.sed_ending, known_error(prediction, prediction.error_estimate), provisional,
         prediction.row.sed, picture, prediction.indentation, kinematics, effect=_greatest_effect(prediction),
     )  # fmt: skip
 

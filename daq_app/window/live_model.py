@@ -84,18 +84,17 @@ class Provisional:
 class Settle:
     """Asks for the full solve of a stroke, to replace what was provisional."""
 
-    trial: int
     plan: SessionPlan
     friction: FrictionParameters
     normal_force: float  # mean over the steady window [N]
-    steady: tuple[float, float]  # over which the provisional value is averaged [s, device time]
+    steady: tuple[float, float]  # window of the stroke, over which the provisional value is averaged [s, device time]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SettledSolve:
     """The full solve of a stroke, with the mean of what was shown live."""
 
-    trial: int
+    steady: tuple[float, float]  # of the stroke [s, device time]
     sed: float | None  # [MPa]; None where `reason` says why
     error: float | None  # its estimated relative error [-]
     provisional: float | None  # mean over the steady window of what was shown [MPa]; None where nothing was
@@ -110,7 +109,7 @@ class SettledSolve:
     def difference(self) -> float | None:
         """Return by which part of the full solve the provisional value is larger [-]; None where one is missing.
 
-        >>> SettledSolve(1, 0.004, 0.01, 0.005, np.empty(0), None, 2.0, "small").difference
+        >>> SettledSolve((1.2, 2.0), 0.004, 0.01, 0.005, np.empty(0), None, 2.0, "small").difference
         0.25
         """
         if not self.sed or self.provisional is None:

@@ -76,7 +76,8 @@ class LiveModel:
         self._child: Child | None = None
         self._under_way = 0
         self._waiting: list[Forces] = []
-        self._requests: list[Use | Settle] = []
+        self._requests: list[Use | Forces | Settle] = []
+        self._settling: tuple[float, float] | None = None  # steady window of the last stroke, until another touch
         self._plan: SessionPlan | None = None
         self.kinematics: Kinematics = "small"  # that is asked for
 
@@ -95,7 +96,7 @@ class LiveModel:
 
     def follow(self, plan: SessionPlan | None) -> None:
         """Follow the finger of another plan."""
-        self._plan, self.settled = plan, None
+        self._plan, self.settled, self._settling = plan, None, None
         if self._child is None and self.problem:
             self.prepare()  # one that has ended gets another chance with the next session
         else:
@@ -119,9 +120,10 @@ class LiveModel:
             self._waiting.pop(0)
 
     def settle(self, request: Settle) -> None:
-        """Ask for the full solve of a stroke."""
+        """Ask for the full solve of a stroke, once all that was added until now was followed."""
         if self._child is not None:
-            self._requests.append(request)
+            self._requests += [join_forces(self._waiting), request] if self._waiting else [request]
+            self._waiting = []
 
     def poll(self) -> tuple[Provisional, ...]:
         """Take what came, and send what waits; return the predictions that are new."""
@@ -147,16 +149,20 @@ class LiveModel:
             case Provisional():
                 self.said = message
                 self.predictions += 1
-                if message.sed[-1] > 0.0:
-                    self.settled = None
+                if message.sed.any():  # its forces came after the stroke: something touches again
+                    self.settled = self._settling = None
             case SettledSolve():
-                self.settled = message
+                if message.steady == self._settling:  # a slow one may be of a stroke before
+                    self.settled = message
 
     def _send(self, child: Child) -> None:
         if self._requests:
             request = self._requests.pop(0)
+            if isinstance(request, Forces) and self.problem:
+                return
             child.send(request)
             if isinstance(request, Settle):
+                self.settled, self._settling = None, request.steady
                 return
         elif self._waiting and not self.problem:
             child.send(join_forces(self._waiting))

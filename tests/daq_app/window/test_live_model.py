@@ -14,6 +14,7 @@ from daq_app.window.live_model import (
     Forces,
     ModelTrace,
     Provisional,
+    Ready,
     Settle,
     SettledSolve,
     Use,
@@ -128,7 +129,7 @@ def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again
 def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
     monkeypatch.setattr("daq_app.window.live_follower.solve", solve_once)
     shown_values = follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
+    settled = follower.settling(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     steady = shown_values.sed[(shown_values.time >= 1.2) & (shown_values.time <= 2.0)]
     assert settled.provisional == pytest.approx(steady.mean())
     assert abs(settled.difference) < 0.02
@@ -144,14 +145,14 @@ def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_stead
 def test_a_full_solve_whose_nested_mesh_has_no_such_state_has_no_estimate_from_the_mesh(follower, monkeypatch):
     monkeypatch.setattr("daq_app.window.live_follower.solve", lambda scene: replace(solve_once(scene), nested=None))
     follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
+    settled = follower.settling(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     assert settled.error is None
     assert f"SED {1000 * settled.sed:.2f} kPa; mesh: no estimate; model: " in model_words(None, settled, "").words
 
 
 def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
     follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(1, PLAN, replace(FRICTION, mu=None), NORMAL, (1.2, 2.0)))()
+    settled = follower.settling(Settle(PLAN, replace(FRICTION, mu=None), NORMAL, (1.2, 2.0)))()
     assert settled.sed is None
     assert settled.difference is None
     assert settled.provisional is not None
@@ -167,7 +168,7 @@ def test_a_solve_that_finds_nothing_is_marked_in_the_last_state_that_was_followe
 
     monkeypatch.setattr("daq_app.window.live_follower.solve", wedged)
     follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
+    settled = follower.settling(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     x, y = settled.picture.lost  # squeezed most between bone and surface, above the contact
     assert abs(x) < 4.0
     assert 0.0 < y < 4.0
@@ -200,9 +201,14 @@ def test_joined_batches_are_one_batch():
     [
         (None, None, "", "none"),
         (None, None, "no finger", "none"),
-        (None, SettledSolve(1, 0.004, 0.01, 0.0041, np.empty(0), None, 2.0, "small"), "", "settled"),
-        (None, SettledSolve(1, 0.004, None, None, np.empty(0), None, 2.0, "finite"), "", "settled"),
-        (None, SettledSolve(1, None, None, None, np.empty(0), None, None, "finite", "it wedges"), "", "failed"),
+        (None, SettledSolve((1.2, 2.0), 0.004, 0.01, 0.0041, np.empty(0), None, 2.0, "small"), "", "settled"),
+        (None, SettledSolve((1.2, 2.0), 0.004, None, None, np.empty(0), None, 2.0, "finite"), "", "settled"),
+        (
+            None,
+            SettledSolve((1.2, 2.0), None, None, None, np.empty(0), None, None, "finite", "it wedges"),
+            "",
+            "failed",
+        ),
     ],
 )
 def test_every_state_of_the_model_has_words(provisional, settled, problem, state):
@@ -234,7 +240,7 @@ def test_a_process_of_its_own_answers_batches_and_the_full_solve_beside_them():
     try:
         model.add(stroke(1.5), FRAME)
         until(lambda: news.extend(model.poll()) or news)
-        model.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 1.5)))
+        model.settle(Settle(PLAN, FRICTION, NORMAL, (1.2, 1.5)))
         model.add(live(2.0 + np.arange(20) / 200, np.zeros((20, 6))), FRAME)
         count = model.predictions
         until(lambda: (model.poll(), model.settled is not None and model.predictions > count)[1])
@@ -244,3 +250,47 @@ def test_a_process_of_its_own_answers_batches_and_the_full_solve_beside_them():
         assert "next session" in model.problem
     finally:
         model.close()
+
+
+class SlowChild:
+    """A live model's process whose answers the test gives, in its order."""
+
+    def __init__(self, *_, **__):
+        self.requests, self.answers = [], []
+
+    def send(self, request):
+        self.requests.append(request)
+
+    def receive(self):
+        return self.answers.pop(0) if self.answers else None
+
+    def close(self):
+        pass
+
+
+def test_a_slow_full_solve_is_never_shown_beside_another_stroke(follower, monkeypatch):
+    monkeypatch.setattr("daq_app.window.live_model_process.Child", SlowChild)
+    model = LiveModel()
+    model.prepare()
+    child = model._child
+    model.poll()
+    child.answers.append(Ready())
+    windows = ((1.0, 1.5), (6.0, 6.5))
+    for number, window in enumerate(windows):
+        model.add(live(5.0 * number + np.arange(20) / 200, np.tile([0.0, 0, -NORMAL, 0, 0, 0], (20, 1))), FRAME)
+        model.settle(Settle(PLAN, FRICTION, NORMAL, window))
+        model.poll()
+        assert isinstance(child.requests[-1], Forces)  # what was measured of a stroke is followed before it is solved
+        child.answers.append(follower.take(child.requests[-1]))
+        model.poll()
+        assert child.requests[-1].steady == window
+    first, second = (SettledSolve(window, 0.004, 0.01, None, np.empty(0), None, 2.0, "small") for window in windows)
+    child.answers += [second, first]
+    model.poll()
+    assert model.settled is second
+    model.add(live(12.0 + np.arange(20) / 200, np.tile([0.0, 0, -500.0, 0, 0, 0], (20, 1))), FRAME)
+    model.poll()
+    child.answers.append(follower.take(child.requests[-1]))
+    model.poll()
+    assert model.said.beyond
+    assert model.settled is None
