@@ -252,21 +252,22 @@ class LivePanel(Panel):
         seen = tuple(mark for mark in marks if mark.stop >= end - self._seconds and mark.start <= now)
         hold = tr("held") if self._hold_time is not None else ""
         frozen = newest is not None and end < newest
-        drawn = (trace, now, end, self._seconds, self._columns(), seen, frozen, hold)
+        latest = tr("last reading") if silent else tr("now")
+        drawn = (trace, now, end, self._seconds, self._columns(), seen, frozen, hold, latest)
         if drawn != self._drawn:
             self._drawn = drawn
             if end == newest or trace.holds(end - self._seconds):  # else the stroke stays as it was drawn last
                 self._show_until(self.plots[:3], end, seen, clock)
             self._show_until(self.plots[3:], now, seen, clock)
             for plot in self._column:
-                plot.show_axis(end=hold or (tr("lift + 1 s") if frozen else tr("now")))
+                plot.show_axis(end=hold or (tr("lift + 1 s") if frozen else latest))
             for plot in self.plots[3:]:
-                plot.show_axis(end=hold or tr("now"))
+                plot.show_axis(end=hold or latest)
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
-                self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1].T)
-        self._draw_model(end, clock, still=end != newest)
+                self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1, : 0 if silent else None].T)
+        self._draw_model(end, clock, still=end != newest, silent=silent)
         if clock - self._read_at >= READ_EVERY:
             self._read_at = clock
             _, values = trace.between(now - 0.1, np.nextafter(now, np.inf))
@@ -289,7 +290,7 @@ class LivePanel(Panel):
         shown = next((plot for plot in self.plots if plot.isVisible()), self.plots[0])
         return max(shown.width() // 2, 100)
 
-    def _draw_model(self, now: float, clock: float, *, still: bool) -> None:
+    def _draw_model(self, now: float, clock: float, *, still: bool, silent: bool) -> None:
         """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
         if self._model_plot.isVisible() and (not still or self._model_trace.holds(now - self._seconds)):
             columns = self._model_trace.columns(now - self._seconds, np.nextafter(now, np.inf), self._columns())
@@ -297,8 +298,9 @@ class LivePanel(Panel):
         if not self.finger.isVisible() or self._hold_time is not None:
             return
         model = self._model
-        words = model_words(model.said, model.settled, model.problem)
-        shown = model.settled if model.settled is not None and model.settled.picture is not None else model.said
+        words = model_words(model.said, model.settled, model.problem, silent=silent)
+        said = None if silent else model.said
+        shown = model.settled if model.settled is not None and model.settled.picture is not None else said
         picture, row = (None, np.empty(0)) if shown is None else (shown.picture, shown.row)
         self.finger.show_model(picture, row, words, clock)
 

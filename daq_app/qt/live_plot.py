@@ -142,7 +142,7 @@ class LivePlot(PaintedWidget):
     def _paint_times(self, painter: QPainter, inside: QRectF) -> None:
         metrics = QFontMetricsF(painter.font())
         widest = metrics.horizontalAdvance("−00 s ")
-        end = inside.right() - metrics.horizontalAdvance(self._end)  # its words may begin so far left
+        end = inside.right() - metrics.horizontalAdvance(f" {self._end}")  # its words may begin so far left
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
             painter.setPen(fine(self.theme.line))

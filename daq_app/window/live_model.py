@@ -147,12 +147,16 @@ class ModelWords:
     state: Literal["none", "provisional", "instead", "beyond", "failed", "settled"]
 
 
-def model_words(said: Provisional | None, settled: SettledSolve | None, problem: str) -> ModelWords:
-    """Return what is said of the picture that is shown."""
+def model_words(
+    said: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
+) -> ModelWords:
+    """Return what is said of the picture that is shown; where the transducer is `silent`, nothing is measured now."""
     if problem:
         return ModelWords(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:
         return ModelWords(_settled_words(settled), "failed" if settled.sed is None else "settled")
+    if silent:
+        return ModelWords(tr("Nothing is measured that the model could follow."), "none")
     if said is None:
         return ModelWords(tr("The live model is starting."), "none")
     if said.beyond:

@@ -72,7 +72,7 @@ class BenchView:
     serial: str
     calibration: str
     rate: str
-    silent: bool  # readings should come, and do not
+    silent: bool  # nothing is measured now, or nothing of it is heard
     counters: tuple[tuple[str, str], ...]
     bars: tuple[Bar, ...]
     tare: str  # its figures
@@ -98,8 +98,11 @@ def bench_summary(view: BenchView) -> str:
     return "\n".join((f"{view.name}: {view.lamp_words}.", zero, noise, tr("Life: {life}.", life=life)))
 
 
-def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
-    """Return what is shown of the bench; while a session is recorded it is neither disconnected nor tared."""
+def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> BenchView:
+    """Return what is shown of the bench; while a session is recorded it is neither disconnected nor tared.
+
+    `unheard` is for how long the recorder was not heard [s].
+    """
     info = bench.info
     lamp, words = _bench_lamp(bench, recording=recording)
     counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"
@@ -111,7 +114,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
-        silent=bench.link == "lost" or _is_silent(bench),
+        silent=bench.link != "open" or _is_silent(bench) or unheard > SILENT,
         counters=(*((COUNT_WORDS[name], f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
@@ -284,10 +287,15 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
         lamp=_lamp(state),
         banner=_banner(state),
         course=None if session is None else course_view(session, state.bench, state.now),
-        bench=bench_view(state.bench, recording=session is not None and not session.over),
+        bench=bench_view(state.bench, recording=session is not None and not session.over, unheard=_unheard(state)),
         subject=subject_view(session, translate, state.language),
         mirror=None if session is None else mirror_view(session, translate),
     )
+
+
+def _unheard(state: AppState) -> float:
+    """Return for how long nothing was heard from the recorder [s]."""
+    return 0.0 if state.heard is None else state.now - state.heard
 
 
 def _lamp(state: AppState) -> Lamp:
@@ -325,8 +333,8 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("wrong", sentence(state.gone))
     if words := _no_readings(bench, running=running):
         return Banner("wrong", words)
-    if running and state.heard is not None and state.now - state.heard > SILENT:
-        return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=state.now - state.heard))
+    if running and (age := _unheard(state)) > SILENT:
+        return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=age))
     if over := bench.peak.over:
         axes = ", ".join(tr(axis) for axis in over)
         words = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)

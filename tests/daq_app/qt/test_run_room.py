@@ -232,8 +232,13 @@ def test_a_transducer_that_sends_nothing_now_has_no_number_now(own_panel):
     _, panel, feed_readings = own_panel
     feed_readings(0.0, 1.0, lambda time: np.full(len(time), 3.0))
     assert panel.bar.values["N"].text() == "3.00 N"
+    assert (len(panel.map._trail), panel.plots[0]._end) == (50, "now")
     panel.draw((), 2.5, silent=True)
     assert panel.bar.values["N"].text() == "–"
+    assert (len(panel.map._trail), panel.plots[0]._end) == (0, "last reading")
+    assert panel.finger.toolTip() == "Nothing is measured that the model could follow."
+    feed_readings(2.5, 3.0)
+    assert panel.plots[0]._end == "now"
 
 
 def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):

@@ -225,6 +225,14 @@ def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
     assert "Nothing was heard from the recorder for 5 s" in derive_view(state).banner.sentence
 
 
+def test_no_reading_counts_as_of_now_once_the_recorder_is_dead_or_not_heard():
+    heard = after(Tick(100.0), *MOUNT, health_report((0.1,) * 7), Tick(101.0))
+    assert not derive_view(heard).bench.silent
+    assert derive_view(after(Tick(105.0), state=heard)).bench.silent
+    assert derive_view(after(m.Gone(False, "signal 9"), state=heard)).bench.silent
+    assert derive_view(after(m.Disconnect(), m.NoDevice(), state=heard)).bench.silent
+
+
 # ---- the bench
 
 
