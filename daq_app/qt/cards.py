@@ -66,8 +66,11 @@ class CutShort(Panel):
         self._shown: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
+        self._sessions.currentTextChanged.connect(self._show_chosen)
+        self._words = label("", wrap=True)  # whole, however narrow the list is
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
-        fill(QVBoxLayout(self), label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on)
+        heading = label(tr("▲ Sessions that were cut short"), wrap=True)
+        fill(QVBoxLayout(self), heading, self._sessions, self._words, self.go_on)
         self._listed.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
         self.show_sessions(())
 
@@ -89,7 +92,11 @@ class CutShort(Panel):
                 self._sessions.addItem(session.words, str(session.folder))
                 at = self._sessions.count() - 1
                 self._sessions.setItemData(at, str(session.folder), Qt.ItemDataRole.ToolTipRole)
+        self._sessions.setVisible(len(sessions) > 1)
         self.setVisible(bool(sessions))
+
+    def _show_chosen(self, words: str) -> None:
+        say(self._words, words)
 
     def _resume(self) -> None:
         if folder := self._sessions.currentData():
