@@ -24,7 +24,7 @@ from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, say, scroll_area, vbox
+from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, say, scroll_area, set_horizontal, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, MODEL, Tokens, px, theme_of
@@ -137,14 +137,17 @@ class AnalystWindow(QMainWindow):
         self.take(request)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.matches(QKeySequence.StandardKey.Undo):
-            self.stroke.decisions.undo.click()
-            return
-        if event.matches(QKeySequence.StandardKey.Redo):
-            self.stroke.decisions.redo.click()
-            return
+        if not self.press(event):
+            super().keyPressEvent(event)
+
+    def press(self, event: QKeyEvent) -> bool:
+        """Take a key of this window, wherever the keyboard is; return whether it meant anything."""
         control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         match event.key():
+            case _ if event.matches(QKeySequence.StandardKey.Undo):
+                self.stroke.decisions.undo.click()
+            case _ if event.matches(QKeySequence.StandardKey.Redo):
+                self.stroke.decisions.redo.click()
             case Qt.Key.Key_F1:
                 self.keys.toggle()
             case Qt.Key.Key_Escape if self.keys.isVisible():
@@ -156,7 +159,8 @@ class AnalystWindow(QMainWindow):
             case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if control:
                 self._go_to(event.key() - Qt.Key.Key_1)
             case _:
-                super().keyPressEvent(event)
+                return False
+        return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the columns beside each other, or on pages where there is little room."""
@@ -252,6 +256,7 @@ class AnalystWindow(QMainWindow):
         if narrow == self._narrow:
             return
         self._narrow = narrow
+        set_horizontal(self._foot, not narrow)
         self._pages.setVisible(narrow)
         self._panes.setVisible(not narrow)
         for name, panel, stretch in zip(self._columns, self._panels, (3, 6, 6), strict=True):
@@ -270,9 +275,11 @@ class AnalystWindow(QMainWindow):
         window = QWidget()
         window.setObjectName("window")
         window.setMinimumSize(*LEAST)  # the columns find room in less than they would like
-        acts = self.progress, self.stop, self.go_on, self.report, self.format, self.export
-        head, foot = hbox((self.way, 1), self._head), hbox((self._words, 1), *acts)
-        vbox(head, (self._panes, 1), (self._pages, 1), foot, on=window, margins=GRID)
+        acts = self.stop, self.go_on, self.report, self.format, self.export
+        head, doing = hbox((self.way, 1), self._head), hbox((self._words, 1), self.progress)
+        self._foot = hbox((doing, 1), hbox(1, *acts))
+        head.setAlignment(self._head, Qt.AlignmentFlag.AlignTop)
+        vbox(head, (self._panes, 1), (self._pages, 1), self._foot, on=window, margins=GRID)
         return window
 
 

@@ -169,7 +169,8 @@ class MainWindow(QMainWindow):
             self.middle.leave()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not self.keyboard.press(event):
+        analyst = self.rooms.analyst
+        if not ((analyst is not None and analyst.press(event)) or self.keyboard.press(event)):
             super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -8,7 +8,7 @@ from platform import python_version
 from typing import TYPE_CHECKING, Literal
 
 from PySide6.QtCore import QEvent, Qt, QTimer, QUrl, qVersion
-from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
+from PySide6.QtGui import QAction, QActionGroup, QDesktopServices, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QListWidget,
@@ -55,6 +55,7 @@ PANELS = (
 )  # fmt: skip
 LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
+BESIDE = 760  # a narrower room has no list beside an open session: the menu has one too; likewise [px]
 
 
 class Rail(Panel):
@@ -194,10 +195,11 @@ class ReviewRoom(QWidget):
         self.recent.itemActivated.connect(self._go)
         self.recent.itemClicked.connect(self._go)
         self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
-        side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
-        side.setFixedWidth(px(LIST_WIDTH))
-        vbox(label(tr("Recent sessions"), "section"), (self.recent, 1), choose, on=side, margins=(0, GRID, 0, GRID))
-        self._row = hbox(side, (self._none, 1), on=self, spacing=GRID)
+        self._side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
+        self._side.setFixedWidth(px(LIST_WIDTH))
+        heading, margins = label(tr("Recent sessions"), "section"), (0, GRID, 0, GRID)
+        vbox(heading, (self.recent, 1), choose, on=self._side, margins=margins)
+        self._row = hbox(self._side, (self._none, 1), on=self, spacing=GRID)
 
     def enter(self) -> None:
         """Open the newest session where none is open."""
@@ -229,6 +231,11 @@ class ReviewRoom(QWidget):
             self._remove(self.analyst)
             self.analyst = None
             self._none.show()
+            self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
 
     def changeEvent(self, event: QEvent) -> None:
         """Show the session in the colours of another theme, once all else has them."""
@@ -247,8 +254,12 @@ class ReviewRoom(QWidget):
         self.analyst = analyst
         analyst.setWindowFlags(Qt.WindowType.Widget)
         self._none.hide()
+        self._fit()
         self._row.addWidget(analyst, 1)
         analyst.show()
+
+    def _fit(self) -> None:
+        self._side.setVisible(self.analyst is None or self.width() >= px(BESIDE))
 
     def _remove(self, analyst: "AnalystWindow") -> None:
         self._row.removeWidget(analyst)

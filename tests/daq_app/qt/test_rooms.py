@@ -95,6 +95,35 @@ def test_a_key_of_the_course_leads_back_from_review_and_does_nothing_unseen(driv
     assert (driver.session.trial, driver.session.phase) == (trial, phase)
 
 
+def test_keys_of_review_serve_wherever_the_keyboard_is(driver, rooms):
+    window = driver.window
+    rooms.open(SESSION)
+    window.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
+    assert window.focusWidget() is rooms.analyst.trials.list
+    window.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert rooms.room == "review"
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    assert (rooms.analyst.keys.isVisible(), window.keys.isVisible()) == (True, False)
+
+
+@pytest.mark.parametrize(("width", "list_shown"), [(683, False), (1366, True)])
+def test_review_is_as_narrow_as_the_screen_and_gives_up_its_list_for_that(driver, rooms, width, list_shown):
+    window = driver.window
+    before = window.size()
+    for _ in range(2):  # at first a room that is hidden may still hold it open
+        window.resize(width, 600)
+        driver.application.processEvents()
+    rooms.open(SESSION)
+    driver.application.processEvents()
+    assert window.width() == width
+    assert rooms.review.recent.isVisible() == list_shown
+    rooms.review.leave()
+    assert rooms.review.recent.isVisible()
+    window.resize(before)
+
+
 def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_place(driver, rooms, tmp_path):
     other = tmp_path / "other"
     other.mkdir()

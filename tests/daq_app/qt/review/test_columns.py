@@ -367,8 +367,13 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         window.resize(*size)
         application.processEvents()
         assert (window.width(), window.height()) == size
-        parts = (window.way, *window._panels, window.report, window.stop, window.export)
+        parts = (window.way, *window._panels, window.progress, window.stop, window.go_on, window.report, window.export)
         assert laid_over(window, parts) == []
+        window.take(m.Step(0.5, "working"))
+        application.processEvents()
+        assert window.progress.isVisible()
+        assert laid_over(window, parts) == []
+        window.take(m.Idle())
 
 
 def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
