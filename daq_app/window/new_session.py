@@ -159,7 +159,7 @@ def refusals(form: SessionForm, bench: Bench) -> Refusal:
     if isinstance(session, Refusal):
         return session
     try:
-        check_room(Path(session.folder).parent, need(session.plan, bench.rate if form.forces else None))
+        check_room(Path(session.folder).absolute().parent, need(session.plan, bench.rate if form.forces else None))
     except (RecordingError, OSError) as error:
         return Refusal({"folder": _sentence(error)})
     return wrong

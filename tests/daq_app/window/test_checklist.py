@@ -1,6 +1,7 @@
 """The checklist before a session: every card says at once, in one sentence, what Start would refuse."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -61,11 +62,12 @@ def test_a_broken_protocol_is_named_with_its_file_before_start(form, tmp_path):
     assert "\n" not in broken.words
 
 
-def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypatch):
+def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypatch, tmp_path):
     monkeypatch.setattr(storage.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 10**6})())
-    full = card(form, "Disk")
+    monkeypatch.chdir(tmp_path)
+    full = card(replace(form, folder="recordings"), "Disk")
     assert not full.ready
-    assert "1 MB of room" in full.words
+    assert full.words.startswith(f"{Path('recordings').absolute()} has 1 MB of room")  # as it is spelled on the disk
 
 
 def test_every_card_that_is_open_says_why_and_the_missing_transducer_comes_first(form):
