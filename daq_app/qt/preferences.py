@@ -89,15 +89,17 @@ def save_place(window: QWidget) -> None:
 
 
 def restore_place(window: QWidget) -> None:
-    """Put a window where it was; Qt brings it back onto a screen that is there.
-
-    A new one is as large as it likes where there is room: left to itself Qt takes at most two thirds of a screen.
-    """
+    """Put a window where it was; Qt brings it back onto a screen that is there."""
     kept = settings().value(_GEOMETRY)
     if isinstance(kept, QByteArray):
         window.restoreGeometry(kept)
     else:
-        window.resize(window.sizeHint().boundedTo(window.screen().availableSize() - FRAME))
+        resize_to_hint(window)
+
+
+def resize_to_hint(window: QWidget) -> None:
+    """Make a window as large as it likes where there is room: Qt itself takes at most two thirds of a screen."""
+    window.resize(window.sizeHint().boundedTo(window.screen().availableSize() - FRAME))
 
 
 def settings() -> QSettings:

@@ -64,13 +64,15 @@ def window(arguments: list[str]) -> int:
 
     def analyst(application: "QApplication") -> "AnalystWindow":
         from daq_app.qt.analyst_window import AnalystWindow
-        from daq_app.qt.preferences import remember_session
+        from daq_app.qt.preferences import remember_session, resize_to_hint
         from daq_app.qt.tokens import chosen_tokens
 
         tokens = chosen_tokens()
         _dress(application, tokens)
         remember_session(folder)
-        return AnalystWindow(folder, tokens)
+        window = AnalystWindow(folder, tokens)
+        resize_to_hint(window)
+        return window
 
     return _show_window(analyst)
 

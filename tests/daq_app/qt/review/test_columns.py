@@ -15,12 +15,12 @@ from daq_app.analyst.finger_words import finger_words
 from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import rows, selected_row
 from daq_app.analyst.stroke import EDGES
-from daq_app.qt import preferences
+from daq_app.qt import preferences, start
 from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
 from daq_app.qt.stroke_column import BY, DecisionsBar
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
-from tests.daq_app.qt.review.examples import SESSION, film, raw, until
+from tests.daq_app.qt.review.examples import SESSION, Nobody, film, raw, until
 from tests.daq_app.qt.written_text import controls, laid_over, unreached_controls
 from tests.sessions.report_example import example
 
@@ -374,6 +374,17 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         assert window.progress.isVisible()
         assert laid_over(window, parts) == []
         window.take(m.Idle())
+
+
+def test_a_session_opened_by_its_verb_shows_three_columns_where_the_screen_has_room(application, monkeypatch):
+    opened = []
+    monkeypatch.setattr(start, "_show_window", lambda create: opened.append(create(application)) or 0)
+    monkeypatch.setattr("daq_app.qt.analyst_window.Analyst", lambda _: Nobody())
+    start.window([str(SESSION)])
+    (window,) = opened
+    room = window.screen().availableSize() - preferences.FRAME
+    assert window.size() == window.sizeHint().boundedTo(room)
+    window.close()
 
 
 def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
