@@ -55,7 +55,7 @@ PANELS = (
 )  # fmt: skip
 LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
-BESIDE = 760  # a narrower room has no list beside an open session: the menu has one too; likewise [px]
+LEAST_FOR_LIST = 760  # width for the list beside an open session: in less the menu alone lists them; likewise [px]
 
 
 class Rail(Panel):
@@ -259,7 +259,7 @@ class ReviewRoom(QWidget):
         analyst.show()
 
     def _fit(self) -> None:
-        self._side.setVisible(self.analyst is None or self.width() >= px(BESIDE))
+        self._side.setVisible(self.analyst is None or self.width() >= px(LEAST_FOR_LIST))
 
     def _remove(self, analyst: "AnalystWindow") -> None:
         self._row.removeWidget(analyst)
