@@ -190,6 +190,7 @@ class ReviewRoom(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.analyst: AnalystWindow | None = None
+        self._has_room = False  # for the list beside an open session
         self.recent = QListWidget()
         self.recent.setAccessibleName(tr("recent sessions"))
         self.recent.itemActivated.connect(self._go)
@@ -231,11 +232,12 @@ class ReviewRoom(QWidget):
             self._remove(self.analyst)
             self.analyst = None
             self._none.show()
-            self._fit()
+            self._show_list()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
+    def fit(self, width: int) -> None:
+        """Take a width, seen or not; a narrow room has no list beside an open session."""
+        self._has_room = width >= px(LEAST_FOR_LIST)
+        self._show_list()
 
     def changeEvent(self, event: QEvent) -> None:
         """Show the session in the colours of another theme, once all else has them."""
@@ -254,12 +256,12 @@ class ReviewRoom(QWidget):
         self.analyst = analyst
         analyst.setWindowFlags(Qt.WindowType.Widget)
         self._none.hide()
-        self._fit()
+        self._show_list()
         self._row.addWidget(analyst, 1)
         analyst.show()
 
-    def _fit(self) -> None:
-        self._side.setVisible(self.analyst is None or self.width() >= px(LEAST_FOR_LIST))
+    def _show_list(self) -> None:
+        self._side.setVisible(self.analyst is None or self._has_room)
 
     def _remove(self, analyst: "AnalystWindow") -> None:
         self._row.removeWidget(analyst)
@@ -323,6 +325,10 @@ class Rooms(QStackedWidget):
     def open(self, folder: Path) -> None:
         self._enter_review().open(folder)
         self.show_state()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.review.fit(event.size().width())  # also while another room is shown, which it would hold open
 
     def show_state(self) -> None:
         """Show in rail and menu what can be done now, and keep a session that has ended among the recent ones."""

@@ -112,9 +112,14 @@ def test_keys_of_review_serve_wherever_the_keyboard_is(driver, rooms):
 def test_review_is_as_narrow_as_the_screen_and_gives_up_its_list_for_that(driver, rooms, width, list_shown):
     window = driver.window
     before = window.size()
-    for _ in range(2):  # at first a room that is hidden may still hold it open
+    rooms.open(SESSION)
+    window.go_to("prepare")
+
+    def resized():
         window.resize(width, 600)
-        driver.application.processEvents()
+        return window.width() == width
+
+    driver.until(resized, "a room that nobody sees to give way")
     rooms.open(SESSION)
     driver.application.processEvents()
     assert window.width() == width
