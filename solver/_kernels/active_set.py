@@ -219,7 +219,7 @@ def look_ahead(
         slip[i] = 0.0 if loose else ahead[i] - position.anchor[i] - motion[1]
 
 
-@compile_loop
+@subroutine
 def count_in(state: Narrow, which: int) -> int:
     """Return the number of nodes in the contact state `which`."""
     count = 0
@@ -228,7 +228,7 @@ def count_in(state: Narrow, which: int) -> int:
     return count
 
 
-@compile_loop
+@subroutine
 def hold(state: Narrow) -> None:
     """Set all touching nodes to STICK."""
     for i in range(state.shape[0]):

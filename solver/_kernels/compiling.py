@@ -113,7 +113,7 @@ def compile_loop(function: Loop) -> Loop:
 def subroutine(function: Loop) -> Loop:
     """Return `function` as a subroutine that LLVM inlines into loops; Python cannot call it.
 
-    It compiles faster than inlined source, but hides the shapes of small arrays from LLVM.
+    It compiles faster than inlined source, once for all loops that call it.
     """
     return cast("Loop", _numba.njit(**_OPTIONS, no_cpython_wrapper=True, forceinline=True)(function))
 

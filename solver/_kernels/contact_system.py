@@ -165,7 +165,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
     return True
 
 
-@compile_loop
+@subroutine
 def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
     """Eliminate the rows before row r from it, four at a time; `over` (r,) holds their reciprocal pivots."""
     row = a[r]

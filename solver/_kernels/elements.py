@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver._kernels.compiling import compile_loop
+from solver._kernels.compiling import compile_loop, subroutine
 from solver.arrays import (
     Array,
     BodyState,
@@ -18,7 +18,7 @@ from solver.arrays import (
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law, which does not stiffen
 
 
-@compile_loop
+@subroutine
 def shear_growth(exponent: float, excess: float) -> tuple[float, float]:
     """Return the growth factor f of the shear modulus and df/dQ at Q = `excess`, as `constitutive.slopes` does."""
     if excess > 0.04:
@@ -35,7 +35,7 @@ def shear_growth(exponent: float, excess: float) -> tuple[float, float]:
     return value, slope
 
 
-@compile_loop
+@subroutine
 def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[float, float, float, float]:
     """Return du/dX at a point, xx, xy, yx, yy, from nodal values `ux`, `uy` (9,) and gradients `gx`, `gy` (9,)."""
     xx, xy, yx, yy = 0.0, 0.0, 0.0, 0.0
@@ -47,19 +47,19 @@ def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[f
     return xx, xy, yx, yy
 
 
-@compile_loop
+@subroutine
 def volume_growth(xx: float, xy: float, yx: float, yy: float) -> float:
     """Return det F - 1 of a displacement gradient without cancellation: stiff tissue multiplies its error."""
     return xx + yy + xx * yy - xy * yx
 
 
-@compile_loop
+@subroutine
 def excess_of(xx: float, xy: float, yx: float, yy: float, log: float) -> float:
     """Return F:F - 2 - 2 ln J of a displacement gradient and `log` = ln J, without cancellation."""
     return 2.0 * (xx + yy - log) + xx * xx + xy * xy + yx * yx + yy * yy
 
 
-@compile_loop
+@subroutine
 def gather(u: Array, nodes: Narrow | Indices, e: int, ux: Array, uy: Array) -> None:
     """Fill `ux`, `uy` (9,) with the nodal displacements of element `e`."""
     for i in range(9):
@@ -102,7 +102,7 @@ def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: El
     return True
 
 
-@compile_loop
+@subroutine
 def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
     """Fill an element's gradients and weights for nodes at `px`, `py` (9,), and x, y in place of its modes."""
     values, along, up, weights = shapes
@@ -170,7 +170,7 @@ def assemble(u: Array, pressure: Array, new_tangent: bool, elements: ElementArra
     return least
 
 
-@compile_loop
+@subroutine
 def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: ElementWork, volume: Array) -> float:
     """Fill the deformation at an element's quadrature points, and its modes of `volume`; return its least det F."""
     f_inv_t, f_diff, wide, push, shear_slope = work.f_inv_t, work.f_diff, work.wide, work.push, work.shear_slope
@@ -206,7 +206,7 @@ def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: E
     return least
 
 
-@compile_loop
+@subroutine
 def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's internal forces `f` (18,)."""
     f_inv_t, f_diff, wide, push, f = work.f_inv_t, work.f_diff, work.wide, work.push, work.f
@@ -226,7 +226,7 @@ def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: Eleme
         f[17] += p10 * gx[8] + p11 * gy[8]
 
 
-@compile_loop
+@subroutine
 def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementArrays, work: ElementWork) -> None:
     """Fill the deformed gradients of shape functions, the derivatives of an element's volume modes, and `bend`."""
     h, s, wide, bend, d, left, lam = work.h, work.s, work.wide, work.bend, work.d, work.left, elements.lame[e]
@@ -246,7 +246,7 @@ def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementA
         left[c, 0], left[c, 1], left[c, 2] = lam * d0, lam * d1, lam * d2
 
 
-@compile_loop
+@subroutine
 def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
     """Fill `out` (18,) with a matrix `by` (xx, xy, yx, yy) times each node's gradient, ordered as in `ElementWork`."""
     for i in range(8):
@@ -254,7 +254,7 @@ def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
     out[16], out[17] = by[0] * gx[8] + by[1] * gy[8], by[2] * gx[8] + by[3] * gy[8]
 
 
-@compile_loop
+@subroutine
 def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
     """Fill `out` (9, 9) with the integrals of grad N_i . grad N_j times a modulus; `push` (q,) holds it by weight."""
     for i in range(9):
@@ -266,7 +266,7 @@ def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
                 out[i, c] += x * grad_x[q, c] + y * grad_y[q, c]
 
 
-@compile_loop
+@subroutine
 def sum_geometric(work: ElementWork) -> None:
     """Fill the products of deformed gradients: of each node's x, then its y, with those of all outer nodes.
 
@@ -283,7 +283,7 @@ def sum_geometric(work: ElementWork) -> None:
             by_x[i, c], by_y[i, c] = x, y
 
 
-@compile_loop
+@subroutine
 def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
     """Fill `own` (18, 18) with the stiffening term of an element's tangent and the tangent of the overstress."""
     s, shear_slope, own = work.s, work.shear_slope, work.own
@@ -296,7 +296,7 @@ def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) 
                 own[i, c] += x * s[q, c]
 
 
-@compile_loop
+@subroutine
 def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Eliminate an element's centre node, which no other element shares: fill the `system`, `left` and `right`."""
     h, bend, d, own, by_x, by_y = work.h, work.bend, work.d, work.own, work.by_x, work.by_y
@@ -328,7 +328,7 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
         system.recovery_matrix[e, 0, 2 * i + a], system.recovery_matrix[e, 1, 2 * i + a] = right[3, c], right[4, c]
 
 
-@compile_loop
+@subroutine
 def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's condensed tangent, lower half, and the derivatives of its volume modes by displacements."""
     left, right, own, even, tangent = work.left, work.right, work.own, work.laplace, system.tangent
@@ -350,7 +350,7 @@ def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
             tangent[e, 2 * i + 1, 2 * c + 1] = product[8 + i, 8 + c] + own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
 
 
-@compile_loop
+@subroutine
 def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None:
     """Add an element's condensed forces to the system, and fill the share of `f` (18,) in the centre's displacement."""
     recovery_matrix, inverse = system.recovery_matrix, system.condensed_inverse

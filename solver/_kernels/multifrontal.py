@@ -7,7 +7,7 @@ are kept: (k, k + b) numbers, upper half. The border's Schur complement (b, b) s
 
 import numpy as np
 
-from solver._kernels.compiling import compile_loop
+from solver._kernels.compiling import compile_loop, subroutine
 from solver.arrays import Array, Factors, Flags, Narrow, SymbolicFactorization
 
 UNSOLVABLE, INDEFINITE, DEFINITE = 0, 1, 2  # results of `eliminate`
@@ -206,7 +206,7 @@ def condense(force: Array, factors: Factors) -> None:
             force[numbers[border_at[p] + j]] -= border_force[j]
 
 
-@compile_loop
+@subroutine
 def back_substitute_part(p: int, condensed_force: Array, factors: Factors, out: Array) -> None:
     """Fill `out` (n,) with the displacements that part `p` of the body eliminates, from those of its border."""
     start, inner, border, border_at, numbers, factor_at, values, near = factors

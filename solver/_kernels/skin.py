@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, compile_loop
+from solver._kernels.compiling import OPEN, compile_loop, subroutine
 from solver.arrays import Array, Flags, Indices, Narrow
 
 SQUEEZED = 0.85  # stretch on at least one side below which a jump of the tangent counts as a kink
@@ -66,7 +66,7 @@ def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
     return False
 
 
-@compile_loop
+@subroutine
 def _overlap(at: Array, i: int, j: int) -> bool:
     """Return whether the segments that start at points `i` and `j` overlap along one axis.
 
