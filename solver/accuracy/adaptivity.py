@@ -64,7 +64,7 @@ class NestedGrid:
         nodes = along * wide + 4 * np.arange(rows)[:, None, None] + five
         moduli = [Moduli(one.shear, 0.0) for one in settled_moduli(finger.scene.materials)]
         shear = Elastic.of(mesh, moduli).stiffness.reshape(columns, 2, rows, 2, 18, 18)
-        place = mesh.nodes[nodes].reshape(columns, rows, 25, 2)
+        place = mesh.nodes.take(nodes, axis=0).reshape(columns, rows, 25, 2)
         affine = np.concatenate([np.ones((*place.shape[:3], 1)), place - place.mean(axis=2, keepdims=True)], axis=3)
         turned = np.swapaxes(affine, 2, 3)
         fit = np.asarray(np.linalg.solve(turned @ affine, turned), np.float64)

@@ -205,24 +205,22 @@ class Probes:
     """Points inside elements at which strains are evaluated; p of them."""
 
     element: Indices  # (p,)
-    gradient: Array  # (p, 9, 2) gradients of the shape functions [1/mm]
+    gradient: Array  # (p, 2, 9) of the shape functions, along x and y [1/mm]
     modes: Array  # (p, 3) the functions 1, x, y about the element's centre
 
     @staticmethod
     def at(mesh: Mesh, centre: Array, element: Indices, local: Array) -> "Probes":
         """Return probes at `local` coordinates (p, 2) of `element` (p,); modes are about `centre` (e, 2)."""
         values, slopes = Q2P1.shape(local)
-        corners = mesh.nodes[mesh.elements[element]]
-        jacobian = np.swapaxes(corners, 1, 2) @ slopes
-        place = (values[:, None] @ corners)[:, 0] - centre[element]
+        corners, slopes = mesh.local(mesh.nodes, element), np.ascontiguousarray(np.swapaxes(slopes, 1, 2))
+        place = (values[:, None] @ corners)[:, 0] - centre.take(element, axis=0)
         modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
-        return Probes(element, slopes @ inverse(jacobian), modes)
+        return Probes(element, inverse(slopes @ corners) @ slopes, modes)
 
     def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
         """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
-        moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
-        moved = moved - moved[:, 8:]  # a translation of the element would drown small strains in round-off
-        slopes = np.swapaxes(self.gradient, 1, 2) @ moved.reshape(len(moved), 9, -1)
+        moved = mesh.about_centre(displacement, self.element)  # (p, 9, 2, ...)
+        slopes = self.gradient @ moved.reshape(len(moved), 9, -1)
         return np.swapaxes(slopes.reshape(len(moved), 2, *moved.shape[2:]), 1, 2)
 
 
@@ -304,8 +302,7 @@ class MeshElements:
         """Return strains and moduli at places, arrays (p, ...), for displacements (nodes, 2, ...)."""
         held, wide = places.held, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
         gradient = places.probes.displacement_gradient(self.mesh, displacement)
-        local = displacement[self.mesh.elements[held]]
-        local = (local - local[:, 8:]).reshape(len(local), 9, -1)
+        local = self.mesh.about_centre(displacement, held).reshape(len(held), 9, -1)
         by = np.moveaxis((places.gradients @ local).reshape(2, len(held), 9, *displacement.shape[1:]), 3, 1)
         fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), held)[places.number]
         shear, lame, stiffening, x, y = places.constants[wide]

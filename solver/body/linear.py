@@ -169,7 +169,7 @@ class LinearBody:
         moved = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
         force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
         if prescribed is not None:
-            force -= mesh.assemble(whole.elastic.forces(moved[mesh.elements]))
+            force -= mesh.assemble(whole.elastic.forces(mesh.local(moved)))
         carried = whole.condense(force) if force.any() else whole.unloaded
         condensed = _condense_skin(mesh, whole.stiffness, whole.skin_load(carried), free)
         if not checked and len(mesh.skin):
@@ -225,12 +225,12 @@ class LinearBody:
 
     def forces(self, displacement: Array) -> Array:
         """Do as `Body` says."""
-        return self.mesh.assemble(self.elastic.forces(displacement[self.mesh.elements]))
+        return self.mesh.assemble(self.elastic.forces(self.mesh.local(displacement)))
 
     def energy_growth(self, displacement: Array) -> float:
         """Do as `Body` says."""
-        local = displacement[self.mesh.elements]
-        return float(np.sum((local - local[:, 8:]) * self.elastic.forces(local)))
+        local = self.mesh.about_centre(displacement)
+        return float(np.sum(local * self.elastic.forces(local)))
 
     def smallest_det(self, displacement: Array) -> float:
         """Do as `Body` says, at the corners of elements, where strains are largest."""
@@ -249,8 +249,7 @@ class LinearBody:
 
     def _at_corners(self, displacement: Array) -> Array:
         """Return F transposed (p, 2, 2) at every corner of every element."""
-        local = displacement[self.mesh.elements]
-        return (self._corners @ (local - local[:, 8:])).reshape(-1, 2, 2) + np.eye(2)
+        return (self._corners @ self.mesh.about_centre(displacement)).reshape(-1, 2, 2) + np.eye(2)
 
     @cached_property
     def _corners(self) -> Array:
@@ -268,8 +267,7 @@ class LinearPatches(Patches):
     def average(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
         element, patch, form = self._energy_forms
-        local = displacement[self.elements.mesh.elements[element]]
-        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # translations would add round-off
+        local = self.elements.mesh.about_centre(displacement, element).reshape(len(element), 18, -1)
         energy = np.einsum("mic,mic->mc", local, form @ local)
         total, first = np.zeros((self.endings.count, energy.shape[1])), np.flatnonzero(np.diff(patch, prepend=-1))
         total[patch[first]] = np.add.reduceat(energy, first)
@@ -279,8 +277,7 @@ class LinearPatches(Patches):
         """Return the derivative (nodes, 2) of the first ending's SED by the `displacement` (nodes, 2) [MPa/mm]."""
         element, patch, form = self._energy_forms
         mesh, first = self.elements.mesh, patch == 0
-        local = displacement[mesh.elements[element[first]]]
-        local = (local - local[:, 8:]).reshape(len(local), 18, 1)
+        local = mesh.about_centre(displacement, element[first]).reshape(-1, 18, 1)
         every = np.zeros((len(mesh.elements), 18))
         every[element[first]] = 2.0 / self.endings.areas[0] * (form[first] @ local)[:, :, 0]
         return mesh.assemble(every)
@@ -297,16 +294,16 @@ class LinearPatches(Patches):
         starts = (np.diff(element, prepend=-1) != 0) | (np.diff(patch, prepend=-1) != 0)
         part, first = np.cumsum(starts) - 1, np.flatnonzero(starts)
         place = np.arange(len(part)) - first[part]
-        roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 21))  # d/dx and d/dy of shape functions, modes
+        roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 21))  # d/dx, d/dy of shape functions; 1, x, y
         sizes = np.sqrt(self.endings.weights[order])[:, None]
-        roots[part, place, :18] = np.swapaxes(probes.gradient[order], 1, 2).reshape(-1, 18) * sizes
-        roots[part, place, 18:] = self.elements.modes_at(probes)[order] * sizes
+        roots[part, place, :18] = probes.gradient.reshape(-1, 18)[order] * sizes
+        roots[part, place, 18:] = probes.modes[order] * sizes
         sums = np.swapaxes(roots, 1, 2) @ roots
         xx, yx, yy, element = sums[:, :9, :9], sums[:, 9:18, :9], sums[:, 9:18, 9:18], element[first]
         form = np.empty((len(first), 9, 2, 9, 2))  # of eps:eps
         form[:, :, 0, :, 0], form[:, :, 0, :, 1] = xx + yy / 2.0, yx / 2.0
         form[:, :, 1, :, 0], form[:, :, 1, :, 1] = np.swapaxes(yx, 1, 2) / 2.0, yy + xx / 2.0
-        theta = self.elements.divergence[element]
+        theta = np.swapaxes(self.elements.combination[element], 1, 2) @ self.elements.divergence[element]  # by 1, x, y
         volume = np.swapaxes(theta, 1, 2) @ sums[:, 18:, 18:] @ theta
         shear, lame = (
             modulus[element, None, None] for modulus in (self.elements.elements.shear, self.elements.elements.lame)

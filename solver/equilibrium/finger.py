@@ -289,7 +289,7 @@ class Places:
         skin = finger.skin_arcs
         lengths = np.empty(len(skin))
         tributary(skin, body.middle, lengths)
-        points = VALUES @ finger.mesh.nodes[finger.mesh.elements]
+        points = VALUES @ finger.mesh.local(finger.mesh.nodes)
         return Places(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
 
 

@@ -90,7 +90,7 @@ class RelaxingBody:
         moved = np.zeros(self.mesh.nodes.shape)
         if prescribed is not None:
             moved[self.mesh.driven] = prescribed[self.mesh.driven]
-            load -= form.elastic.forces(moved[self.mesh.elements])
+            load -= form.elastic.forces(self.mesh.local(moved))
         nodes = self.mesh.assemble(load)
         nodes[self.mesh.driven] = 0.0
         body, recover = form.under(nodes)
@@ -102,7 +102,7 @@ class RelaxingBody:
         assert self._next is not None
         recover, step = self._next
         after = recover(u)
-        grown = (after - self.displacement)[self.mesh.elements].reshape(len(self._left), 18)
+        grown = self.mesh.local(after - self.displacement).reshape(len(self._left), 18)
         ages = step / self._tau
         self._left *= np.exp(-ages)[:, None, :]
         self._left += mean_decay(ages)[:, None, :] * grown[:, :, None]
@@ -111,7 +111,7 @@ class RelaxingBody:
     def energy(self, probes: Probes) -> Array:
         """Return the stored energy density (p,) [MPa]."""
         element = probes.element
-        local = self.displacement[self.mesh.elements[element]].reshape(len(element), 18)
+        local = self.mesh.local(self.displacement, element).reshape(-1, 18)
         shear, long_term = self.elastic.elements.shear[element], 1.0 - self._g[element].sum(axis=1)
         rows = self.elastic.modes_at(probes)[:, None] @ self.elastic.divergence[element]
         deviator, theta = self._strain(probes, rows, local)
@@ -130,14 +130,14 @@ class RelaxingBody:
 
         `rows` (p, 1, 18) map displacements to the volume strain.
         """
-        gradient = np.einsum("pna,pnb->pab", local.reshape(-1, 9, 2), probes.gradient)
+        gradient = probes.gradient @ local.reshape(-1, 9, 2)
         strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
         theta = (rows @ local[:, :, None])[:, 0, 0]
         return np.sum(strain * strain, axis=(1, 2)) - theta**2 / 3.0, theta
 
     def _past(self, step: float) -> Array:
         """Return the element displacements (e, 18) whose instantaneous shear stress is that of the past."""
-        local = self.displacement[self.mesh.elements].reshape(len(self._left), 18)
+        local = self.mesh.local(self.displacement).reshape(-1, 18)
         ages = step / self._tau
         left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
         return left - local * np.sum(self._g * mean_decay(ages), axis=1)[:, None]

@@ -127,6 +127,16 @@ class Mesh:
         out[self.fixed] = True
         return out.reshape(-1, 2)
 
+    def local(self, field: Array, element: Indices | None = None) -> Array:
+        """Return the nodal values (e, 9, ...) of a `field` (n, ...) in all elements, or in those numbered `element`."""
+        nodes = self.elements if element is None else self.elements.take(element, axis=0)
+        return field.take(nodes, axis=0)  # ten times as fast as to index with an array
+
+    def about_centre(self, field: Array, element: Indices | None = None) -> Array:
+        """Return `local` less the value at the centre: a translation would drown small strains in round-off."""
+        local = self.local(field, element)
+        return local - local[:, 8:]
+
     def assemble(self, local: Array) -> Array:
         """Return the nodal sums (n, 2) of `local` (e, 18): x, y of each node of an element in turn."""
         node, along = self.elements.ravel(), local.reshape(-1, 2).T
@@ -155,8 +165,11 @@ def grid_mesh(points: Array, layers: Indices, skin: slice, held: Indices) -> Mes
     elements = first[:, None] + ALONG * wide + OUT
     region = np.tile(layers, (long - 1) // 2)
     mesh = Mesh(points.reshape(-1, 2), elements, region, number[skin, -1].copy(), held)
-    quality(mesh)
+    jacobians(mesh, _CHECKED)  # raises where an element is folded
     return mesh
+
+
+_CHECKED = np.concatenate([Q2P1.points, Q2P1.corners])
 
 
 def quality(mesh: Mesh) -> dict[str, float]:
@@ -164,7 +177,7 @@ def quality(mesh: Mesh) -> dict[str, float]:
 
     Raises MeshError where the Jacobian is not positive at a corner or quadrature point: the element is folded.
     """
-    jacobian, det = jacobians(mesh, np.concatenate([Q2P1.points, Q2P1.corners]))
+    jacobian, det = jacobians(mesh, _CHECKED)
     sides = np.linalg.norm(jacobian, axis=-2)  # lengths of the two tangents
     aspect = np.maximum(sides[..., 0] / sides[..., 1], sides[..., 1] / sides[..., 0])
     return {"jacobian_ratio": float((det.min(axis=1) / det.max(axis=1)).min()), "aspect": float(aspect.max())}
@@ -175,7 +188,7 @@ def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
 
     Raises MeshError where a determinant is not positive: the element is folded there.
     """
-    jacobian = np.swapaxes(mesh.nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(at)[1]
+    jacobian = np.swapaxes(np.tensordot(mesh.local(mesh.nodes), Q2P1.shape(at)[1], axes=(1, 1)), 1, 2)
     det = determinant(jacobian)
     if not det.min() > 0.0:
         worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]

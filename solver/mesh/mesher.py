@@ -6,7 +6,8 @@ a depth below the skin. In the world frame the surface is y = 0 with the finger 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from math import ceil, cos, pi, radians, sin
 from typing import Self
@@ -188,8 +189,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     averages over whole elements converge faster than over parts. Raises MeshError where the outline cannot be meshed.
     """
     outline = Outline.of(finger)
-    base = sizing.fineness if isinstance(sizing.fineness, Lines) else _lines(outline, receptor, sizing, sizing.fineness)
-    lines = base
+    base = lines = _lines(outline, receptor, replace(sizing, halved=False))
     if sizing.halved:
         lines = base.divide(np.full(len(base.arcs) - 1, 2), np.full(base.rows, 2))
     arcs, depths, fat = np.array(lines.arcs), np.array(lines.skin), np.array(lines.fat)
@@ -224,9 +224,12 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     return FingerMesh(mesh, outline, sizing, base, arcs, depths, below, number[:, -1].copy(), loose)
 
 
-def _lines(outline: Outline, receptor: Receptor, sizing: Sizing, fineness: float) -> Lines:
-    """Return the lines for a `fineness`."""
-    finger = outline.finger
+@lru_cache(maxsize=8)  # a mesh and its nested mesh have the same
+def _lines(outline: Outline, receptor: Receptor, sizing: Sizing) -> Lines:
+    """Return the lines of a mesh before its elements are halved."""
+    finger, fineness = outline.finger, sizing.fineness
+    if isinstance(fineness, Lines):
+        return fineness
     fine, size = _finest_size(outline, sizing.indentation, fineness), finger.tip_radius / fineness
     row = _Row.of(outline, fine, receptor, sizing, 1.0 / fineness)
     arcs = row.lines(row.gaps(), shift=sizing.shift)
@@ -250,13 +253,17 @@ def _fold_size(finger: Finger) -> float:
     return max(min(FOLD[0] * finger.tip_radius, FOLD[1] * finger.epidermis), 2.0 * FINEST * finger.tip_radius)
 
 
+_DEPTH = distinct(np.concatenate([np.geomspace(1e-6, 1.0, 1000), np.linspace(0.0, 1.0, 1000)]))  # parts of the tissue
+_SIDE = np.geomspace(1e-9, 1.0, 2001)  # parts of a side of the skin
+
+
+@lru_cache(maxsize=8)
 def _arcs_below(outline: Outline, height: float) -> tuple[float, float]:
     """Return the arc positions between which the undeformed skin is lower than `height` [mm]."""
-    side = np.geomspace(1e-9, 1.0, 2001)
     ends: list[float] = []
     for end in (outline.palmar_cut, outline.dorsal):
-        rise = outline.tissue(end * side, np.asarray(0.0))[:, 1]
-        ends.append(float(end * np.interp(height, np.maximum.accumulate(rise), side)))
+        rise = outline.tissue(end * _SIDE, np.asarray(0.0))[:, 1]
+        ends.append(float(end * np.interp(height, np.maximum.accumulate(rise), _SIDE)))
     return ends[0], ends[1]
 
 
@@ -356,8 +363,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     """
     skin = finger.epidermis + finger.dermis
     thick = finger.pulp_thickness() - skin
-    depth = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 1000)]) * (skin + thick)
-    depth = distinct(np.concatenate([depth, np.linspace(0.0, skin + thick, 1000)]))
+    depth = _DEPTH * (skin + thick)
     of_bone = SIZES.at_bone + SIZES.from_bone * (skin + thick - depth) / finger.tip_radius
     of_ending = SIZES.at_ending + SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
     sizes = np.minimum(

@@ -107,7 +107,7 @@ class Sketch:
         means = {field.name: np.bincount(place, one) / count for field, one in zip(FIELDS, values, strict=True)}
         means[DISPLACEMENT] = np.hypot(*displacement[self._kept].T)
         drawn = {
-            name: (shape[:, None] @ lowered[self.mesh.elements[element]])[:, 0]
+            name: (shape[:, None] @ self.mesh.local(lowered, element))[:, 0]
             for name, (element, shape) in self._lines.items()
         }
         patch = drawn.pop("patch")
@@ -157,7 +157,7 @@ def _patch(outline: Outline, scene: Scene) -> Array:
 def _locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     """Return the element (m,) that holds each undeformed point (m, 2), and its shape functions there (m, 9)."""
     element = _holding(mesh, points)
-    local = local_coordinates(mesh.nodes[mesh.elements[element]], points, np.zeros(points.shape))
+    local = local_coordinates(mesh.local(mesh.nodes, element), points, np.zeros(points.shape))
     return element, Q2P1.shape(local)[0]
 
 
@@ -166,7 +166,7 @@ def _holding(mesh: Mesh, points: Array) -> Indices:
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :12]
     tried = near.ravel()
-    corners = mesh.nodes[mesh.elements[tried]]
+    corners = mesh.local(mesh.nodes, tried)
     local = local_coordinates(corners, np.repeat(points, near.shape[1], axis=0), np.zeros((len(tried), 2)))
     outside = np.abs(local).max(axis=1).reshape(near.shape)
     return near[np.arange(len(points)), np.argmin(np.where(np.isfinite(outside), outside, np.inf), axis=1)]

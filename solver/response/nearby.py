@@ -116,8 +116,8 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
         raise ValueError("with friction the normal force is no derivative of an energy")
     mesh = finger.geometry.mesh
     by_depth = finger.body.following(of_skin(finger.newton, state)[:, DEPTH, None])[:, :, 0]
-    forces = finger.body.elastic.forces(finger.displacement(state)[mesh.elements])
-    work = np.sum(by_depth[mesh.elements] * forces, axis=(1, 2))
+    forces = finger.body.elastic.forces(mesh.local(finger.displacement(state)))
+    work = np.sum(mesh.local(by_depth) * forces, axis=(1, 2))
     return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
 
 

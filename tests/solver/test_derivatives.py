@@ -243,7 +243,7 @@ def average(body, probes, u):
     log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.elements.nodes], gradients)))
     volume = np.einsum("eq,eqm,eq->em", body.elements.weight, body.elements.modes, log)
     places = probes.endings.probes
-    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.elements.nodes[places.element]], places.gradient)
+    F = np.eye(2) + np.einsum("pia,pAi->paA", u[body.elements.nodes[places.element]], places.gradient)
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(determinant(F))
     shear, lame = body.elements.shear[places.element], body.elements.lame[places.element]
     stretch_energy = Q if body.elements.stiffening[0] == 2.0 else grown(body.elements.stiffening[places.element], Q)

@@ -18,7 +18,7 @@ def stress(body, probes):
     local = body.displacement[body.mesh.elements[element]].reshape(len(element), 18)
     springs = local * (1.0 - body._g[element].sum(axis=1))[:, None]
     springs += np.einsum("pim,pm->pi", body._left[element], body._g[element])
-    gradient = np.einsum("pna,pnb->pab", springs.reshape(-1, 9, 2), probes.gradient)
+    gradient = np.einsum("pna,pbn->pab", springs.reshape(-1, 9, 2), probes.gradient)
     rows = np.einsum("pm,pmi->pi", body.elastic.modes_at(probes), body.elastic.divergence[element])
     theta, volume = np.sum(rows * springs, axis=1), np.sum(rows * local, axis=1)
     shear = body.elastic.elements.shear[element]
