@@ -34,6 +34,7 @@ from sessions.prediction import QUANTITIES
 from sessions.report.wording import shown_response
 
 LOOK = 30  # between two looks at the work [ms]
+ONE_ROW = 760  # width in which what is being done stands beside the buttons, before the font's scale [px]
 LEAST = (480, 320)  # the window can be made as small as that [px]
 
 
@@ -165,6 +166,7 @@ class AnalystWindow(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the columns beside each other, or on pages where there is little room."""
         super().resizeEvent(event)
+        set_horizontal(self._foot, self.width() >= px(ONE_ROW))
         self._place_columns()
         self.keys.fit()
 
@@ -256,7 +258,6 @@ class AnalystWindow(QMainWindow):
         if narrow == self._narrow:
             return
         self._narrow = narrow
-        set_horizontal(self._foot, not narrow)
         self._pages.setVisible(narrow)
         self._panes.setVisible(not narrow)
         for name, panel, stretch in zip(self._columns, self._panels, (3, 6, 6), strict=True):
