@@ -45,7 +45,7 @@ class WrongValue(Exception):
 
 
 class RecordingKept(KeyboardInterrupt):
-    """The user stopped what had recorded something by then; the message says where that is: exit code 3."""
+    """The user stopped work that had already recorded something; the message names the folder (exit code 3)."""
 
 
 class NotWritten(Exception):

@@ -80,9 +80,10 @@ def conduct(
 
 @contextmanager
 def recordings_in(out: Path) -> Generator[None]:
-    """Let recordings be made in `out`, new or empty; who stops them is told that they are kept there.
+    """Guard work that records into the folder `out`, which must be new or empty.
 
-    Raises RecordingError where `out` holds something, RecordingKept in place of KeyboardInterrupt where it does then.
+    Raises RecordingError where `out` is not empty. When the user stops the work after it recorded something, raises
+    RecordingKept, which names the folder, in place of KeyboardInterrupt.
     """
     if holds_something(out):
         raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")

@@ -198,7 +198,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     bone = outline.bone(every_arc)[:, None]
     inner = bone + (core - bone) * with_middles(fat)[:-1, None]
     points = np.concatenate([inner, outline.tissue(every_arc[:, None], with_middles(depths)[None, :])], axis=1)
-    skin = np.where(_middles(depths) > finger.epidermis, DERMIS, EPIDERMIS)
+    skin = np.where(with_middles(depths)[1::2] > finger.epidermis, DERMIS, EPIDERMIS)
     below = lines.rows - len(skin)
     layers = np.concatenate([np.full(below, FAT), skin])
     if lines.bone:
@@ -260,11 +260,9 @@ _SIDE = np.geomspace(1e-9, 1.0, 2001)  # parts of a side of the skin
 @lru_cache(maxsize=8)
 def _arcs_below(outline: Outline, height: float) -> tuple[float, float]:
     """Return the arc positions between which the undeformed skin is lower than `height` [mm]."""
-    ends: list[float] = []
-    for end in (outline.palmar_cut, outline.dorsal):
-        rise = outline.tissue(end * _SIDE, np.asarray(0.0))[:, 1]
-        ends.append(float(end * np.interp(height, np.maximum.accumulate(rise), _SIDE)))
-    return ends[0], ends[1]
+    rises = [(end, outline.tissue(end * _SIDE, np.asarray(0.0))[:, 1]) for end in (outline.palmar_cut, outline.dorsal)]
+    first, last = (float(end * np.interp(height, np.maximum.accumulate(rise), _SIDE)) for end, rise in rises)
+    return first, last
 
 
 def _contact_lines(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
@@ -280,10 +278,6 @@ def _finest_size(outline: Outline, indentation: float, fineness: float) -> float
     radius = outline.finger.tip_radius
     overlap = min(1.0, (high - low) / 2.0 / (SIZES.short_overlap * radius))
     return max(radius / fineness * SIZES.in_contact * overlap, FINEST * radius)
-
-
-def _middles(lines: Array) -> Array:
-    return (lines[1:] + lines[:-1]) / 2.0
 
 
 def _cumulative_count(place: Array, size: Array) -> Array:
