@@ -36,6 +36,15 @@ def test_a_finger_with_a_node_without_an_sed_is_drawn():
     assert all(panel.svg for panel in panels)
 
 
+def test_a_finger_that_touches_and_does_not_press_is_drawn_without_arrows():
+    none = np.zeros_like(FIELD.skin.pressure)
+    first_touch = replace(FIELD, skin=replace(FIELD.skin, pressure=none, traction=none))
+    with look():
+        _, close = finger_panels(first_touch, common_levels((FIELD,)))
+    assert "Contact and receptor" in close.svg
+    assert "traction 0.0 kPa" not in close.svg
+
+
 def test_a_finger_without_any_sed_is_drawn_without_colours_and_says_so_in_one_sentence():
     incomplete_field = with_sed(np.full_like(SED, np.nan))
     with look():

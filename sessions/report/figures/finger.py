@@ -142,14 +142,16 @@ def _tractions(drawn: Sheet, field: Field) -> None:
     if not touching:
         axes.text(0.5, 0.02, "no contact", transform=axes.transAxes, ha="center", va="bottom")
         return
+    _states(axes, field)
     strongest = float(np.hypot(skin.pressure[touching], skin.traction[touching]).max())
+    if strongest == 0.0:  # it touches, and nothing presses yet
+        return
     scale = LONGEST_ARROW / strongest
     for i in touching[:: max(1, -(-len(touching) // ARROWS))]:
         vector = (scale * skin.traction[i], scale * skin.pressure[i])
         text = f"pressure {1e3 * skin.pressure[i]:.1f} kPa, traction {1e3 * skin.traction[i]:.1f} kPa"
         start = (skin.x[i] - vector[0], -0.08 - vector[1])
         axes.quiver(*start, *vector, color=INK, gid=drawn.note(text), **_ARROW)
-    _states(axes, field)
     unit = _nice(strongest)
     left = _middle(field) - HALF_WIDTH + 0.3
     axes.plot([left, left], [-2.8, -2.8 + unit * scale], color=INK, linewidth=1.0, solid_capstyle="butt")
