@@ -72,14 +72,26 @@ def columns(
     `header` is its first row, None where that holds numbers already. `axes` names the columns from the first on ("-"
     for one that is neither), and `units` those of forces and torques, as stated. Raises ColumnsUnknown.
     """
-    places = dict(_axes_from_option(axes, width)) if axes is not None else dict(_axes_from_header(header))
+    headings = [_heading(cell) for cell in header or ()]
+    if axes is not None and len(axes) > width:
+        raise ColumnsUnknown(f"--axes names {len(axes)} columns, but the file has {width}")
+    places: dict[str, int] = {}
+    for position, name in enumerate([axis for axis, _ in headings] if axes is None else axes):
+        if name == SKIPPED:
+            continue
+        if name not in {TIME, *AXES}:
+            raise ColumnsUnknown(f'--axes names "{name}", which is none of t, {", ".join(AXES)} or -')
+        if name in places:
+            twice = f"two columns are headed {name}: give --axes, with - for the one to leave out"
+            raise ColumnsUnknown(twice if axes is None else f"--axes names {name} twice")
+        places[name] = position
     missing = [axis for axis in AXES if axis not in places]
     if missing:
         raise ColumnsUnknown(
             f"no column for {', '.join(missing)} is named: give --axes, such as --axes t,Fx,Fy,Fz,Tx,Ty,Tz, "
             "with - for a column that is none of these"
         )
-    headed = {axis: _unit(header[places[axis]]) for axis in places} if header is not None else {}
+    headed = {axis: headings[place][1] for axis, place in places.items()} if headings else {}
     force = _common_unit("forces", {headed.get(axis) for axis in AXES[:3]}, units[0] if units else None, FORCE_UNITS)
     torque = _common_unit("torques", {headed.get(axis) for axis in AXES[3:]}, units[1] if units else None, TORQUE_UNITS)
     time_unit = headed.get(TIME) or "s"
@@ -99,38 +111,18 @@ def columns(
     )
 
 
-def _axes_from_header(header: Sequence[str] | None) -> list[tuple[str, int]]:
-    """Return axis and position of every column whose heading names one."""
-    places: list[tuple[str, int]] = []
-    for position, heading in enumerate(header or ()):
-        match = _HEADING.match(heading.strip())
-        if match is None:
-            continue
-        name = match[1].lower()
-        axis = TIME if name in {"t", "time"} else name.replace("m", "t")[0].upper() + name[1]
-        if axis in {already for already, _ in places}:
-            raise ColumnsUnknown(f"two columns are headed {axis}: give --axes, with - for the one to leave out")
-        places.append((axis, position))
-    return places
+def _heading(cell: str) -> tuple[str, str | None]:
+    """Return the axis that a heading names, and its unit without blanks and dots, None where it names none.
 
-
-def _axes_from_option(axes: Sequence[str], width: int) -> list[tuple[str, int]]:
-    if len(axes) > width:
-        raise ColumnsUnknown(f"--axes names {len(axes)} columns, but the file has {width}")
-    places = [(name, position) for position, name in enumerate(axes) if name != SKIPPED]
-    for name, _ in places:
-        if name not in {TIME, *AXES}:
-            raise ColumnsUnknown(f'--axes names "{name}", which is none of t, {", ".join(AXES)} or -')
-        if [other for other, _ in places].count(name) > 1:
-            raise ColumnsUnknown(f"--axes names {name} twice")
-    return places
-
-
-def _unit(heading: str) -> str | None:
-    """Return the unit a heading names, without blanks and dots, or None."""
-    match = _HEADING.match(heading.strip())
-    unit = match and (match[2] or match[3])
-    return re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
+    >>> _heading("Mz [N m]"), _heading("time"), _heading("remark")
+    (('Tz', 'Nm'), ('t', None), ('-', None))
+    """
+    match = _HEADING.match(cell.strip())
+    if match is None:
+        return SKIPPED, None
+    name, unit = match[1].lower(), match[2] or match[3]
+    axis = TIME if name in {"t", "time"} else name.replace("m", "t")[0].upper() + name[1]
+    return axis, re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
 
 
 def _common_unit(what: str, headed: set[str | None], stated: str | None, factors: Mapping[str, float]) -> str:
