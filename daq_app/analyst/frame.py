@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.wording import tr, tr_noop
+from drivers.arrays import Array, Indices
 from solver.prediction import Skin, SkinLine
 from solver.quantities import FIELDS
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
 
 TOP = 0.97  # of the corners' values lies below the end of the colour scale
@@ -69,8 +67,6 @@ class Instant:
     depth: float  # of the bone [mm]
     travel: float  # of the bone along the surface [mm]
     sed: float  # averaged over the ending [MPa]
-    normal: float  # [N/mm]
-    drag: float  # along +x, on the skin [N/mm]
     sticking: int  # points that stick
     slipping: int  # points that slip
 
@@ -78,7 +74,7 @@ class Instant:
     def phase(self) -> Phase:
         """What the finger does.
 
-        >>> Instant(1.2, 2.0, 0.3, 0.008, 0.2, 0.1, sticking=3, slipping=9).phase
+        >>> Instant(1.2, 2.0, 0.3, 0.008, sticking=3, slipping=9).phase
         'slipping in part'
         """
         if self.travel == 0.0:

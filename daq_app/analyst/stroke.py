@@ -5,17 +5,15 @@ from typing import Literal
 
 import numpy as np
 from msgspec import Struct
-from numpy.typing import NDArray
 
 from daq_app.wording import tr, tr_noop
+from drivers.arrays import Array
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE, SEALED_FILE
 from sessions.report.contents import StrokeFinding
 from sessions.strokes.decisions import Decision, Decisions
 from sessions.strokes.forces import in_face_frame
-
-Array = NDArray[np.float64]
 
 AROUND = 1.0  # before and after a stroke of a recording without trials [s]
 MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a replay [s]

@@ -14,6 +14,7 @@ from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.console import is_ours
 from daq_app.wording import tr
+from drivers.arrays import Array
 from sessions.exchange import ExportSource, export
 from sessions.file_access import failure_sentence, write_whole
 from sessions.plan.plan import Blinded
@@ -29,7 +30,6 @@ from sessions.report.trials import field_of, finding_of
 from sessions.strokes import analyse
 from sessions.strokes.decisions import append, read
 from solver import Cancelled, Prediction, Scene
-from solver.arrays import Array
 from solver.equilibrium.load_path import Instant as Step
 from solver.mesh import Mesh
 from solver.prediction import ROW, Skin
@@ -374,7 +374,6 @@ def _frame(drawn: Fields, skin: Skin, row: Array) -> Frame:
 
 
 def _instant(still: Still) -> Instant:
-    at, force = still.instant, still.instant.state.force
-    states = still.skin.state
+    at, states = still.instant, still.skin.state
     sticking, slipping = states.count("stick"), states.count("slip") + states.count("cap")
-    return Instant(at.time, at.depth, at.travel, still.sed, float(force[1]), float(force[0]), sticking, slipping)
+    return Instant(at.time, at.depth, at.travel, still.sed, sticking, slipping)

@@ -4,7 +4,6 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
@@ -12,8 +11,7 @@ from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, V
 from daq_app.qt.painting import faces, paint_failed_solve, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
-
-Array = NDArray[np.float64]
+from drivers.arrays import Array
 
 ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
 TRACTIONS = LONGEST + 0.4  # below the surface: the arrows, and the line of what the skin does [mm]

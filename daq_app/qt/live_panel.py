@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
@@ -19,6 +18,7 @@ from daq_app.window.live_model import MODEL_CHANNELS, ModelTrace, model_words
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.live_trace import CHANNELS, PlotScale
 from daq_app.wording import quantity, tr, tr_noop
+from drivers.arrays import Array
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 COLOURS = {"N": N, "T": T, "mu": MU}  # under the captions of the numbers
@@ -82,7 +82,7 @@ class LiveBar(QWidget):
         self._forces_shown = shown
         self._fit()
 
-    def show_numbers(self, values: NDArray[np.float64]) -> None:
+    def show_numbers(self, values: Array) -> None:
         """Show the means of the last readings (channels, n)."""
         for channel, form in PICTURE.items():
             known = values[CHANNELS.index(channel)]

@@ -1,7 +1,6 @@
 """Where the finger presses on the sample, and the deforming finger with its SED, while a stroke goes on."""
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -12,9 +11,8 @@ from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
 from daq_app.window.live_model import ModelWords, Picture
 from daq_app.window.live_trace import PlotScale
 from daq_app.wording import tr
+from drivers.arrays import Array
 from solver.prediction import ROW
-
-Array = NDArray[np.float64]
 
 ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
 MARGIN = 4  # [pixels]

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QStaticText
 
@@ -18,8 +17,6 @@ from daq_app.qt.tokens import SMALL, font, px
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, MARGIN, Columns, PlotScale, ticks, times
 from daq_app.wording import tr, tr_noop
-
-Array = NDArray[np.float64]
 
 AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
 LEAST = 36  # height that holds the name and the times under it, likewise

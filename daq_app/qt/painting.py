@@ -6,15 +6,13 @@ from math import ceil
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QByteArray, QDataStream, QPoint, QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from shiboken6 import VoidPtr
 
 from daq_app.qt.tokens import GRID, LIGHT, Tokens, theme_of
-
-Array = NDArray[np.float64]
+from drivers.arrays import Array, Indices
 
 _ELEMENT = np.dtype([("kind", ">i4"), ("x", ">f8"), ("y", ">f8")])  # of a path in Qt's own serial form
 _TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # where the last part begins; overlaps are filled
@@ -89,7 +87,7 @@ def _polygon(points: Array) -> QPolygonF:
     return polygon
 
 
-def faces(corners: Array, shades: NDArray[np.int64]) -> Iterator[tuple[int, QPainterPath]]:
+def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]:
     """Return closed polygons (f, k, 2) as one path for each of their shades (f,), to be filled at once."""
     order = np.argsort(shades, kind="stable")
     sorted_shades = shades[order]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent, QValidator
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
@@ -16,9 +15,10 @@ from daq_app.qt.parts import button, choice, hbox, label, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MODEL, SMALL, TARGET, Tokens, font
 from daq_app.wording import tr, tr_noop
+from drivers.arrays import Array
 
 pg: Any = pyqtgraph  # it has no types: who draws by it imports it from here
-Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
+Curve = tuple[Array, Array]
 NOTHING: Curve = (np.empty(0), np.empty(0))
 NAMES = ("A", "B")  # of two sessions
 RECEPTORS, SKIN, LINE = range(3)

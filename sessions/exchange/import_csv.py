@@ -12,6 +12,7 @@ import numpy as np
 
 from drivers.arrays import Array
 from drivers.calibration import Calibration
+from drivers.calibration_file import AXES
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
@@ -25,7 +26,6 @@ from sessions.recording.writer import SessionWriter
 from sessions.strokes import ZERO_SETTING, ZERO_STATED
 from sessions.toml_file import NotAllowed, SettingsError, check_range
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 TIME = "t"
 SKIPPED = "-"
 

@@ -26,12 +26,12 @@ from sessions.recording import Recording
 from sessions.recording.head import compact_json
 from sessions.recording.manifest import description
 from sessions.recording.sealed_copy import new_hdf5
+from sessions.strokes.trial_analysis import RAW_WRENCH
 
 if TYPE_CHECKING:
     from pynwb import NWBFile
 
 FILE = "session.nwb"
-RAW_WRENCH = "N, N mm"
 MISSING = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
 _WHOLE = (
     ("sequence", "n/a", "Record number given by the device; missing numbers are readings that never arrived."),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drivers.arrays import Array, Mask
+from drivers.calibration_file import AXES
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
 from sessions.strokes import invalid_readings as invalid
@@ -16,9 +17,6 @@ from sessions.strokes.stroke import Flaw, FlawName, significant
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
-
-
-_AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +68,7 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     stretches = segments(good, broken)
     dead = tuple(
         name
-        for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True)
+        for name, column in zip(AXES, block.raw[good].T, strict=True)
         if len(column) > settings.signal.frozen_readings and np.ptp(column) == 0.0
     )
     missing = np.diff(block.sequence) - 1
@@ -160,13 +158,13 @@ def _flaws_of_axes(
             else "moves before or after: frozen there. These readings are left out."
         )
         sentence = (
-            f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {significant(lasting, 2)} s "
+            f"{AXES[axis]} keeps one value bit for bit while other axes move, for {significant(lasting, 2)} s "
             f"in all, first at {time[runs[0].first]:.2f} s, and {what}"
         )
         yield Flaw(FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful")
     if wild.any():
         at = wild.any(axis=1)
-        axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.T, strict=True) if marked.any())
+        axes = ", ".join(name for name, marked in zip(AXES, wild.T, strict=True) if marked.any())
         stand = "reading stands" if at.sum() == 1 else "readings stand"
         sentence = (
             f"{at.sum()} {stand} far beyond everything around on {axes}, first at {time[at][0]:.3f} s: spikes, which "

@@ -14,6 +14,7 @@ from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connect
 from daq_app.wording import COUNT_WORDS, number
+from drivers.calibration_file import AXES
 from drivers.catalog import DRIVERS, Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
@@ -22,7 +23,6 @@ from drivers.transducer import Transducer, flagged_words
 from sessions.recording.head import identity
 
 EXAMPLE = "daq-app devices probe sim:"
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 FLAWS = ("lost", "malformed", "stalled", "saturated", "doubtful", "off_rate", "off_units")  # counts of Health
 PROBED = 3.0  # how long a probe listens [s]
 

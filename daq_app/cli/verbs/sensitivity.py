@@ -16,7 +16,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.batch import sign_map
 from daq_app.batch.sensitivity import (
@@ -32,6 +31,7 @@ from daq_app.batch.sign_map import Answer
 from daq_app.cli.options import add_seed, add_shared
 from daq_app.console import DONE, Console, WrongValue, table
 from daq_app.wording import number
+from drivers.arrays import Array
 from sessions.file_access import remedy
 from sessions.prediction import QUANTITIES
 from sessions.prediction.surface_series import SERIES
@@ -222,9 +222,7 @@ def _mark(answer: Answer | str, place: int, at: int) -> str:
     return "".join("·" if one is None else "+" if one > 0.0 else "\N{MINUS SIGN}" for one in numbers)
 
 
-def _print_thirds(
-    name: str, points: NDArray[np.float64], kept: NDArray[np.float64], label: str, console: Console
-) -> None:
+def _print_thirds(name: str, points: Array, kept: Array, label: str, console: Console) -> None:
     """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
     values = points[:, list(sign_map.DESIGN).index(name)]
     rows = [

@@ -10,6 +10,7 @@ from sessions.report.wording import NONE, between
 
 Thing = TypeVar("Thing")
 CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under the table
+TOO_SHORT = "the stroke has too few readings"  # for an interval
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,17 @@ from typing import NamedTuple
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval, Variant
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
-from sessions.report.tables import Cell, Row, Rows, Table, estimate_cell, group_by_experiment, number_cell, table
+from sessions.report.tables import (
+    TOO_SHORT,
+    Cell,
+    Row,
+    Rows,
+    Table,
+    estimate_cell,
+    group_by_experiment,
+    number_cell,
+    table,
+)
 from sessions.report.wording import (
     ShownResponse,
     caption,
@@ -36,9 +46,9 @@ def prediction_table(report: Report) -> Table | None:
             bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
         missing, error = p.reasons.get("sed"), None if p.doubt else p.error_estimate
         return (
-            estimate_cell(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
+            estimate_cell(p.mu, places(3), p.reasons.get("mu") or missing, mu, TOO_SHORT),
             {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
-            estimate_cell(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
+            estimate_cell(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, TOO_SHORT, unit=1e3),
             _depth(p),
             _stroke_sed(p),
             number_cell(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
@@ -51,7 +61,6 @@ def prediction_table(report: Report) -> Table | None:
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
 _SED_ALONE = "the uncertainty of friction goes through to the SED alone"
-_SHORT = "the stroke has too few readings"
 
 
 class _Estimate(NamedTuple):
@@ -193,9 +202,9 @@ def force_table(report: Report) -> Table | None:
         return (
             cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
             cell("normal_force", p.normal_force_error, normal, why),
-            cell("measured_normal", None, intervals.get("normal_force"), _SHORT),
+            cell("measured_normal", None, intervals.get("normal_force"), TOO_SHORT),
             cell("tangential_force", p.tangential_force_error, tangential, why),
-            cell("measured_tangential", None, intervals.get("tangential_force"), _SHORT),
+            cell("measured_tangential", None, intervals.get("tangential_force"), TOO_SHORT),
             _depth(p),
             cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
         )

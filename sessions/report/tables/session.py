@@ -6,6 +6,7 @@ from functools import partial
 from sessions.prediction import BY_NAME
 from sessions.report.contents import GroundTruth, Report, StrokeFinding
 from sessions.report.tables import (
+    TOO_SHORT,
     Cell,
     Row,
     Rows,
@@ -40,7 +41,6 @@ from sessions.statistics.scores import MeanScore, sd_interval
 
 Format = Callable[[float], str]
 
-_TOO_SHORT = "the stroke has too few readings"
 _WITHOUT = {
     "onset": "the force had left its noise before, or too few readings measure its noise",
     "break_away": "too few readings to fit the rise of T/N",
@@ -84,7 +84,7 @@ def course_table(report: Report) -> Table | None:
 
     def row(stroke: StrokeFinding) -> Row:
         cell = partial(_estimate, stroke)
-        why = stroke.reasons.get("direction") or _TOO_SHORT
+        why = stroke.reasons.get("direction") or TOO_SHORT
         return (
             cell("normal_force", places(2)),
             cell("tangential_force", places(2)),
@@ -116,7 +116,7 @@ def _table(report: Report, name: str, caption: str, columns: str, row: Callable[
 
 def _estimate(stroke: StrokeFinding, name: str, shown: Format, unit: float = 1.0) -> Cell:
     """Return one number of a stroke over its bootstrap interval, or why it has none."""
-    without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, _TOO_SHORT)
+    without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, TOO_SHORT)
     why = stroke.reasons.get(name) or _MISSING.get(name)
     return estimate_cell(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, unit=unit)
 
@@ -144,7 +144,7 @@ def planted_table(report: Report) -> Table | None:
         for name, truth, value, shown, unit in quantities:
             reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
             ends = stroke.bootstrap.get(name) if stroke else None
-            cell = estimate_cell(value, shown, reason, ends, _TOO_SHORT, unit=unit)
+            cell = estimate_cell(value, shown, reason, ends, TOO_SHORT, unit=unit)
             off = None if value is None else 100 * (value / truth - 1)
             cells += [shown(truth), cell, number_cell(off, with_sign, reason)]
         right = stroke is not None and stroke.direction == p.direction

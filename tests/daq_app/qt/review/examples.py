@@ -49,7 +49,7 @@ PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]),
 
 
 def film(**more):
-    instants = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 1.0, 0.1, 3, i) for i in range(4)]
+    instants = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 3, i) for i in range(4)]
     return Film(PARTS, tuple(frame(0.001 * i) for i in range(4)), tuple(instants), ARCS, **more)
 
 
