@@ -157,6 +157,8 @@ class SubjectSide(QObject):
         subject.show_view(view.subject, None if session is None else session.plan.answering_hand)
         if not was_scoring:
             self._bring()
+        elif not subject.scoring:  # the question was taken back
+            self._let_go()
 
     def show_force(self) -> None:
         trace = self._bridge.feed.trace
@@ -206,6 +208,10 @@ class SubjectSide(QObject):
 
     def _send_answer(self, event: Message) -> None:
         self._bridge.send(event)
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """Give the keyboard back once no answer is due, unless it is another window's."""
         field = self.keyboard.focused_field()
         if field is None or field.window() is self._window:
             self.come_back()

@@ -269,3 +269,15 @@ def test_which_of_two_is_chosen_with_a_key_and_kept(driver):
     QTest.keyClick(window.subject.choice, ENTER)
     driver.until(lambda: driver.session.trials[1].outcome == "done", "the next trial")
     assert driver.session.trials[1].answer == "the second"
+
+
+def test_on_one_screen_the_experimenters_window_comes_back_when_a_question_is_taken_back(driver):
+    window = driver.window
+    driver.begin("P13", scores_only=True)
+    driver.go_on("ready")
+    driver.go_on("scoring")
+    driver.until(window.subject.isVisible, "the page for an answer")
+    QTest.keyClick(window.subject, Qt.Key.Key_0)
+    driver.phase("mounting")
+    driver.until(window.isActiveWindow, "the experimenter's window")
+    assert not window.subject.isVisible()
