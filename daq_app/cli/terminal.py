@@ -5,9 +5,9 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, TextIO
+from typing import Literal, Never, TextIO
 
-from daq_app.console import DONE, FLAWED, Console, WrongValue
+from daq_app.console import DONE, FLAWED, Console, RecordingKept, WrongValue
 from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
 from daq_app.wording import typed_number
@@ -194,7 +194,7 @@ def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession
     """Attend a session until it is sealed, or cut short; people answer at this terminal unless they are simulated.
 
     A stop is passed on at once; a second one no longer waits: for the sealing, which the recorder finishes alone, or
-    for a recorder that does not answer (KeyboardInterrupt). Raises as a driver does, RecordingError, WrongValue.
+    for a recorder that does not answer (RecordingKept). Raises as a driver does, RecordingError, WrongValue.
     """
     recorder.send(request)
     with interruptions() as interrupted:
@@ -226,7 +226,7 @@ class _Attendance:
                     self._console.note("the recorder goes on sealing the session by itself")
                     return Outcome(self._folder, self._end, sealed=False)
                 if self._stopping:
-                    raise KeyboardInterrupt
+                    self._leave_silent_recorder()
                 self._stopping = True
                 self._console.note("stopping")
                 self._recorder.send(m.Stop())
@@ -237,6 +237,13 @@ class _Attendance:
                 if self._terminal.closed and self._end is None:
                     self._terminal = None
                     self._recorder.leave()
+
+    def _leave_silent_recorder(self) -> Never:
+        if self._begun is None:
+            raise KeyboardInterrupt
+        raise RecordingKept(
+            f"stopped; the recorder does not answer and will end the session by itself; {self._begun.folder} keeps it"
+        )
 
     def _watch_silence(self) -> None:
         """Say so once where the recorder does not answer, and once when it does again."""
@@ -255,8 +262,8 @@ class _Attendance:
         match report:
             case m.SessionBegun():
                 self._begun = report
-                people, forces = report.people == "people", report.plan.forces
-                self._terminal = Terminal(self._console, forces=forces) if people else None
+                attended, forces = report.people != "simulated people", report.plan.forces
+                self._terminal = Terminal(self._console, forces=forces) if attended else None
             case Status():
                 self._show_status(report)
             case m.SessionEnded(folder, end, resumable):

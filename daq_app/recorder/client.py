@@ -88,7 +88,7 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close it; where somebody pressed Ctrl-C without waiting."""
-        self.close(0.0 if kind is KeyboardInterrupt else PATIENCE)
+        self.close(0.0 if kind is not None and issubclass(kind, KeyboardInterrupt) else PATIENCE)
 
     @property
     def pid(self) -> int:

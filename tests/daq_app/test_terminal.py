@@ -10,9 +10,12 @@ import time
 from pathlib import Path
 
 import pytest
+from desk import Desk
 
 from daq_app.cli.terminal import Terminal
 from daq_app.console import Console, takes_all
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import SessionEnded
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
 from sessions.run.steps import (
@@ -107,6 +110,17 @@ def test_a_note_in_another_encoding_than_the_terminals_is_kept_with_escapes_and_
     assert terminal.poll() == (Note(r"m\xfcde"), Pause())
 
 
+def test_who_goes_on_at_a_terminal_with_a_session_of_the_window_can_type_there(tmp_path):
+    folder = tmp_path / "P07"
+    with Recorder.start() as recorder:
+        desk = Desk(recorder, {AskMount: lambda _: recorder.leave()})
+        desk.begin(folder, people="simulated hand")
+        desk.until(SessionEnded)
+    words = [sys.executable, "-m", "daq_app", "resume", str(folder)]
+    process = subprocess.run(words, input="", capture_output=True, text=True, check=False)
+    assert "Enter does what is asked" in process.stderr
+
+
 @pytest.fixture
 def at_a_terminal(tmp_path):
     """A session on the simulated bench whose people are at a terminal; it waits for the first stimulus."""
@@ -164,8 +178,9 @@ def test_a_second_ctrl_c_leaves_a_recorder_that_does_not_answer_and_it_ends_the_
     while "stopping" not in output:
         output += process.stderr.read(1)
     os.killpg(process.pid, signal.SIGINT)
-    process.communicate()
-    assert process.returncode == 130
+    _, output = process.communicate()
+    assert process.returncode == 3
+    assert f"{folder} keeps it" in output
     assert Recording.open(folder).end is None
     os.kill(recorder, signal.SIGCONT)
     while not (folder / "MANIFEST.json").exists():
