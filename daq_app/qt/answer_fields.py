@@ -290,7 +290,9 @@ class ChoiceOfTwo(_Field):
         return False
 
     def _button(self, words: str, which: Which) -> QPushButton:
-        choice = button(words, words, lambda: self._take(self.answer.choose(self.now(), which, self._pointer)))
+        choice = button(
+            words, words, lambda: self._take(self.answer.choose(self.now(), which, self._pointer)), "choice"
+        )
         choice.installEventFilter(self)
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)

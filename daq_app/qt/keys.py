@@ -32,7 +32,11 @@ KEYS = (
     Key("S", "skip", tr_noop("skip the trial, with a reason")),
     Key("P", "pause", tr_noop("pause, and go on")),
     Key("N", "note", tr_noop("write a note, kept with its time")),
-    Key("0", "no answer", tr_noop("the subject gives no answer to this trial; where a number is due, use the button")),
+    Key(
+        "0",
+        "no answer",
+        tr_noop("the subject gives no answer to this trial; where it is typed in digits, use the button"),
+    ),
     Key("Ctrl+E", "end", tr_noop("end the session before its last trial, with a reason")),
     Key("Ctrl+N", "new", tr_noop("new session, after one has ended")),
     Key("F2", "go to prepare", tr_noop("prepare a session")),

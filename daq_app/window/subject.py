@@ -44,7 +44,7 @@ DIGITS = 1  # of a score: a mark can be placed no finer
 GIVES = frozenset({"Enter", "Space"})  # the answer that stands
 PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
 TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
-CHOOSES = frozenset({"1", "2", "Left", "Right"})  # one of two
+CHOOSES = frozenset({"0", "1", "2", "Left", "Right"})  # one of two; 0, beside them on a keypad, does nothing
 ANSWER_KEYS: dict[Kind, frozenset[str]] = {
     "read": frozenset(), "line": PLACES | GIVES, "number": TYPES | GIVES, "choice": CHOOSES | GIVES,
 }  # fmt: skip

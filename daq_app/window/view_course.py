@@ -136,7 +136,8 @@ def _no_forces(plan: SessionPlan) -> str:
 
 
 def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Button]:
-    phase, nought = session.phase, "" if isinstance(session.command, steps.AskNumber) else "0"  # a digit of a number
+    phase = session.phase
+    by_digits = isinstance(session.command, steps.AskNumber | steps.AskChoice)  # a subject may press 0 by mistake
     why_skip = "" if trial is None else tr("Why is {trial} left out?", trial=_name_trials((trial,)))
     pause = Button(tr("Pause"), "P", phase in IN_A_TRIAL, steps.Pause())
     end = Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?"))
@@ -144,7 +145,9 @@ def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Butto
         "skip": Button(tr("Skip"), "S", trial is not None and phase in IN_A_TRIAL, question=why_skip),
         "pause": Button(tr("Resume"), "P", sends=steps.Resume()) if phase == "paused" else pause,
         "note": Button(tr("Note"), "N", not session.over, question=tr("Note, kept with its time:")),
-        "no answer": Button(tr("No answer"), nought, phase == "scoring", NO_ANSWER.get(type(session.command))),
+        "no answer": Button(
+            tr("No answer"), "" if by_digits else "0", phase == "scoring", NO_ANSWER.get(type(session.command))
+        ),
         "end": Button(tr("New"), "Ctrl+N", sends=NewSession()) if session.over else end,
     }
 
@@ -154,7 +157,7 @@ def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     if not again:
         return Button(tr("Redo"), "R", enabled=False)
     numbers = "–".join(str(trial.trial.number) for trial in again)
-    question = tr("Why redo {trials}? What was recorded of it no longer counts.", trials=_name_trials(again))
+    question = tr("Why redo {trials}? What was recorded there no longer counts.", trials=_name_trials(again))
     return Button(tr("Redo {numbers}", numbers=numbers), "R", sends=sends, question=question)
 
 

@@ -25,6 +25,7 @@ from session_messages import (
 
 from daq_app.recorder import messages as m
 from daq_app.window.course_state import Judged
+from daq_app.window.subject import owner
 from daq_app.window.view import derive_view
 from sessions.plan.protocols import plan, protocol
 from sessions.run import steps
@@ -179,7 +180,8 @@ def test_a_flaw_is_the_reason_to_redo_only_the_trial_it_was_found_in():
     assert (redo.label, redo.sends) == ("Redo 2", None)
 
 
-def test_no_key_stands_for_no_answer_while_a_number_is_typed():
+def test_no_key_stands_for_no_answer_while_an_answer_is_typed_in_digits():
     assert derive_view(after(*SCORE)).course.buttons["no answer"].key == "0"
-    number = after(*MOUNT, steps.AskNumber(PLAN.trials[0], "How sticky?"))
-    assert derive_view(number).course.buttons["no answer"].key == ""
+    for asked in (steps.AskNumber(PLAN.trials[0], "How sticky?"), steps.AskChoice(*PLAN.trials[:2], "Which?")):
+        assert derive_view(after(*MOUNT, asked)).course.buttons["no answer"].key == ""
+    assert owner("0", "choice", typing=False) == "answer"  # beside 1 and 2 on a keypad
