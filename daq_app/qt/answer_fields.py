@@ -35,7 +35,7 @@ KEYS = {
     Qt.Key.Key_PageDown: -LEAP, Qt.Key.Key_PageUp: LEAP, Qt.Key.Key_Home: -100.0, Qt.Key.Key_End: 100.0,
 }  # fmt: skip
 NUMBER = QRegularExpression(
-    rf"\d{{0,9}}[{POINTS}]?\d{{0,9}}", QRegularExpression.PatternOption.UseUnicodePropertiesOption
+    rf"\d{{0,9}}([{POINTS}]\d{{0,9}})?", QRegularExpression.PatternOption.UseUnicodePropertiesOption
 )  # what can be typed of one
 LARGE = 36  # type of the number [device-independent pixels]
 WORDS = 24  # type of the buttons

@@ -147,6 +147,9 @@ def test_a_number_is_typed_of_digits_alone():
     field.point = ","
     QTest.keyClicks(field.field, "0")
     assert field.answer.value == 1.0
+    field.field.clear()
+    QTest.keyClicks(field.field, "1234567891111")  # no more than nine digits of a whole number, which the field shows
+    assert field.answer.value == 123456789.0
 
 
 def test_a_choice_by_touch_is_kept_as_one_by_touch(application):
