@@ -68,7 +68,7 @@ def findings(
         apparatus=facts.apparatus(recording, analysis),
         excluded=(
             *map(full_stop, more.unreadable),
-            *facts.exclusion_sentences(recording, analysis, alone.strokes, tables),
+            *facts.exclusion_sentences(recording, analysis, alone.strokes),
         ),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
@@ -160,9 +160,21 @@ def experiments(
                 response=response,
                 paths=path_findings(along, "small", law, within=False),
                 psychometric=subject_function([(visit, row) for row in trials]) if block.standard else None,
+                other_answers=() if block.standard else _other_answers(trials),
             )
         )
     return tuple(judged)
+
+
+def _other_answers(trials: Sequence[TrialRow]) -> tuple[tuple[int, str, str], ...]:
+    """Return trial, index judged and answer of each number, and of each choice with both indices."""
+    numbers = [(row.trial, str(row.index), f"{row.estimate:g}") for row in trials if row.estimate is not None]
+    chosen = [
+        (row.trial, f"{row.before}, then {row.index}", str(row.before if row.choice == "first" else row.index))
+        for row in trials
+        if row.choice is not None
+    ]
+    return (*numbers, *chosen)
 
 
 def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:

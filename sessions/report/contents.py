@@ -62,6 +62,8 @@ class Experiment:
     psychometric: Psychometric | None = None  # of comparisons with a standard, where the block has one
     own_scores: Mapping[int, float] = field(default_factory=dict[int, float])  # of that subject, by index
     response: str = "sed"  # the quantity at the ending whose relations these are, one of `solver.quantities`
+    # Numbers and choices: trial, what was judged, answer; none where `psychometric` is made of them
+    other_answers: tuple[tuple[int, str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -199,12 +199,9 @@ def _tilt(analysis: Analysis) -> tuple[str, str]:
     return f"{along}, {across}", f"{tilt.kind}; {done}"
 
 
-def exclusion_sentences(
-    recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]
-) -> tuple[str, ...]:
+def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding]) -> tuple[str, ...]:
     """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
     sentences = [full_stop(f"By {one.sentence}") for one in analysis.decisions if one.leaves_out]
-    sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
         number = record.trial.number
         for take in record.other_takes:
@@ -223,10 +220,12 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
     sentences += [full_stop(f"By {one.sentence}") for one in analysis.decisions if not one.leaves_out]
+    sentences += [table.other_answers for table in tables if table.other_answers]
     for record in recording.trials:
         number = record.trial.number
         if record.outcome == "not answered":
-            sentences.append(f"Trial {number} has no score: the subject did not answer.")
+            what = "score" if record.trial.answer == "line" else "answer"
+            sentences.append(f"Trial {number} has no {what}: the subject did not answer.")
         elif record.outcome == "open":
             sentences.append(f"Trial {number} was not done: the session ended before.")
     sentences += [

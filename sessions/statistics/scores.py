@@ -81,7 +81,7 @@ class ScoreTable:
     subject: str
     simulated: bool
     scores: tuple[Score, ...]  # answered trials only
-    left_out: str = ""  # a sentence about answers that are no scores on the line, and cannot be compared with them
+    other_answers: str = ""  # a sentence on those that are no scores on the line, and cannot be compared with them
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,10 @@ def _other_answers(recording: "Recording") -> str:
     choices = sum(record.choice is not None for record in recording.trials)
     if not numbers and not choices:
         return ""
-    what = f"{numbers} numbers on a scale of the subject's own" if numbers else f"{choices} choices of one of two"
+    several = "" if numbers + choices == 1 else "s"
+    what = f"{numbers} number{several} on a scale of the subject's own"
+    if not numbers:
+        what = f"{choices} choice{several} of one of two"
     return (
         f"The answers of {recording.plan.subject} in {recording.folder.name} are {what}: they are kept, and no mean or "
         "correlation of scores between 0 and 100 is taken of them."

@@ -8,6 +8,8 @@ from recordings import new_writer
 
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import Recording
+from sessions.report import findings
+from sessions.report.tables.session import tables
 from sessions.statistics.correlations import relation
 from sessions.statistics.scores import (
     Score,
@@ -20,6 +22,7 @@ from sessions.statistics.scores import (
     score_table,
     subject_scores,
 )
+from sessions.strokes.analysis import analyse
 
 
 def table(subject, values, *, session=None, descriptor="stickiness", indices=(0, 20, 50, 80, 100)):
@@ -163,13 +166,15 @@ def test_the_order_of_the_sessions_does_not_matter(answers):
 
 
 @pytest.mark.parametrize(
-    ("answers", "sentence"),
+    ("answers", "sentence", "row"),
     [
-        (["number", "number"], "1 numbers on a scale of the subject's own"),
-        (["none", "choice"], "1 choices of one of two"),
+        (["number", "number"], "1 number on a scale of the subject's own", (2, "2", "7.5")),
+        (["none", "choice"], "1 choice of one of two", (2, "1, then 2", "1")),
     ],
 )
-def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_with_them(tmp_path, answers, sentence):
+def test_answers_that_are_no_scores_on_the_line_are_shown_and_never_averaged_with_them(
+    tmp_path, answers, sentence, row
+):
     trials = tuple(
         Trial(n, "b", Stimulus("d", n, f"K{n}"), 1, 1, answer=answer, compared_with=1 if answer == "choice" else None)
         for n, answer in enumerate(answers, 1)
@@ -188,8 +193,12 @@ def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_wit
     assert [record.outcome for record in recording.trials] in (["not answered", "numbered"], ["presented", "chosen"])
     table = score_table(recording)
     assert table.scores == ()
-    assert sentence in table.left_out
+    assert sentence in table.other_answers
     assert mean_scores([table]) == ()
+    report = findings(recording, analyse(recording))
+    assert [experiment.other_answers for experiment in report.experiments] == [(row,)]
+    assert [shown.name for shown in tables(report)["scores"]] == ["table-other-answers"]
+    assert report.excluded == ()
 
 
 @pytest.mark.parametrize(

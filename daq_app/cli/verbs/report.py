@@ -99,6 +99,6 @@ def _check_scores(visit: Recording, recording: Recording) -> None:
     """Raise WrongValue where a visit named by --scores adds nothing to a report, not even a sentence."""
     judged = {(trial.stimulus.descriptor, trial.stimulus.index) for trial in recording.plan.trials}
     table = score_table(visit)
-    if not table.left_out and judged.isdisjoint((score.descriptor, score.index) for score in table.scores):
+    if not table.other_answers and judged.isdisjoint((score.descriptor, score.index) for score in table.scores):
         which = "a stimulus of this session" if table.scores else "any stimulus"
         raise WrongValue(f"--scores {visit.folder} is not allowed: it holds no score of {which}; leave it out")

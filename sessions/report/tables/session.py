@@ -186,6 +186,12 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
     return tuple(tables)
 
 
+def other_answer_table(report: Report) -> Table | None:
+    """Return the numbers and the choices of the session's own subject."""
+    groups = [(e.name, list(e.other_answers)) for e in report.experiments]
+    return table("table-other-answers", caption("session-other-answers"), "trial | index | answer", groups)
+
+
 def relation_table(report: Report) -> Table | None:
     """Return how the predicted quantity goes with mean scores and with the indices."""
     shown = shown_response(report.response)
@@ -294,7 +300,12 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             of_predictions.variant_forces_table(report),
         ),
         "rivals": rival_tables(compared, BY_NAME[report.response].label, report.model),
-        "scores": (score_table(report), *answer_tables(report), psychometric_table(session_functions(report))),
+        "scores": (
+            score_table(report),
+            *answer_tables(report),
+            other_answer_table(report),
+            psychometric_table(session_functions(report)),
+        ),
         "afferent": (of_predictions.afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),

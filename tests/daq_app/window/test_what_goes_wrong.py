@@ -182,6 +182,6 @@ def test_a_flaw_is_the_reason_to_redo_only_the_trial_it_was_found_in():
 
 def test_no_key_stands_for_no_answer_while_an_answer_is_typed_in_digits():
     assert derive_view(after(*SCORE)).course.buttons["no answer"].key == "0"
-    for asked in (steps.AskNumber(PLAN.trials[0], "How sticky?"), steps.AskChoice(*PLAN.trials[:2], "Which?")):
-        assert derive_view(after(*MOUNT, asked)).course.buttons["no answer"].key == ""
+    for question in (steps.AskNumber(PLAN.trials[0], "How sticky?"), steps.AskChoice(*PLAN.trials[:2], "Which?")):
+        assert derive_view(after(*MOUNT, question)).course.buttons["no answer"].key == ""
     assert owner("0", "choice", typing=False) == "answer"  # beside 1 and 2 on a keypad
