@@ -267,8 +267,10 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
 
     >>> _ends([0.93, 0.95])
     (0.9, 1.0)
+    >>> _ends([1.0])
+    (0.9, 1.0)
     """
-    low, high = np.floor(10.0 * min(values)) / 10.0, np.ceil(10.0 * max(values)) / 10.0
+    low, high = min(0.9, np.floor(10.0 * min(values)) / 10.0), np.ceil(10.0 * max(values)) / 10.0
     return max(-1.0, float(low)), min(1.0, float(high if high > low else low + 0.1))
 
 
