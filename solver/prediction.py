@@ -99,7 +99,8 @@ class Prediction:
     contact_width: float  # from the first to the last touching point, along the surface [mm]
     indentation: float  # of the bone, asked for or found under a given force [mm]
     shift: float | None  # of the bone along +x, found under a given drag [mm]; None where it slides or is only pressed
-    error_estimate: float  # half width of the interval about sed_ending_corrected, and about sed_ending, relative [-]
+    error_estimate: float  # half width of the interval about sed_ending, relative [-]
+    corrected_error: float  # half width of the interval about sed_ending_corrected, relative [-]
     dofs: int  # unknown displacements
     newton_iterations: int  # solutions of a linear system with trial contact states
     wall_s: float  # the solve alone: this scene's, and its part of what scenes solved together share [s]
@@ -125,8 +126,8 @@ class Prediction:
 
     @property
     def sed_ending_corrected(self) -> float:
-        """SED averaged over the ending on the nested mesh [MPa], the best value; nan without a state there."""
-        return float("nan") if self.nested is None else float(self.nested.numbers[0])
+        """SED averaged over the ending on the nested mesh [MPa], the best value; `sed_ending` without a state there."""
+        return self.sed_ending if self.nested is None else float(self.nested.numbers[0])
 
     @property
     def mesh(self) -> Mesh:

@@ -13,12 +13,12 @@ from matplotlib.ticker import NullFormatter
 
 from sessions.report.figures import style
 from solver.verification.costs import Cost
-from solver.verification.estimates import Estimate, GuaranteedCost
+from solver.verification.estimates import GOALS, Estimate, GuaranteedCost
 from solver.verification.growth import FEWEST, Growth, exponent
 from solver.verification.measuring import RunResults
 from solver.verification.orders import Order
 from solver.verification.speed import Speed
-from solver.verification.truth import JUDGED, NUMBERS, Truth
+from solver.verification.truth import JUDGED, Truth
 
 COLOURS = {"small": style.GREEN, "finite": style.VERMILLION}
 MARKS = {"small": "o", "finite": "s"}
@@ -246,7 +246,7 @@ def plates(measured: RunResults) -> dict[str, style.Plate]:
     costs, growth = measured.of(Cost), measured.of(Growth)
     truths = [truth for truth in measured.of(Truth) if truth.case in JUDGED and truth.doubt]
     doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
-    estimates = [[row for row in measured.of(Estimate) if row.number == number] for number in NUMBERS]
+    estimates = [[row for row in measured.of(Estimate) if row.number == number] for number in GOALS]
     with style.look():
         panels: dict[str, list[style.Panel | None]] = {
             "speed": [

@@ -15,7 +15,7 @@ from sessions.report.figures.style import Plate
 from sessions.report.pages import embed, swap_in, template
 from solver.prediction import percent
 from solver.verification.costs import Cost
-from solver.verification.estimates import Estimate
+from solver.verification.estimates import GOALS, Estimate
 from solver.verification.hard_cases import HardCase
 from solver.verification.histories import March
 from solver.verification.machine import Machine
@@ -99,7 +99,7 @@ def _estimates(measured: RunResults) -> Table:
     """Return how often estimates are above and near, by kinematics and number."""
     rows = measured.of(Estimate)
     cells: list[tuple[str, ...]] = []
-    for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), NUMBERS):
+    for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
         mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
         if mine:
             met = _share([row.met for row in mine]) if name == NUMBERS[0] else "–"

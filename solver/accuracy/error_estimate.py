@@ -3,7 +3,8 @@
 The scene is solved on the mesh H of the answer and on its nested mesh h, which divides every element into four. Errors
 of quadratic elements beneath a contact fall at least with the square of the element size. The error on H is therefore
 at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994). At a corner where stiff tissue holds soft
-tissue they may fall with the first power only, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change.
+tissue they may fall with the first power only, and the error is at most 1 + 1/2 + 1/4 + ... = 2 of the change. The
+value on h errs by the series without its first term: the error is smaller by the change.
 
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
 anywhere between two nodes. Each edge is moved by one node of h to either side at otherwise fixed contact states, and
@@ -118,6 +119,7 @@ class Errors(NamedTuple):
     """Error estimates: relative, except for the shift. None for numbers that are given or do not exist."""
 
     sed: float
+    corrected: float  # of the SED on the nested mesh
     normal: float | None
     tangential: float | None  # 0 where nothing rubs
     indentation: float | None
@@ -223,14 +225,18 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     of a state that depends on its load path.
     """
     if nested is None:
-        return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
-    off = half_width(nested.numbers - numbers, nested.of_edges, order_of(scene), _PARTS_OF_EDGES)
+        return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
+    change = nested.numbers - numbers
+    off = half_width(change, nested.of_edges, order_of(scene), _PARTS_OF_EDGES)
     if steps is not None:
         off += steps.error
     relative = off / np.maximum(np.abs(numbers), np.finfo(float).tiny)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
-    estimates = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])
-    return _without_prescribed(scene, estimates)
+    corrected = float(off[0] - abs(change[0])) / max(abs(float(nested.numbers[0])), np.finfo(float).tiny)
+    own = off[FORCES_AND_PLACES:]
+    return _without_prescribed(
+        scene, Errors(sed, corrected, normal, tangential, depth, float(off[SHIFT]), width, point, own)
+    )
 
 
 def responses(numbers: Array, errors: Errors) -> dict[str, Response]:

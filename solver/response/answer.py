@@ -73,6 +73,7 @@ def prediction(
         indentation=depth,
         shift=shift if held else None,
         error_estimate=off.sed,
+        corrected_error=off.corrected,
         normal_force_error=off.normal,
         tangential_force_error=off.tangential,
         indentation_error=off.indentation,

@@ -87,8 +87,10 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros)
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
     assert estimate.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
+    assert estimate.corrected == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)
     with_edges = errors(sliding, truth * (1.0 + error), replace(nested, of_edges=edges), None)
     assert with_edges.sed - estimate.sed == pytest.approx(0.01 / 3.0 / 1.04, rel=1e-12)
+    assert with_edges.corrected - estimate.corrected == pytest.approx(0.01 / 3.0 / 1.01, rel=1e-12)
     assert with_edges.width - estimate.width == pytest.approx(0.005 / 1.04, rel=1e-12)  # it follows an edge by a line
     assert with_edges.responses - estimate.responses == pytest.approx(0.01 / 3.0, rel=1e-12)
 

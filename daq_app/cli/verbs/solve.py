@@ -92,7 +92,8 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     plain = prediction.to_dict()
     console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
     console.say(title)
-    corrected = ["corrected", number(prediction.sed_ending_corrected, 5, factor=1e3), "kPa", ""]
+    best, off_by = number(prediction.sed_ending_corrected, 5, factor=1e3), _percent(plain["corrected_error"])
+    corrected = ["corrected", best, "kPa", off_by]
     off = "–" if plain["shift_error"] is None else f"{number(plain['shift_error'], 2)} mm"
     shift = ["sideways shift", number(prediction.shift, 4), "mm", off]
     rows = [

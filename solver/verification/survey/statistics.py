@@ -5,14 +5,13 @@ from statistics import median
 
 from scipy.stats import spearmanr
 
-from solver.verification.estimates import Estimate
-from solver.verification.truth import NUMBERS
+from solver.verification.estimates import GOALS, Estimate
 
 TOLERANCES = (0.01, 0.003)  # of answers; the second is the usual one
 EXACT = 1e-12  # error below which a number follows from the input alone, and is not judged [-]
 HEADER = (
-    "set", "strain", "answers", "SED above", "force above", "drag above", "near", "missed unsaid", "ratio", "rank",
-    "sign", "corrected",
+    "set", "strain", "answers", "SED above", "corrected above", "force above", "drag above", "near", "missed unsaid",
+    "ratio", "corrected ratio", "rank", "sign", "corrected",
 )  # fmt: skip
 
 
@@ -23,11 +22,10 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     lies on the truth's side) and corrected (its error by the answer's, median) are those of the SED.
     """
     decided = [row for row in rows if row.above is not None and row.error > EXACT]
-    by_number = [[row for row in decided if row.number == number] for number in NUMBERS]
+    by_number = [[row for row in decided if row.number == number] for number in GOALS]
     sed = by_number[0]
     within = [row for row in sed if row.met is not None and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
-    ratios = [row.estimate / row.error for row in sed]
     halves = [row.corrected / row.error for row in true if row.corrected is not None]
     return (
         name,
@@ -36,11 +34,16 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         *(_share([bool(row.above) for row in column]) for column in by_number),
         _share([row.near for row in sed if row.near is not None]),
         f"{sum(not row.met and not row.warned for row in within)} of {len(within)}",
-        f"{median(ratios):.1f}" if ratios else "–",
+        _ratio(sed),
+        _ratio(by_number[1]),
         f"{spearmanr([(row.estimate, row.error) for row in sed]).statistic:.2f}" if len(sed) > 2 else "–",
         _share([bool(row.towards) for row in true]),
         f"{median(halves):.2f}" if halves else "–",
     )
+
+
+def _ratio(rows: Sequence[Estimate]) -> str:
+    return f"{median(row.estimate / row.error for row in rows):.1f}" if rows else "–"
 
 
 def _share(verdicts: Sequence[bool]) -> str:
