@@ -301,8 +301,9 @@ class MeshElements:
     def state(self, places: "Places", displacement: Array) -> LocalState:
         """Return strains and moduli at places, arrays (p, ...), for displacements (nodes, 2, ...)."""
         held, wide = places.held, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
-        gradient = places.probes.displacement_gradient(self.mesh, displacement)
         local = self.mesh.about_centre(displacement, held).reshape(len(held), 9, -1)
+        slopes = places.probes.gradient @ local.take(places.number, axis=0)
+        gradient = np.swapaxes(slopes.reshape(-1, 2, *displacement.shape[1:]), 1, 2)
         by = np.moveaxis((places.gradients @ local).reshape(2, len(held), 9, *displacement.shape[1:]), 3, 1)
         fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), held)[places.number]
         shear, lame, stiffening, x, y = places.constants[wide]
