@@ -48,7 +48,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 def find(path: Path) -> Path | None:
     """Return the file that `read` reads where `path` is it or the folder that holds it; None elsewhere."""
-    if path.suffix in {".h5", ".hdf5"}:
+    if path.suffix in {".h5", ".hdf5"} and not path.is_dir():
         return path
     return path / SEALED_FILE if (path / SEALED_FILE).is_file() else None
 

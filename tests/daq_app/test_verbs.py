@@ -165,6 +165,9 @@ def test_a_session_goes_out_and_comes_back_by_the_command_line(session, tmp_path
     assert run(["import", str(out), "--out", str(tmp_path / "again"), "--json"]) == 0
     assert answer(capsys)["differences"] == []
     assert run(["verify", str(tmp_path / "again")]) == 0
+    folder = tmp_path / "P07.h5"  # named as the file in it might be
+    assert run(["export", str(session), "--format", "hdf5", "--out", str(folder)]) == 0
+    assert run(["import", str(folder), "--out", str(tmp_path / "P07 again")]) == 0
     assert run(["import", str(out), "--units", "N,Nmm", "--out", str(tmp_path / "third")]) == 2
     assert run(["export", str(session), "--format", "csv", "--out", str(out)]) == 1
     assert run(["export", str(session), "--format", "xls"]) == 2
