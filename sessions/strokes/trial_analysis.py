@@ -221,13 +221,16 @@ def _measure(
 
 
 def _with_decided_ends(piece: Contact, decisions: StrokeDecisions, span: Span) -> tuple[Contact, Flaw | None]:
-    """Return a contact with the onset and lift that were decided; as it is, with a flaw, where nothing is between."""
+    """Return a contact with the onset and lift that were decided; as it is, with a flaw, where none can be."""
     onset, lift = decisions.instant("onset"), decisions.instant("lift")
     start = piece.start if onset is None else int(np.searchsorted(span.time, onset))
     stop = piece.stop if lift is None else int(np.searchsorted(span.time, lift))
-    if stop - start < 2:
-        sentence = "No readings lie between the onset and the lift that were decided: they stay as they were found."
-        return piece, Flaw(FlawName.DECISION, sentence, "doubtful")
+    problem = "No readings lie between the onset and the lift that were decided" if stop - start < 2 else ""
+    for name, instant in (("onset", onset), ("lift", lift)):
+        if instant is not None and not span.time[0] <= instant <= span.time[-1]:
+            problem = f"The {name} that was decided lies outside of the readings around the stroke"
+    if problem:
+        return piece, Flaw(FlawName.DECISION, f"{problem}: onset and lift stay as they were found.", "doubtful")
     ends = piece.onset if onset is None else onset, piece.lift if lift is None else lift
     return replace(piece, start=start, stop=stop, onset=ends[0], lift=ends[1]), None
 

@@ -259,6 +259,14 @@ def test_a_slide_onset_decided_outside_of_the_contact_is_named_and_changes_nothi
     ]
 
 
+@pytest.mark.parametrize(("end", "instant"), [("onset", -1.0), ("lift", 90.0)])
+def test_an_onset_or_lift_decided_where_nothing_was_read_is_named_and_changes_nothing(end, instant):
+    analysis = analyse_with(Decision("E02", "seen", end, 1, 1, None, instant))
+    assert getattr(analysis.strokes[0], end) == getattr(analyse_with().strokes[0], end)
+    (sentence,) = (flaw.sentence for flaw in analysis.flaws if flaw.name == "decision")
+    assert sentence.startswith(f"The {end} that was decided lies outside of the readings around the stroke")
+
+
 def test_onset_lift_and_direction_are_those_decided():
     ends = [Decision("E02", "w", "onset", 1, 1, None, 0.9), Decision("E02", "w", "lift", 1, 1, None, 2.7)]
     (stroke,) = analyse_with(*ends, Decision("E02", "w", "direction", 1, 1, 1, -1)).strokes
