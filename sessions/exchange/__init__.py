@@ -50,6 +50,6 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress = l
             importlib.import_module(FORMATS[name]).write(source, part, progress)
     except OSError as error:
         raise ExportError(
-            f"{folder} cannot be written ({error.strerror or error}); {remedy(error, new=True)}, or give another"
+            f"{folder} cannot be written ({error.strerror or error}); {remedy(error, new=True)}, or give another folder"
         ) from error
     return folder
