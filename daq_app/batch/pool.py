@@ -237,7 +237,9 @@ class Shelf:
             write_whole(self.file(key), text.encode() + b"\n")
         except OSError as error:
             why = f"{self._folder} cannot be written ({error.strerror}): {remedy(error, new=True)}"
-            raise RecordingError(f"{why}, or give another by --out, and run this again: what is done is kept") from error
+            raise RecordingError(
+                f"{why}, or give another by --out, and run this again: what is done is kept"
+            ) from error
 
 
 def _digest(result: Mapping[str, Any]) -> str:
