@@ -375,6 +375,8 @@ def _cut_short(state: AppState, session: SessionState) -> str:
     why = end.reason
     if end.cause == "device":
         why = tr("the transducer fell silent; it answers again") if bench.link == "open" else bench.problem or why
+    if end.cause == "disk":  # its reason says what is safe
+        return tr("The session was cut short: {why}.", why=why)
     return tr("The session was cut short: {why}. Everything until then is kept.", why=why)
 
 
