@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from daq_app.console import Console, WrongValue
+from sessions.file_access import as_type
 from sessions.plan.plan import SessionPlan
 from sessions.plan.study import StudyError, is_study
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, part_of, predict
@@ -31,7 +32,7 @@ from sessions.recording.head import software_versions
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.analysis import bootstrap_settings, check_analysis
 from sessions.strokes.bootstrap import intervals_document, stroke_intervals
-from sessions.strokes.decisions import Decisions
+from sessions.strokes.decisions import Decision, Decisions
 from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.stroke import AreaLaw
 from sessions.toml_file import SettingsError, from_table
@@ -244,6 +245,14 @@ def is_current(stored: Mapping[str, Any], decisions: Decisions) -> bool:
     """Say whether a stored document was made with the decisions that are in force now."""
     now = json.loads(json.dumps([decision.to_dict() for decision in decisions.in_force]))
     return stored.get("decisions", []) == now
+
+
+def decisions_of(stored: Mapping[str, Any]) -> Decisions:
+    """Return the decisions that a stored document was made with. Raises SettingsError where they are damaged."""
+    try:
+        return Decisions(as_type(stored.get("decisions", []), tuple[Decision, ...]))
+    except ValueError as error:
+        raise SettingsError(f"the decisions stored with it are damaged: {error}") from error
 
 
 class OpenVisit(NamedTuple):

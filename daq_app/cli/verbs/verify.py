@@ -6,7 +6,7 @@ Exit code 0: whole; 3: readable, with what is lost or differs named; 1: unreadab
 import argparse
 from pathlib import Path
 
-from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, is_current, repeat, stored_document
+from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, decisions_of, is_current, repeat, stored_document
 from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording, RecordingError
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
                 continue
             if not is_current(stored, decided):
                 flaws.append(f"{name} was made under other decisions than those in force: make it anew")
-            fresh = repeat(name, stored, recording, decided)
+            fresh = repeat(name, stored, recording, decisions_of(stored))
         except (RecordingError, SettingsError) as damaged:
             flaws.append(" ".join(str(damaged).split()))
             continue
