@@ -5,15 +5,18 @@ from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 
+import numpy as np
+
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation.existence import doubts, folded, refuse_far_beyond, sound
+from solver.continuation import folds_at
+from solver.continuation.existence import PROOF, doubts, folded, refuse_far_beyond, sound
 from solver.continuation.finite_states import nearby, roughly, settled_state
 from solver.continuation.small_states import within_reach
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
-from solver.equilibrium.finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.relaxation import CondensedRelaxing
@@ -216,6 +219,29 @@ def solve_nested(
     return nested_state(finger, state, values, changes, steps), steps
 
 
+CUT_FOLDS = "Error estimates may not hold: beside the free cut, tissue"  # and so on
+
+
+def _doubts_at_cut(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
+    """Return a warning where tissue beside the free cut is squeezed more than its free face can bear, else nothing.
+
+    A face folds there (Biot 1963, Appl. Sci. Res. A 12, 168), and finer meshes come to other folds.
+    """
+    scene, mesh, columns = finger.scene, finger.body.mesh, len(finger.geometry.lines.arcs) - 1
+    if scene.finger.cut != "free":
+        return ()
+    first_to_last = np.arange(len(mesh.elements)).reshape(columns, -1)
+    beside = first_to_last[[0, -1]].ravel()
+    F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[beside]
+    least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
+    place = int(least.argmin())
+    folds = folds_at(finite_laws(scene.materials)[mesh.region[beside[place]]]) if least[place] < PROOF.plain else 0.0
+    if least[place] >= folds:
+        return ()
+    squeezed = f"is squeezed to {100 * least[place]:.0f} % of its length, and a free face folds at {100 * folds:.0f} %"
+    return (f'{CUT_FOLDS} {squeezed}: ask for finger.cut = "driven", a longer shaft, or less depth or friction.',)
+
+
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
 
 
@@ -281,7 +307,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     nested_numbers = None if on_nested is None else with_shares(scene, numbers, on_nested, steps)
     row = finger.row.average(state.u)
     estimate_s = perf_counter() - solved_at
-    warnings, wall = doubts(finger, state), solved_at - start - setup
+    warnings, wall = doubts(finger, state) + _doubts_at_cut(finger, state), solved_at - start - setup
     solved = replace(solved, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
     return prediction(solved, finger, numbers, row, nested_numbers, estimate_s)
 

@@ -12,6 +12,7 @@ import numpy as np
 from solver.accuracy.error_estimate import stiffness_warning
 from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
+from solver.response.finite_answers import CUT_FOLDS
 from solver.response.solution import solve, solve_many
 from solver.scene.tables import Solve
 from solver.verification.fine_meshes import fine_numbers
@@ -150,7 +151,8 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
         rows.append(
             Estimate(
                 answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
-                unsure, *better, bool(stiffness_warning(answer.scene)),
+                unsure, *better,
+                bool(stiffness_warning(answer.scene)) or any(one.startswith(CUT_FOLDS) for one in answer.warnings),
             )
         )  # fmt: skip
     return rows

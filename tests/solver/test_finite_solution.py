@@ -12,10 +12,12 @@ from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.response import finite_answers
-from solver.response.finite_answers import Meshes, coarse_solution, refine
+from solver.response.finite_answers import CUT_FOLDS, Meshes, coarse_solution, refine
 from solver.response.solution import ERROR_UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
+from solver.verification.fine_meshes import numbers_on_mesh
 from solver.verification.methods import FiniteMethod
+from solver.verification.random_scenes import random_scene
 from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes
@@ -187,3 +189,16 @@ def test_setting_up_a_mesh_counts_once_where_the_first_mesh_is_that_of_the_answe
     prediction = solve(scene)
     assert prediction.wall_s > 0.0
     assert prediction.setup_s + prediction.wall_s + prediction.estimate_s < perf_counter() - begin
+
+
+def test_where_two_fine_meshes_disagree_because_a_free_cut_folds_the_answer_warns_and_a_driven_cut_has_no_such_fold():
+    free = random_scene("fingers", 14021, "finite")
+    driven = replace(free, finger=replace(free.finger, cut="driven"))
+    apart, warnings = [], []
+    for scene in (free, driven):
+        one, other = (numbers_on_mesh([scene], 15.0, shift)[0, 0] for shift in (False, True))
+        prediction = solve(replace(scene, solve=Solve("finite", tolerance=0.01, evidence="quick")))
+        apart.append(abs(one / other - 1.0) / prediction.error_estimate)
+        warnings.append([one for one in prediction.warnings if one.startswith(CUT_FOLDS)])
+    assert apart[0] > 2.0 > 1.0 > apart[1]
+    assert (len(warnings[0]), warnings[1]) == (1, [])
