@@ -195,9 +195,9 @@ def test_where_two_fine_meshes_disagree_because_a_free_cut_folds_the_answer_warn
     free = random_scene("fingers", 14021, "finite")
     driven = replace(free, finger=replace(free.finger, cut="driven"))
     apart, warnings = [], []
-    for scene in (free, driven):
-        one, other = (numbers_on_mesh([scene], 15.0, shift)[0, 0] for shift in (False, True))
-        prediction = solve(replace(scene, solve=Solve("finite", tolerance=0.01, evidence="quick")))
+    for one_cut in (free, driven):
+        one, other = (numbers_on_mesh([one_cut], 15.0, shift)[0, 0] for shift in (False, True))
+        prediction = solve(replace(one_cut, solve=Solve("finite", tolerance=0.01, evidence="quick")))
         apart.append(abs(one / other - 1.0) / prediction.error_estimate)
         warnings.append([one for one in prediction.warnings if one.startswith(CUT_FOLDS)])
     assert apart[0] > 2.0 > 1.0 > apart[1]
