@@ -231,11 +231,11 @@ def _doubts_at_cut(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, 
     if scene.finger.cut != "free":
         return ()
     first_to_last = np.arange(len(mesh.elements)).reshape(columns, -1)
-    beside = first_to_last[[0, -1]].ravel()
-    F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[beside]
+    ends = first_to_last[[0, -1]].ravel()
+    F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[ends]
     least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
     place = int(least.argmin())
-    folds = folds_at(finite_laws(scene.materials)[mesh.region[beside[place]]]) if least[place] < PROOF.plain else 0.0
+    folds = folds_at(finite_laws(scene.materials)[mesh.region[ends[place]]]) if least[place] < PROOF.plain else 0.0
     if least[place] >= folds:
         return ()
     squeezed = f"is squeezed to {100 * least[place]:.0f} % of its length, and a free face folds at {100 * folds:.0f} %"

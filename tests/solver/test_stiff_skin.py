@@ -82,7 +82,7 @@ def test_a_number_of_which_little_is_known_near_its_limit_gives_way_to_the_limit
 
 def test_the_estimate_of_stiffening_skin_covers_what_meshes_of_14_to_28_tend_to():
     # From mu = 0.45 on the corner where the cut meets the bone errs by more than halving its elements shows: 1.7 % for
-    # 1.2 % estimated (docs/explanation/solver-errors.md).
+    # 1.2 % estimated (docs/explanation/solver-trials.md).
     # A mesh that is refined at the corner tends to 3.1726e-3, so that the truth is in doubt by 0.05 %.
     prediction = solve(stiffening_scene(0.35))
     assert abs(prediction.sed_ending / 3.171e-3 - 1.0) <= prediction.error_estimate + 5e-4
