@@ -219,9 +219,12 @@ class Probes:
 
     def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
         """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
-        moved = mesh.about_centre(displacement, self.element)  # (p, 9, 2, ...)
-        slopes = self.gradient @ moved.reshape(len(moved), 9, -1)
-        return np.swapaxes(slopes.reshape(len(moved), 2, *moved.shape[2:]), 1, 2)
+        return self.gradient_of(mesh.about_centre(displacement, self.element))
+
+    def gradient_of(self, local: Array) -> Array:
+        """Return du_a/dx_b (p, 2, 2, ...) for the displacements (p, 9, 2, ...) of the nodes of each probe's element."""
+        slopes = self.gradient @ local.reshape(len(local), 9, -1)
+        return np.swapaxes(slopes.reshape(len(local), 2, *local.shape[2:]), 1, 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -301,10 +304,10 @@ class MeshElements:
     def state(self, places: "Places", displacement: Array) -> LocalState:
         """Return strains and moduli at places, arrays (p, ...), for displacements (nodes, 2, ...)."""
         held, wide = places.held, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
-        local = self.mesh.about_centre(displacement, held).reshape(len(held), 9, -1)
-        slopes = places.probes.gradient @ local.take(places.number, axis=0)
-        gradient = np.swapaxes(slopes.reshape(-1, 2, *displacement.shape[1:]), 1, 2)
-        by = np.moveaxis((places.gradients @ local).reshape(2, len(held), 9, *displacement.shape[1:]), 3, 1)
+        local = self.mesh.about_centre(displacement, held)
+        gradient = places.probes.gradient_of(local.take(places.number, axis=0))
+        by = places.gradients @ local.reshape(len(held), 9, -1)
+        by = np.moveaxis(by.reshape(2, len(held), 9, *displacement.shape[1:]), 3, 1)
         fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), held)[places.number]
         shear, lame, stiffening, x, y = places.constants[wide]
         return LocalState(

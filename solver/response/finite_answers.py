@@ -219,7 +219,7 @@ def solve_nested(
     return nested_state(finger, state, values, changes, steps), steps
 
 
-CUT_FOLDS = "Error estimates may not hold: beside the free cut, tissue"  # and so on
+CUT_FOLDS = "Error estimates may not hold: beside the free cut, tissue"  # the warning begins like this
 
 
 def _doubts_at_cut(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:

@@ -133,26 +133,23 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
 
 def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
     """Return the estimates of an answer's numbers with their errors against `truth` (3,) of relative `doubt` (3,)."""
-    sed, normal, drag = truth.tolist()
-    of_sed, of_normal, of_drag = doubt.tolist()
-    best = answer.sed_ending_corrected
-    numbers = (
-        (answer.sed_ending, answer.error_estimate, sed, of_sed),
-        (best, None if answer.nested is None else answer.corrected_error, sed, of_sed),
-        (answer.normal_force, answer.normal_force_error, normal, of_normal),
-        (answer.tangential_force, answer.tangential_force_error, drag, of_drag),
+    best, warned = answer.sed_ending_corrected, any(one.startswith(CUT_FOLDS) for one in answer.warnings)
+    numbers = (  # place in the truth, value and estimate of each of `GOALS`
+        (0, answer.sed_ending, answer.error_estimate),
+        (0, best, None if answer.nested is None else answer.corrected_error),
+        (1, answer.normal_force, answer.normal_force_error),
+        (2, answer.tangential_force, answer.tangential_force_error),
     )
     rows: list[Estimate] = []
-    for name, (value, estimate, true, unsure) in zip(GOALS, numbers, strict=True):
+    for name, (place, value, estimate) in zip(GOALS, numbers, strict=True):
+        true = float(truth[place])
         if estimate is None or not true > 0.0:
             continue
-        error, off = abs(value) / true - 1.0, best / sed - 1.0
+        error, off = abs(value) / true - 1.0, best / true - 1.0
         better = (abs(off), error * (error - off) > 0.0) if name == NUMBERS[0] and answer.nested else (None, False)
-        rows.append(
-            Estimate(
-                answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
-                unsure, *better,
-                bool(stiffness_warning(answer.scene)) or any(one.startswith(CUT_FOLDS) for one in answer.warnings),
-            )
+        row = Estimate(
+            answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
+            float(doubt[place]), *better, warned or bool(stiffness_warning(answer.scene)),
         )  # fmt: skip
+        rows.append(row)
     return rows
