@@ -15,6 +15,7 @@ VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this proce
 SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.xlf
 
 POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
+_PLAIN = re.compile(rf"(\d*)([{POINTS}]?)(\d*)")
 _MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 
 T = TypeVar("T")
@@ -99,13 +100,22 @@ def typed_number(text: str, point: str = ".") -> float | None:
     >>> typed_number("12,5"), typed_number("1,000"), typed_number("1,000", ","), typed_number("0,125")
     (12.5, None, 1.0, 0.125)
     """
-    match = re.fullmatch(rf"(\d*)([{POINTS}]?)(\d*)", text.strip())
-    if match is None or not (match[1] or match[3]):
+    match = _PLAIN.fullmatch(text.strip())
+    if match is None or not (match[1] or match[3]) or two_meanings(text, point):
         return None
-    whole, mark, fraction = match.groups()
-    if mark not in ("", point) and len(fraction) == 3 and len(whole) < 4 and float(whole or 0) > 0.0:
+    return float(f"{match[1] or 0}.{match[3] or 0}")
+
+
+def two_meanings(text: str, point: str = ".") -> tuple[str, str] | None:
+    """Return a number whose mark may group thousands, as it would be typed without and with a fraction; else None.
+
+    >>> two_meanings("1,250"), two_meanings("1.250", ","), two_meanings("1.250")
+    (('1250', '1.250'), ('1250', '1,250'), None)
+    """
+    match = _PLAIN.fullmatch(text.strip())
+    if match is None or match[2] in ("", point) or len(match[3]) != 3 or len(match[1]) > 3 or not float(match[1] or 0):
         return None
-    return float(f"{whole or 0}.{fraction or 0}")
+    return f"{match[1]}{match[3]}", f"{match[1]}{point}{match[3]}"
 
 
 def span(low: float, high: float, digits: int = 3) -> str:

@@ -10,7 +10,7 @@ from typing import Literal, Never, TextIO
 from daq_app.console import DONE, FLAWED, Console, RecordingKept, WrongValue
 from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
-from daq_app.wording import typed_number
+from daq_app.wording import two_meanings, typed_number
 from drivers.transducer import LinkLost, SetupError
 from sessions.recording import RecordingError
 from sessions.run import steps
@@ -140,7 +140,9 @@ class Terminal:
             event = self._prompt.answer(number)
         if event is None:
             due = PAUSED if self._paused else HELP if self._prompt is None else self._prompt.question
-            self._print(f"'{line}' means nothing now. {due}" if line else f"Nothing is waiting for Enter now. {due}")
+            nothing = f"'{line}' means nothing now" if line else "Nothing is waiting for Enter now"
+            doubt = ": it is {} or {}".format(*meanings) if (meanings := two_meanings(line)) else ""
+            self._print(f"{nothing}{doubt}. {due}")
         return event
 
     def _read(self, lines: TextIO) -> None:

@@ -23,7 +23,7 @@ from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import LEAP, LENGTH, STEP, Answer, Choice, Device, Translate, Which
 from daq_app.window.subject import SubjectText as Text
-from daq_app.wording import POINTS, typed_number
+from daq_app.wording import POINTS, two_meanings, typed_number
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event, Scored
 
@@ -244,6 +244,11 @@ class NumberField(_Field):
         self.answer = Choice()
         self.field.clear()
         self.changed.emit()
+
+    @property
+    def two_meanings(self) -> tuple[str, str] | None:
+        """Return how a number whose mark may group thousands would be typed without and with a fraction."""
+        return two_meanings(self.field.text(), self.point)
 
     def _type(self, text: str) -> None:
         self.answer = self.answer.type_number(self.now(), typed_number(text, self.point))

@@ -95,7 +95,6 @@ class SubjectWindow(QWidget):
             if before is None or _question_of(before) != _question_of(view):
                 self._begin(view)
             say(self._question, view.title)
-            say(self._hint, view.text)
             self._answer_changed()
         else:
             say(self._title, view.title)
@@ -236,6 +235,13 @@ class SubjectWindow(QWidget):
 
     def _answer_changed(self) -> None:
         self.next.setVisible(self._way.answered)
+        hint, meanings = "" if self._view is None else self._view.text, self.number.two_meanings
+        if self.asks == "number" and meanings is not None:
+            words = translator(self._language)(Text.TWO_MEANINGS)
+            hint = words.format(whole=meanings[0], fraction=meanings[1])
+        if self._hint.text() != hint:
+            say(self._hint, hint)
+            self._fit_type()
 
     def _give(self, key: int | None = None) -> None:
         if not self.scoring or not self._way.answered:

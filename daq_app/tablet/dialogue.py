@@ -24,7 +24,7 @@ ANSWERS: Mapping[Kind, tuple[type, ...]] = {
 }  # fmt: skip
 WORDS = (  # of the page itself
     Text.NEXT, Text.FIRST, Text.SECOND, Text.THANKS, Text.OFFLINE, Text.LINE, Text.UNANSWERED, Text.ANSWERED,
-    Text.OWN_NUMBER, Text.OF_TWO, Text.PRESSING,
+    Text.OWN_NUMBER, Text.TWO_MEANINGS, Text.OF_TWO, Text.PRESSING,
 )  # fmt: skip
 
 

@@ -71,6 +71,7 @@ class SubjectText(StrEnum):
     SAMPLE = "Sample {code}."
     JUDGE = "Judge the surface"
     NUMBER = "Give a number above 0, on your own scale."
+    TWO_MEANINGS = "Do you mean {whole} or {fraction}? Please type it like that."
     WHICH = "Which one?"
     NEXT = "Next"
     FIRST = "The first"

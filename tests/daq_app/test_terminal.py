@@ -65,7 +65,7 @@ def test_a_line_means_what_was_asked_for(command, line, event):
 def test_a_number_that_may_be_a_thousand_is_asked_for_again():
     events, output = read_line(AskNumber(TRIAL, "How rough?"), "1,000")
     assert events == ()
-    assert "'1,000' means nothing now" in output
+    assert "'1,000' means nothing now: it is 1000 or 1.000. How rough?" in output
 
 
 def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():

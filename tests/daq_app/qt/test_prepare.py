@@ -11,9 +11,11 @@ from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 from qt_events import wheel
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField
+from daq_app.qt.subject_window import SubjectWindow
 from daq_app.recorder.messages import Connect, Disconnect
 from daq_app.window.new_session import UnfinishedSession
 from daq_app.window.state import DevicesFound, Searching
+from daq_app.window.subject import SubjectView
 from daq_app.window.view import Lamp
 
 pytestmark = pytest.mark.qt
@@ -150,6 +152,34 @@ def test_a_number_is_typed_of_digits_alone():
     field.field.clear()
     QTest.keyClicks(field.field, "1234567891111")  # no more than nine digits of a whole number, which the field shows
     assert field.answer.value == 123456789.0
+
+
+@pytest.mark.usefixtures("application")
+@pytest.mark.parametrize(
+    ("language", "typed", "doubt", "numbers"),
+    [
+        ("en", "1,000", "1000 or 1.000", {"1000": 1000.0, "1.000": 1.0}),
+        ("de", "1.250", "1250 oder 1,250", {"1250": 1250.0, "1,250": 1.25}),
+    ],
+)
+def test_a_subject_whose_mark_may_group_thousands_is_asked_which_of_two_numbers_it_is(language, typed, doubt, numbers):
+    window = SubjectWindow(lambda: 0.0)
+    window.show_view(SubjectView("number", "How rough?", "Give a number.", language=language), None)
+    window.show()
+    for text, number in numbers.items():
+        QTest.keyClicks(window.number.field, typed)
+        shown = " ".join(label.text() for label in window.findChildren(QLabel) if label.isVisible())
+        assert doubt in shown
+        assert not window.next.isVisible()
+        window.number.field.clear()
+        QTest.keyClicks(window.number.field, text)
+        shown = " ".join(label.text() for label in window.findChildren(QLabel) if label.isVisible())
+        assert "Give a number." in shown
+        assert doubt not in shown
+        assert window.next.isVisible()
+        assert window.number.answer.value == number
+        window.number.begin()
+    window.hide()
 
 
 def test_a_choice_by_touch_is_kept_as_one_by_touch(application):

@@ -206,7 +206,9 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
         for text, language, number in READ:
             browser.value(f"page.view.language = '{language}', document.getElementById('number').value = '{text}'")
             assert browser.value("number()") == number, (text, language)
-        browser.value("page.view.language = 'en', document.getElementById('number').value = ''")
+        browser.value("page.view.language = 'en', document.getElementById('number').value = '1,000', draw()")
+        assert "Do you mean 1000 or 1.000?" in browser.value("document.body.innerText")
+        browser.value("document.getElementById('number').value = '', draw()")
     give(browser)
     browser.until("!document.getElementById('next').hidden")
     browser.click("next")
