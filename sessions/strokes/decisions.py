@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 import msgspec
 from msgspec import Meta
 
-from sessions.file_access import as_type, json_object, name_failure
+from sessions.file_access import as_type, json_object, name_failure, one_at_a_time
 from sessions.recording.derived import bytes_of
 from sessions.recording.head import compact_json
 from sessions.recording.schema import RecordingError, text_crc
@@ -249,17 +249,18 @@ def append(recording: "Recording", decision: Decision) -> Decision:
     Raises DecisionError where it cannot be, RecordingError where it cannot be written.
     """
     path = recording.folder / DECISIONS
-    content = bytes_of(path)
-    torn = bool(content) and not content.endswith(b"\n")
-    number = max(parse(content).with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
-    recorded = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
-    # A line is compact JSON whose last name, crc32, is that of the JSON text without it.
-    text = compact_json({**recording.mark, **recorded.to_dict()})
-    ending = "\n" if torn else ""  # a torn line stays, as a line of its own
-    with name_failure(RecordingError, f"{path} cannot be written"), path.open("ab") as file:
-        file.write(f'{ending}{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode())
-        file.flush()
-        os.fsync(file.fileno())
+    with name_failure(RecordingError, f"{path} cannot be written"), one_at_a_time(recording.folder):
+        content = bytes_of(path)
+        torn = bool(content) and not content.endswith(b"\n")
+        number = max(parse(content).with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
+        recorded = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
+        # A line is compact JSON whose last name, crc32, is that of the JSON text without it.
+        text = compact_json({**recording.mark, **recorded.to_dict()})
+        ending = "\n" if torn else ""  # a torn line stays, as a line of its own
+        with path.open("ab") as file:
+            file.write(f'{ending}{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode())
+            file.flush()
+            os.fsync(file.fileno())
     return recorded
 
 

@@ -3,6 +3,7 @@
 import json
 import tempfile
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,6 +49,14 @@ def test_a_decision_is_a_line_with_who_when_why_and_what_stood_before(recording)
     assert (document["old"], document["new"], document["number"]) == ([1.1, 2.9], [1.5, 2.5], 1)
     assert document["made_utc"] == decision.made_utc > "2026"
     assert read(recording.folder).in_force == (decision,)
+
+
+def test_everybody_who_decides_at_once_gets_a_line_and_a_number_of_its_own(recording):
+    with ThreadPoolExecutor(8) as people:
+        decisions = list(people.map(lambda _: append(recording, WINDOW), range(40)))
+    kept = read(recording.folder)
+    assert kept.problems == ()
+    assert sorted(decision.number for decision in decisions) == [line.number for line in kept.lines] == [*range(1, 41)]
 
 
 def test_the_check_sum_is_that_of_the_text_before_it(recording):
