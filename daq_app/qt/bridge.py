@@ -61,16 +61,14 @@ class Bridge(QObject):
     changed = Signal(object)  # View, whenever it is another one
     frame = Signal()  # readings may have come: time to draw
 
-    def __init__(
-        self, client: Client, start: Callable[[], Client], clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        """Speak to a recorder; `start` makes another should it go, `clock` is the machine's monotonic one [s]."""
+    def __init__(self, client: Client, start: Callable[[], Client]) -> None:
+        """Speak to a recorder; `start` makes another should it go."""
         super().__init__()
-        self._client, self._start, self._clock = client, start, clock
+        self._client, self._start = client, start
         self._ticked = -1.0
         self._from_threads: SimpleQueue[Message] = SimpleQueue()
         self._judge = Judge(self._from_threads.put)
-        self.state = fold(AppState(), Tick(clock()))
+        self.state = fold(AppState(), Tick(time.monotonic()))
         self.view: View = derive_view(self.state)
         self._shown = self.state
         self.feed = LiveFeed()
@@ -105,7 +103,7 @@ class Bridge(QObject):
             self._client.close()
 
     def session_now(self) -> float:
-        return self._clock() + self.session_offset
+        return time.monotonic() + self.session_offset
 
     def send(self, message: Message) -> None:
         """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
@@ -125,7 +123,7 @@ class Bridge(QObject):
 
     def poll(self) -> None:
         """Take what has come, and let it be drawn."""
-        now = self._clock()
+        now = time.monotonic()
         if now - self._ticked >= TICK:
             self._ticked = now
             self._fold(Tick(now))
