@@ -7,6 +7,7 @@ Text that begins like a formula has an apostrophe before it; numbers stay as the
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -114,6 +115,12 @@ def number_in(cell: str) -> float | None:
         return None
 
 
+def mend_row(*cells: str) -> str:
+    """Return what to do where cells of a row hold no numbers. A comma could stand before thousands or a fraction."""
+    commas = any(re.fullmatch(r"[+-]?\d+,\d+", cell.strip()) for cell in cells)
+    return "save the file with decimal points" if commas else "mend or remove the row"
+
+
 PART = 16_384  # rows at once
 MISSING = "n/a"
 RAW = tuple(f"raw_{axis}" for axis in range(1, 7))
@@ -195,7 +202,8 @@ def displacement_log(path: Path) -> DisplacementLog:
     for line, cells in rows:
         at, displacement = (_number(cells, place) for place in places)
         if not np.isfinite([at, displacement]).all():
-            raise ImportRefused(f"{path}, line {line}: {clock} or {DISPLACEMENT} is no number; mend or remove the row")
+            words = f"{clock} or {DISPLACEMENT} is no number; {mend_row(*cells)}"
+            raise ImportRefused(f"{path}, line {line}: {words}")
         if values and at <= values[-1][0]:
             raise ImportRefused(f"{path}, line {line}: {clock} does not grow; mend or remove the row")
         width = np.nan if of_width is None else _number(cells, of_width)

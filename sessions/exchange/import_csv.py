@@ -16,7 +16,7 @@ from drivers.calibration_file import AXES
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, content_of, number_in, records
+from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, content_of, mend_row, number_in, records
 from sessions.file_access import write_whole
 from sessions.plan.plan import Frame, Origin, SessionPlan
 from sessions.plan.protocols.protocol import HEIGHTS
@@ -282,7 +282,7 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int
         if value is None or not abs(value) <= GREATEST:
             cell = cell_text(cells[position])
             words = f'{name} is "{cell}", which is no number that a device gives'
-            raise ImportRefused(f"{path}, line {line}: {words}; mend or remove the row")
+            raise ImportRefused(f"{path}, line {line}: {words}; {mend_row(cell)}")
         row[position] = value
     return row
 

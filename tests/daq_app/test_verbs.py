@@ -215,6 +215,7 @@ def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, co
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2\n", 1, "line 3"),
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,nan,4,5,6\n", 1, "line 3"),
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,1e300,4,5,6\n", 1, "no number that a device"),
+        ("t_s;Fx_N;Fy_N;Fz_N;Tx_Nm;Ty_Nm;Tz_Nm\n0;1,5;2;3;4;5;6\n", 1, "; save the file with decimal points"),
         ("", 1, "empty"),
     ],
 )
