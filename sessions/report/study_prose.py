@@ -137,11 +137,14 @@ def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]
     return [f"Session {name}: {full_stop(one)}" for name, one in decided if (" is left out: " in one) == leaving_out]
 
 
+NO_TRIAL = "has no trial of an experiment, as an imported table has none, and counts nothing"
+
+
 def remarks(study: StudyFindings) -> list[str]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = _decision_sentences(study, leaving_out=False)
     sentences += [
-        f"Session {visit.session} ended before its last trial; what it holds counts."
+        f"Session {visit.session} {'ended before its last trial; what it holds counts' if visit.rows else NO_TRIAL}."
         for visit in study.visits
         if not visit.complete
     ]

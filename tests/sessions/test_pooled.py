@@ -233,6 +233,13 @@ def test_trials_that_the_session_did_not_come_to_are_not_done_and_nothing_was_ex
     assert any(sentence.startswith("Not done: S01 trial 1, S01 trial 2") for sentence in sentences)
 
 
+def test_a_recording_without_trials_is_told_to_count_nothing_and_not_to_have_ended_early():
+    foreign = replace(VISITS[0], session="foreign", rows=(), complete=False)
+    (sentence,) = (one for one in remarks(pool_visits([foreign, *VISITS[1:]])) if "foreign" in one)
+    assert sentence.startswith("Session foreign has no trial of an experiment")
+    assert sentence.endswith("counts nothing.")
+
+
 SENSE = {"small": 1.0, "finite": -1.0}  # of the SED along a path
 
 
