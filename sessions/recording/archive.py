@@ -9,7 +9,14 @@ from sessions.recording.derived import ABSENT, unlike
 from sessions.recording.manifest import changed_files, description, head_of_manifest, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
 from sessions.recording.recovery import fold_log
-from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
+from sessions.recording.schema import (
+    DESCRIPTION_FILE,
+    LIVE_FILE,
+    MANIFEST_FILE,
+    SEALED_FILE,
+    DiskRefused,
+    RecordingError,
+)
 from sessions.recording.sealed_copy import differences, write_copy
 from sessions.recording.storage import release_reserve
 
@@ -45,9 +52,11 @@ def seal(folder: Path) -> None:
         list_in_manifest(folder, SEALED, head_of_manifest(recording))
     except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
         new.unlink(missing_ok=True)
-        raise RecordingError(
-            f"{folder} could not be sealed ({error}); the live file is untouched: {remedy(error)}, and seal it again "
-            "with 'daq-app resume --end'"
+        mended = remedy(error)
+        raise DiskRefused(
+            f"{folder} could not be sealed ({error}); the live file is untouched: {mended}, and seal it again "
+            "with 'daq-app resume --end'",
+            f"({error}); {mended}",
         ) from error
 
 

@@ -87,7 +87,7 @@ def quick(monkeypatch):
     [
         ("time_s,x\n0,1\n1,2\n", [], 1, "displacement_mm"),
         ("time_s,displacement_mm\n0,1\n0,2\n", [], 1, "line 3: time_s does not grow"),
-        ("time_s;displacement_mm\n0,0;1,0\n0,1;1,5\n", [], 1, "line 2: time_s or displacement_mm is no number; save the"),
+        ("time_s;displacement_mm\n0,0;1,0\n0,1;1,5\n", [], 1, "is no number; save the file with decimal points"),
         ("time_s,displacement_mm\n0,1\n1,much\n", [], 1, "line 3"),
         ("time_s,displacement_mm\n0,1\n1,2\n", [], 1, "does not follow it"),
         ("sequence,displacement_mm\n0,1\n1,2\n", ["--shift", "2"], 2, "--shift"),

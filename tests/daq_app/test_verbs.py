@@ -264,7 +264,9 @@ def test_an_import_that_cannot_be_sealed_leaves_no_folder(session, tmp_path, cap
     csv.write_text("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,3,4,5,6\n")
     for source in (session / "session.h5", csv):
         assert run(["import", str(source), "--out", str(tmp_path / "again")]) == 1
-        assert "free space on the disk" in capsys.readouterr().err
+        output = capsys.readouterr().err
+        assert "free space on the disk, and import again: nothing is left of it" in output
+        assert "resume" not in output
         assert not (tmp_path / "again").exists()
 
 
