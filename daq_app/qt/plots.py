@@ -73,7 +73,8 @@ class ZoomedPlot(pg.PlotWidget):
     read: Callable[[float], str] | None = None
 
     def __init__(self, tokens: Tokens) -> None:
-        pg.PlotWidget.__init__(self, background=tokens.surface, axisItems={"left": RoomyAxis("left")})
+        axes = {"left": RoomyAxis("left")}
+        pg.PlotWidget.__init__(self, background=tokens.surface, axisItems=axes, enableMenu=False)
         self._names: Any = None
         self._text = tokens.text
         self.setMinimumSize(120, round(100 + 160 * (type_scale() - 1)))  # the axes take what the type needs
@@ -88,7 +89,6 @@ class ZoomedPlot(pg.PlotWidget):
         self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.words.setStyleSheet(f"background: {tokens.surface}; color: {tokens.text}; padding: 0 {GRID // 2}px;")
         self._hide_words()
-        item.setMenuEnabled(False)
         item.hideButtons()
         for side in ("left", "bottom"):
             style_axis(item.getAxis(side), tokens, font(SMALL))

@@ -209,7 +209,7 @@ def _dress(application: "QApplication", tokens: "Tokens") -> None:
     application.setApplicationName("daq-app")
     application.setDesktopFileName("daq-app")
     application.setWindowIcon(QIcon(str(ICON)))
-    if application.style().name() != "fusion":
+    if not application.styleSheet():  # at the first call
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
     for kind in ("QCheckBox", "QRadioButton"):

@@ -1,5 +1,6 @@
 """The real window on a screen in memory, with the real recorder behind it, whose clock runs fast."""
 
+import gc
 import os
 import time
 from pathlib import Path
@@ -101,6 +102,18 @@ def application(tmp_path_factory):
     return QApplication.instance() or QApplication([])
 
 
+@pytest.fixture(scope="module", autouse=True)
+def none_stays(application):
+    """Delete every window after the tests of its file: one that stays is styled again with each that opens."""
+    yield
+    for widget in application.topLevelWidgets():
+        if type(widget).__module__.startswith("daq_app.") and widget.parent() is None:
+            widget.deleteLater()
+    application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    gc.unfreeze()  # an opening window keeps all there is from collection
+    gc.collect()
+
+
 @pytest.fixture
 def type_size():
     """Return what chooses a size of type; the usual one comes back."""
@@ -154,10 +167,6 @@ def one_window(application, request):
     window.show()
     yield window
     window.bridge.end()
-    for widget in (window.subject, window):  # one that stays is styled again with every window that opens
-        widget.hide()
-        widget.deleteLater()
-    application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture
@@ -181,3 +190,4 @@ def driver(application, one_window, tmp_path):
         driver.sealed()
         one_window.bridge.send(NewSession())
     one_window.bridge.send(Dismissed())
+    application.sendPostedEvents(None, QEvent.Type.DeferredDelete)  # a loop that only processes events leaves these
