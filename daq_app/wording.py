@@ -65,6 +65,22 @@ COUNT_WORDS: Mapping[str, str] = tr_noop({  # of a transducer's `Health`, by the
 })  # fmt: skip
 
 
+ANSWERS: Mapping[str, str] = tr_noop({  # by what became of a trial, or which of two was chosen
+    "scored": "score {answer:.0f}", "numbered": "number {answer:.9g}", "first": "the first", "second": "the second",
+})  # fmt: skip
+
+
+def answer_words(outcome: str, answer: float | str | None) -> str:
+    """Return what a subject answered: a score, a number of its own, or which of two.
+
+    >>> answer_words("scored", 37.4), answer_words("numbered", 0.125), answer_words("chosen", "first")
+    ('score 37', 'number 0.125', 'the first')
+    """
+    if answer is None:
+        return tr("no answer")
+    return tr(ANSWERS[answer]) if isinstance(answer, str) else tr(ANSWERS[outcome], answer=answer)
+
+
 def quantity(value: float | None, digits: int, unit: str = "") -> str:
     """Return a number with its unit and a true minus sign, never a minus zero; a dash where it is not known.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.analyst.state import AnalystState, Row, Step, rows, selected_row
-from daq_app.wording import errors_words, quantity, tr, tr_noop
+from daq_app.wording import answer_words, errors_words, quantity, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
@@ -36,13 +36,14 @@ class Point:
 
 def words_of(row: Row) -> str:
     """Return a line of the list of trials; `marks_of` explains its marks."""
+    answer = "" if row.answer is None else f"  {answer_words(*row.answer)}"
     if row.stroke is None:
         assert row.prediction is not None  # a row has at least one of them
-        return _name_of(row.prediction) + tr("  no stroke")
+        return _name_of(row.prediction) + tr("  no stroke") + answer
     mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
-    return f"{_name_of(row.stroke)}  {mu}{mark}{failed}"
+    return f"{_name_of(row.stroke)}  {mu}{answer}{mark}{failed}"
 
 
 def marks_of(row: Row) -> str:

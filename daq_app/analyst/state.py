@@ -202,6 +202,7 @@ class Row:
     trial: int | None
     stroke: StrokeFinding | None
     prediction: PredictionFinding | None
+    answer: tuple[str, float | str] | None = None  # of the subject to the trial, with the trial's outcome
 
     @property
     def key(self) -> Key:
@@ -270,11 +271,12 @@ def rows(state: AnalystState) -> tuple[Row, ...]:
     if report is None:
         return ()
     by_stroke = {p.stroke: p for p in report.predictions if p.stroke is not None}
-    listed = [Row(s.trial, s, by_stroke.get(s.number)) for s in report.strokes]
+    answers = {None: None, **report.answers}
+    listed = [Row(s.trial, s, by_stroke.get(s.number), answers.get(s.trial)) for s in report.strokes]
     for p in report.predictions:
         if p.stroke is None:
             later = (at for at, row in enumerate(listed) if (row.trial or 0) > (p.trial or 0))
-            listed.insert(next(later, len(listed)), Row(p.trial, None, p))
+            listed.insert(next(later, len(listed)), Row(p.trial, None, p, answers.get(p.trial)))
     return tuple(listed)
 
 

@@ -10,7 +10,6 @@ from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeE
 from PySide6.QtWidgets import (
     QFileDialog,
     QLabel,
-    QListWidget,
     QMainWindow,
     QProgressBar,
     QSizePolicy,
@@ -24,7 +23,19 @@ from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Panel, WrappedLabel, button, choice, hbox, label, say, scroll_area, set_horizontal, vbox
+from daq_app.qt.parts import (
+    Panel,
+    WrappedLabel,
+    button,
+    choice,
+    hbox,
+    label,
+    row_list,
+    say,
+    scroll_area,
+    set_horizontal,
+    vbox,
+)
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, MODEL, Tokens, px, theme_of
@@ -291,8 +302,7 @@ class TrialsColumn(QWidget):
         """Show no trials; `ask` takes the chosen row, `respond` the quantity that is compared with the score."""
         super().__init__()
         self._tokens, self._ask = tokens, ask
-        self.list = QListWidget()
-        self.list.setAccessibleName(tr("trials"))
+        self.list = row_list(tr("trials"))
         self.list.currentRowChanged.connect(self._choose)
         self.responses = choice(tr("quantity that is held against the score"))
         for shown in (shown_response(quantity.name) for quantity in QUANTITIES):

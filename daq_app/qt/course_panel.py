@@ -8,7 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, say, stack_pages, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, say, stack_pages, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
@@ -32,9 +32,7 @@ class CoursePanel(Panel):
         self._view: CourseView | None = None
         self._asking = ""
         self._asked_for = ""  # the question that stands over the line
-        self.plan = QListWidget()
-        self.plan.setAccessibleName(tr("plan: trials done, in hand and coming"))
-        self.plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.plan = row_list(tr("plan: trials done, in hand and coming"))
         self.buttons = {act: button("", tr(WORDS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QLayout,
     QLineEdit,
+    QListWidget,
     QPushButton,
     QScrollArea,
     QSizePolicy,
@@ -145,6 +146,16 @@ def choice(name: str, entries: Iterable[str] = ()) -> QComboBox:
     box.addItems(list(entries))
     box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return box
+
+
+def row_list(name: str) -> QListWidget:
+    """Return a list whose rows take a second line where they are longer than it is wide."""
+    rows = QListWidget()
+    rows.setAccessibleName(name)
+    rows.setWordWrap(True)
+    rows.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    rows.setResizeMode(QListWidget.ResizeMode.Adjust)
+    return rows
 
 
 class EntryLine(QLineEdit):

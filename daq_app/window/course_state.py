@@ -8,7 +8,7 @@ from msgspec import Struct
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import answer_words
 from sessions.plan.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
 from sessions.run import steps
@@ -297,11 +297,11 @@ def _fold_event(session: SessionState, event: LoggedEvent) -> SessionState:
 def _of_trial(session: SessionState, number: int | None, kind: str, data: Mapping[str, Any]) -> SessionState:
     match kind:
         case "scored":
-            return session.with_trial(number, answer=_answer(tr_noop("score {answer:.0f}"), data["score"]))
+            return session.with_trial(number, answer=answer_words("scored", data["score"]))
         case "number_given":
-            return session.with_trial(number, answer=_answer(tr_noop("number {answer:g}"), data["number"]))
+            return session.with_trial(number, answer=answer_words("numbered", data["number"]))
         case "chosen":
-            return session.with_trial(number, answer=_answer(CHOICES.get(data["choice"], ""), data["choice"]))
+            return session.with_trial(number, answer=answer_words("chosen", data["choice"]))
         case "left_out":
             return session.with_trial(number, outcome="skipped")
         case "take_started":
@@ -316,13 +316,6 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
             return replace(session.with_trial(number, outcome="skipped"), redone=())
         case _:
             return session
-
-
-CHOICES = tr_noop({"first": "the first", "second": "the second"})
-
-
-def _answer(form: str, answer: float | str | None) -> str:
-    return tr("no answer") if answer is None else tr(form, answer=answer)
 
 
 def _discard(session: SessionState, number: int | None, reason: str) -> SessionState:

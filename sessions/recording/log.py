@@ -51,6 +51,11 @@ class TrialRecord:
     choice: Choice | None = None  # of the two compared; None unless outcome is "chosen"
 
     @property
+    def answer(self) -> float | Choice | None:
+        """Return what the subject answered: a score, a number or which of two; None where it gave none."""
+        return next((one for one in (self.score, self.number, self.choice) if one is not None), None)
+
+    @property
     def start_ns(self) -> int | None:
         """Return when the take that counts began [ns, session clock]."""
         return self.take.start_ns if self.take else None

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sessions.plan.plan import SessionPlan
+from sessions.plan.plan import Choice, SessionPlan
 from sessions.prediction import BY_NAME, SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.stored import model_facts
 from sessions.prediction.surface_series import other_signs
+from sessions.recording.log import Outcome
 from sessions.recording.reader import Recording
 from sessions.report import facts
 from sessions.report.contents import Experiment, Fact, GroundTruth, Report
@@ -93,10 +94,14 @@ def numbers_alone(
 ) -> Report:
     """Return a report of strokes and predictions alone: nothing is held against scores, so it may be blinded."""
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
+    answers: dict[int, tuple[Outcome, float | Choice]] = {
+        record.trial.number: (record.outcome, record.answer) for record in recording.trials if record.answer is not None
+    }
     return Report(
         session=recording.folder.name,
         strokes=strokes(recording, analysis),
         predictions=predictions(prediction, more.firing, undone),
+        answers=answers,
         response=more.response,
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         width=None if prediction is None else prediction.width,

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from drivers.arrays import Array
+from sessions.plan.plan import Choice
 from sessions.prediction import Fields, History, Response, Skin
 from sessions.prediction.stored import Ends, TrialNumbers
+from sessions.recording.log import Outcome
 from sessions.statistics.correlations import Relation
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.psychometric import Psychometric
@@ -157,6 +159,10 @@ class Report:
     course: Course | None = None
     strokes: tuple[StrokeFinding, ...]
     predictions: tuple[PredictionFinding, ...]
+    # Of the subject, by trial: its outcome, and the score, the number or which of two
+    answers: Mapping[int, tuple[Outcome, float | Choice]] = field(
+        default_factory=dict[int, tuple[Outcome, float | Choice]]
+    )
     fields: tuple[Field, ...] = ()
     planted: tuple[GroundTruth, ...] = ()
     modelled: tuple[Fact, ...] = ()

@@ -59,6 +59,28 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
         assert row.trial is None or words.startswith(str(row.trial))
 
 
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (("scored", 37.4), "score 37"),
+        (("numbered", 0.125), "number 0.125"),
+        (("numbered", 123456789.0), "number 123456789"),
+        (("chosen", "second"), "the second"),
+    ],
+)
+def test_a_line_says_what_the_subject_answered_to_its_trial(state, answer, words):
+    answered = fold(state, m.ReportReady("predicted", replace(state.report, answers={3: answer})))
+    assert [row.trial for row in rows(answered) if words in words_of(row)] == [3]
+
+
+def test_the_answers_shown_are_those_that_the_session_recorded():
+    recording = Recording.open(SESSION)
+    scores = {event.trial: event.data["score"] for event in recording.events if event.kind == "scored"}
+    shown = findings(recording, analyse(recording)).answers
+    assert shown
+    assert shown == {trial: ("scored", score) for trial, score in scores.items() if score is not None}
+
+
 def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state):
     second = state.report.strokes[1]
     bare = replace(state.report, strokes=tuple(s for s in state.report.strokes if s is not second), predictions=())
