@@ -13,7 +13,7 @@ from daq_app.window.subject import SubjectText as Text
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event, MagnitudeEstimate, Note, PairedChoice, Scored
 
-LARGEST = 1 << 20  # of a message [bytes]: an hour of an answer's positions
+LARGEST = 1 << 24  # of a message [bytes]: an hour of an answer's positions, 60 a second
 Short = Annotated[str, Meta(max_length=200)]
 PixelsPerMm = Annotated[float, Meta(ge=1.0, le=40.0)]
 

@@ -30,6 +30,7 @@ TRIES = 5  # of wrong codes, before there is a new one
 WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
 ALIVE = 5.0  # a tablet that says nothing for so long is gone [s]
 PATIENCE = 10.0  # for the first message [s]
+REPLACED = 4000  # closes the conversation with a tab whose place another one of the same browser takes; see page.html
 OFF = logging.CRITICAL + 1
 PAGE = Path(__file__).with_name("page.html")
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
@@ -167,7 +168,7 @@ class TabletServer:
             for text in (written(Welcome(self._token)), *self._last.values()):
                 _tell(connection, text)
         if before is not None:
-            before.close()
+            before.close(REPLACED)
         self._changed()
         return True
 
@@ -182,7 +183,9 @@ class TabletServer:
                 self.code, self._wrong = _new_code(), 0
         if renewed:
             self._changed()
-        return "Another device shows this page. Ask for a new code." if taken else "This is not the code."
+        if taken:
+            return "Another device shows this page. Ask for a new code."
+        return "This is not the code." if hello.code else "Another code holds now."
 
 
 def own_address() -> str:

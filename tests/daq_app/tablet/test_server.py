@@ -90,6 +90,31 @@ def test_one_device_is_let_in_by_the_code_and_comes_back_by_its_token(server):
     assert server.requests[0].pixels_per_mm == 4.0
 
 
+def test_a_tab_whose_place_another_takes_is_told_so_and_need_not_take_it_back(server):
+    with socket(server, code=server.code) as first:
+        token = receive(first)["token"]
+        with socket(server, token=token) as second:
+            assert receive(second)["type"] == "welcome"
+            with pytest.raises(ConnectionClosed) as closed:
+                first.recv(5.0)
+            assert closed.value.rcvd.code == 4000  # of the page's own: RFC 6455, 7.4.2
+    with socket(server, token=token) as third:
+        receive(third)
+        server.renew()
+        with pytest.raises(ConnectionClosed) as closed:
+            third.recv(5.0)
+        assert closed.value.rcvd.code != 4000
+
+
+def test_an_hour_on_the_line_is_taken_as_one_answer(server):
+    with socket(server, code=server.code) as talk:
+        receive(talk)
+        acts = [[1.7e12 + 1000.0 / 60.0 * at, "drag", 100.0 / 3.0 + at * 1e-6, "touch"] for at in range(60 * 3600)]
+        talk.send(json.dumps({"type": "given", "key": "a", "acts": acts, "sent": 1.8e12}))
+        until(lambda: isinstance(server.requests[-1], AnswerGiven))
+    assert len(server.requests[-1].acts) == 60 * 3600
+
+
 def socket_refused(server, **hello):
     with socket(server, **hello) as talk:
         return receive(talk)["type"] == "refused"
@@ -138,7 +163,8 @@ def test_a_new_code_lets_go_of_the_device_that_was_there(server):
         server.renew()
         with pytest.raises(ConnectionClosed):
             first.recv(5.0)
-    assert socket_refused(server, token=token)
+    with socket(server, token=token) as again:  # nobody has typed anything
+        assert receive(again) == {"type": "refused", "sentence": "Another code holds now."}
     with socket(server, code=server.code) as second:
         assert receive(second)["type"] == "welcome"
 
