@@ -22,6 +22,8 @@ AXIS_WIDTH = 52  # the same for all, so that their times stand under each other 
 LEAST = 36  # height that holds the name and the times under it, likewise
 SAMPLE = 14  # length of the piece of line before a curve's name, likewise
 DASHES = 45  # times two thirds of a dash in the stretch that is shown
+TOP = 2  # above the names [px]
+LINES = 3  # of type: a lower plot has no line to spare for its names
 FAR = 1e4  # a value so many pixels away is as good as any beyond it
 
 
@@ -98,9 +100,12 @@ class LivePlot(PaintedWidget):
         painter.drawPixmap(0, 0, self._names)
 
     def _inside(self) -> QRectF:
+        """Return where curves are: below the names, but in a plot so low that its names must lie over them."""
         left = px(AXIS_WIDTH)
         below = px(SMALL + 5) if self._times_shown else 3
-        return QRectF(left, 2, max(self.width() - left - 4, 8), max(self.height() - below - 2, 8))
+        names, high = QFontMetricsF(font(SMALL, bold=True)).height(), self.height() - below - TOP
+        top = TOP + names if high >= LINES * names else TOP
+        return QRectF(left, top, max(self.width() - left - 4, 8), max(self.height() - below - top, 8))
 
     def _reach(self) -> tuple[float, float]:
         """Return the values at the lower and the upper edge."""
@@ -155,15 +160,15 @@ class LivePlot(PaintedWidget):
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
 
     def _draw_names(self, inside: QRectF) -> QPixmap:
-        """Return the plot's name, and where it has several curves a piece of the line of each, to lie over the curves.
+        """Return the plot's name, and where it has several curves a piece of the line of each.
 
-        In a low plot they would be unreadable beneath them.
+        They are painted last: in a low plot they lie over the curves, and would be unreadable beneath them.
         """
         metrics = QFontMetricsF(font(SMALL, bold=True))
         picture = blank(self, "transparent")
         painter = QPainter(picture)
         painter.setFont(font(SMALL, bold=True))
-        x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
+        x, baseline = inside.left() + 6, TOP + metrics.ascent() + 1
         named = [curve for curve in self._curves if curve.named]
         several = len(named) > 1
         unit = self._name[max(self._name.find("["), 0) :] if several else self._name
@@ -171,7 +176,7 @@ class LivePlot(PaintedWidget):
         room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
         sample = max(min(SAMPLE * type_scale(), room), 0.0)
         width = words + len(named) * sample if several else 0.0
-        ground = QRectF(x - 3, inside.top(), width + metrics.horizontalAdvance(unit) + 6, metrics.height())
+        ground = QRectF(x - 3, TOP, width + metrics.horizontalAdvance(unit) + 6, metrics.height())
         painter.fillRect(ground, sheer(self.theme.surface, 200))
         for curve in named if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
@@ -207,11 +212,11 @@ class LivePlot(PaintedWidget):
             painter.setPen(fine(self.theme.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
-            if inside.height() >= 5 * line:  # a lower plot has no room for words; the ones above it say them
+            if inside.bottom() - TOP >= 5 * line:  # a lower plot has no room for words; the ones above it say them
                 width = words.size().width()
                 left = start - width - 3 if onset else start + 3
                 if free <= left <= inside.right() - width:
-                    painter.drawStaticText(QPointF(left, inside.top() + line), words)
+                    painter.drawStaticText(QPointF(left, TOP + line), words)
                     free = left + width
 
     def _colour(self, name: str) -> str:

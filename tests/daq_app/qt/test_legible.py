@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontMetricsF
+from PySide6.QtGui import QColor, QFontMetricsF
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -27,13 +27,14 @@ from daq_app.analyst.state import selected_row
 from daq_app.qt import tokens
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.finger_canvas import FingerCanvas
-from daq_app.qt.live_panel import PLOTS
+from daq_app.qt.live_panel import AXES, PLOTS
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.main_window import MainWindow
 from daq_app.qt.plots import ZoomedPlot
 from daq_app.qt.rooms import about_box
 from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
+from daq_app.qt.tokens import FY
 from daq_app.window.course_state import Judged, Mark
 from daq_app.window.live_model import ModelWords
 from daq_app.window.live_trace import CHANNELS, Columns
@@ -372,3 +373,25 @@ def test_the_words_of_a_lift_and_of_the_next_onset_never_lie_on_each_other():
         plot.show_columns(Columns(time, np.zeros((len(CHANNELS), 50))), 10.0, marks, 0.0)
         assert not cut_or_colliding(plot)
     assert [text.words for text in painted_texts(plot)].count("onset") == 2
+
+
+@pytest.mark.usefixtures("application")
+@pytest.mark.parametrize("height", [90, 160])
+def test_the_names_of_a_plot_hide_nothing_of_its_curves(height):
+    plot = LivePlot(*AXES[1])  # three dashed torques, named at the left end
+    plot.resize(240, height)
+    time = np.linspace(0.0, 10.0, 200)
+    values = np.zeros((len(CHANNELS), 200))
+    values[CHANNELS.index("Ty")] = 50.0  # along the upper edge
+    plot.show_columns(Columns(time, values), 10.0, [], 0.0)
+    names = [text.place for text in painted_texts(plot) if text.words in ("Tx", "Ty", "Tz")]
+    picture, colour = plot.grab().toImage(), QColor(FY)
+    seen = [
+        y
+        for y in range(picture.height())
+        for x in range(picture.width() - 40, picture.width())  # right of the names
+        if picture.pixelColor(x, y) == colour
+    ]
+    assert len(names) == 3
+    assert seen
+    assert min(seen) >= max(place.bottom() for place in names) - 1
