@@ -16,6 +16,7 @@ from daq_app.window.view_course import Button
 from daq_app.wording import tr
 
 ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
+TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
 LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
 MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
@@ -31,6 +32,7 @@ class Header(QWidget):
             policy = wrapped.sizePolicy()
             policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)  # they share the room there is
             wrapped.setSizePolicy(policy)
+        self._device.setMinimumHeight(px(TWO_LINES))  # what is below stays in place when the device says more
         self._simulated = label(tr("SIMULATED"), "simulated")
         self._simulated.setVisible(False)
         self._lamp = Lamp(tr("recording"))

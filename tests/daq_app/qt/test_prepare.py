@@ -37,6 +37,27 @@ def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):
         driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
 
 
+def test_what_is_below_the_top_stays_in_place_while_the_transducer_says_more(driver):
+    window, words = driver.window, ("nothing lost", "no readings for 3 s", "no readings for 12 s")
+    size, places = window.size(), {}
+    window.bridge.blockSignals(True)
+    try:
+        for width in (1280, *range(1360, 1600, 40)):
+            window.resize(width, 1000)
+            for _ in range(3):  # until the rows at the top have found their heights
+                driver.application.processEvents()
+            for said in words:
+                bench = replace(driver.view.bench, name="SIMULATED Net F/T SI-36-0.5", lamp_words=said)
+                window.header.show_view(replace(driver.view, bench=bench, heading="subject P07 · sensotact-friction"))
+                driver.application.processEvents()
+                places.setdefault(width, set()).add(window.to_do.mapTo(window, window.to_do.rect().topLeft()).y())
+    finally:
+        window.bridge.blockSignals(False)
+        window.header.show_view(driver.view)
+        window.resize(size)
+    assert {width: len(there) for width, there in places.items()} == dict.fromkeys(places, 1)
+
+
 def test_the_wheel_over_a_list_scrolls_the_page_and_chooses_nothing(driver):
     page = driver.window.page
     for box in (page.protocol, page.stroking, page.studies):
