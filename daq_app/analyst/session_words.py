@@ -7,7 +7,7 @@ from typing import Literal
 from daq_app.analyst.state import AnalystState, Row, Step, rows, selected_row
 from daq_app.wording import answer_words, errors_words, quantity, tr, tr_noop
 from sessions.prediction import SED
-from sessions.report.contents import PredictionFinding, Report, StrokeFinding
+from sessions.report.contents import AnswerFinding, PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
 
 Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
@@ -36,10 +36,11 @@ class Point:
 
 def words_of(row: Row) -> str:
     """Return a line of the list of trials; `marks_of` explains its marks."""
-    answer = "" if row.answer is None else f"  {answer_words(*row.answer)}"
+    answer = "" if row.answer is None else f"  {answer_words(row.answer.outcome, row.answer.answer)}"
     if row.stroke is None:
-        assert row.prediction is not None  # a row has at least one of them
-        return _name_of(row.prediction) + tr("  no stroke") + answer
+        of = row.prediction or row.answer
+        assert of is not None  # a row has at least one of them
+        return _name_of(of) + ("" if row.prediction is None else tr("  no stroke")) + answer
     mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
@@ -215,7 +216,7 @@ def progress_words(step: Step | None) -> str:
     return f"{tr(step.words)}  {done}{left}"
 
 
-def _name_of(of: StrokeFinding | PredictionFinding) -> str:
+def _name_of(of: StrokeFinding | PredictionFinding | AnswerFinding) -> str:
     if of.trial is None:
         return tr("stroke {number}", number=of.number) if isinstance(of, StrokeFinding) else tr("stroke –")
     return f"{of.trial}  {of.experiment} {of.code if of.index is None else of.index}"

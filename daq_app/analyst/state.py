@@ -12,7 +12,7 @@ from daq_app.analyst.frame import Film, Finger
 from daq_app.analyst.stroke import Edge, History, RawReadings
 from daq_app.wording import tr, tr_noop
 from sessions.prediction import SED
-from sessions.report.contents import PredictionFinding, Report, StrokeFinding
+from sessions.report.contents import AnswerFinding, PredictionFinding, Report, StrokeFinding
 
 Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a predicted row
 
@@ -197,12 +197,12 @@ class AnalystState:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of the list: a stroke, or a predicted trial without one."""
+    """A line of the list: a stroke, or a predicted trial without one, or an answer where no forces were recorded."""
 
     trial: int | None
     stroke: StrokeFinding | None
     prediction: PredictionFinding | None
-    answer: tuple[str, float | str] | None = None  # of the subject to the trial, with the trial's outcome
+    answer: AnswerFinding | None = None  # of the subject to the trial
 
     @property
     def key(self) -> Key:
@@ -266,18 +266,21 @@ def _on_request(state: AnalystState, request: Ask) -> AnalystState:
 
 
 def rows(state: AnalystState) -> tuple[Row, ...]:
-    """Return the list: every stroke in order of time, and a trial without one before the strokes of later trials."""
+    """Return the list: every stroke in order of time, and a trial without one before the strokes of later trials.
+
+    A session of scores alone has its answers in place of strokes.
+    """
     report = state.report
     if report is None:
         return ()
     by_stroke = {p.stroke: p for p in report.predictions if p.stroke is not None}
-    answers = {None: None, **report.answers}
-    listed = [Row(s.trial, s, by_stroke.get(s.number), answers.get(s.trial)) for s in report.strokes]
+    answers = {one.trial: one for one in report.answers}
+    listed = [Row(s.trial, s, by_stroke.get(s.number), answers.get(s.trial or 0)) for s in report.strokes]
     for p in report.predictions:
         if p.stroke is None:
             later = (at for at, row in enumerate(listed) if (row.trial or 0) > (p.trial or 0))
-            listed.insert(next(later, len(listed)), Row(p.trial, None, p, answers.get(p.trial)))
-    return tuple(listed)
+            listed.insert(next(later, len(listed)), Row(p.trial, None, p, answers.get(p.trial or 0)))
+    return tuple(listed or (Row(one.trial, None, None, one) for one in report.answers))
 
 
 def selected_row(state: AnalystState) -> Row | None:

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from sessions.plan.plan import Choice, SessionPlan
+from sessions.plan.plan import SessionPlan
 from sessions.prediction import BY_NAME, SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.stored import model_facts
 from sessions.prediction.surface_series import other_signs
-from sessions.recording.log import Outcome
 from sessions.recording.reader import Recording
 from sessions.report import facts
 from sessions.report.contents import Experiment, Fact, GroundTruth, Report
 from sessions.report.facts import scene_file, session_commands
-from sessions.report.trials import course, fields, flaws, model_in_short, omissions, predictions, strokes
+from sessions.report.trials import answers, course, fields, flaws, model_in_short, omissions, predictions, strokes
 from sessions.report.wording import full_stop
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
@@ -94,14 +93,11 @@ def numbers_alone(
 ) -> Report:
     """Return a report of strokes and predictions alone: nothing is held against scores, so it may be blinded."""
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
-    answers: dict[int, tuple[Outcome, float | Choice]] = {
-        record.trial.number: (record.outcome, record.answer) for record in recording.trials if record.answer is not None
-    }
     return Report(
         session=recording.folder.name,
         strokes=strokes(recording, analysis),
         predictions=predictions(prediction, more.firing, undone),
-        answers=answers,
+        answers=answers(recording),
         response=more.response,
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         width=None if prediction is None else prediction.width,

@@ -111,6 +111,18 @@ class PredictionFinding(TrialNumbers):
     opposite_doubt: str = ""  # likewise of the state slid the other way
 
 
+@dataclass(frozen=True, slots=True)
+class AnswerFinding:
+    """What the subject answered to a trial."""
+
+    trial: int
+    experiment: str
+    index: int | None  # None while the session is blinded
+    code: str
+    outcome: Outcome
+    answer: float | Choice  # a score, a number of the subject's own, or which of two
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Field:
     """The finger of one trial in its settled state."""
@@ -159,10 +171,7 @@ class Report:
     course: Course | None = None
     strokes: tuple[StrokeFinding, ...]
     predictions: tuple[PredictionFinding, ...]
-    # Of the subject, by trial: its outcome, and the score, the number or which of two
-    answers: Mapping[int, tuple[Outcome, float | Choice]] = field(
-        default_factory=dict[int, tuple[Outcome, float | Choice]]
-    )
+    answers: tuple[AnswerFinding, ...] = ()  # of the subject, in the order of its trials
     fields: tuple[Field, ...] = ()
     planted: tuple[GroundTruth, ...] = ()
     modelled: tuple[Fact, ...] = ()

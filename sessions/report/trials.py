@@ -14,7 +14,16 @@ from sessions.prediction import PredictionOptions, SessionPrediction, TrialPredi
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.scenes import doubt_of
 from sessions.recording.reader import Recording
-from sessions.report.contents import Course, Fact, Field, PredictionFinding, StrokeFinding, Trace, same_fields
+from sessions.report.contents import (
+    AnswerFinding,
+    Course,
+    Fact,
+    Field,
+    PredictionFinding,
+    StrokeFinding,
+    Trace,
+    same_fields,
+)
 from sessions.report.wording import plural
 from sessions.statistics.scores import by_key
 from sessions.strokes.analysis import Analysis
@@ -48,6 +57,16 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
         }
         findings.append(StrokeFinding(**{**same_fields(stroke, StrokeFinding), **numbers}))
     return tuple(findings)
+
+
+def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
+    """Return what the subject answered to each trial, in their order."""
+    return tuple(
+        AnswerFinding(of.number, of.block, of.stimulus.index, of.stimulus.code, record.outcome, record.answer)
+        for record in recording.trials
+        for of in (record.trial,)
+        if record.answer is not None
+    )
 
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:

@@ -25,6 +25,7 @@ from daq_app.analyst.work import Work, sentence_of
 from sessions.recording import Recording
 from sessions.recording.derived import set_gain_error
 from sessions.report import findings
+from sessions.report.contents import AnswerFinding
 from sessions.strokes import AnalysisSettings, analyse
 from sessions.strokes.decisions import Decision, Decisions, read
 from solver.prediction import Skin
@@ -69,7 +70,8 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
     ],
 )
 def test_a_line_says_what_the_subject_answered_to_its_trial(state, answer, words):
-    answered = fold(state, m.ReportReady("predicted", replace(state.report, answers={3: answer})))
+    given = AnswerFinding(3, "stickiness", 20, "K20", *answer)
+    answered = fold(state, m.ReportReady("predicted", replace(state.report, answers=(given,))))
     assert [row.trial for row in rows(answered) if words in words_of(row)] == [3]
 
 
@@ -78,7 +80,18 @@ def test_the_answers_shown_are_those_that_the_session_recorded():
     scores = {event.trial: event.data["score"] for event in recording.events if event.kind == "scored"}
     shown = findings(recording, analyse(recording)).answers
     assert shown
-    assert shown == {trial: ("scored", score) for trial, score in scores.items() if score is not None}
+    assert {one.trial: one.answer for one in shown} == {trial: it for trial, it in scores.items() if it is not None}
+
+
+def test_a_session_of_scores_alone_has_a_line_for_each_answer():
+    given = [AnswerFinding(n, "stickiness", 20, "K20", "scored", 10.0 * n) for n in (1, 2)]
+    report = replace(example(), strokes=(), predictions=(), answers=tuple(given))
+    opened = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
+    assert [words_of(row) for row in rows(opened)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
+    chosen = fold(opened, m.Choose(1))
+    assert selected_row(chosen).trial == 2
+    assert numbers(chosen) == ()
+    assert [link.place for link in lineage(chosen)] == ["session", "trial"]
 
 
 def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state):
