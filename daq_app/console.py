@@ -216,6 +216,15 @@ class Console:
             self._line_open = False
 
 
+def behind_a_point(text: str) -> str:
+    """Return what to add to what is allowed where somebody typed a comma before a fraction.
+
+    >>> behind_a_point("'1,5'"), behind_a_point("1.5"), behind_a_point("1,5,2")
+    (', its fraction behind a point', '', '')
+    """
+    return ", its fraction behind a point" if re.fullmatch(r"'?[+-]?\d*,\d+'?", text.strip()) else ""
+
+
 class Parser(argparse.ArgumentParser):
     """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
 
@@ -229,7 +238,7 @@ class Parser(argparse.ArgumentParser):
         """Raise WrongValue."""
         if wrong := re.fullmatch(r"argument (\S+): invalid (int|float) value: (.*)", message, re.DOTALL):
             kind = "a whole number" if wrong[2] == "int" else "a number"
-            message = f"{wrong[1]} {wrong[3]} is not allowed: it must be {kind}"
+            message = f"{wrong[1]} {wrong[3]} is not allowed: it must be {kind}{behind_a_point(wrong[3])}"
         raise WrongValue(f"{message}; '{self.prog} --help' explains")
 
     def print_help(self, file: object = None) -> None:  # noqa: ARG002  argparse's own

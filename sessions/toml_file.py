@@ -84,12 +84,16 @@ def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | 
         raise SettingsError(f"{where}{f', line {line}' if line else ''}: {wrong.sentence}") from wrong
 
 
+_COMMA = re.compile(r"^[^#\"'\n]*=[ \t]*([+-]?\d+,\d+)[ \t]*(?:#.*)?$", re.MULTILINE)  # before a fraction
+
+
 def tables_in(text: str, where: str) -> dict[str, Any]:
     """Return what a TOML text holds; `where` is how messages call it. Raises SettingsError."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"{where}: this is not TOML: {error}") from error
+        comma = f"; in {typed[1]} write the fraction behind a point" if (typed := _COMMA.search(text)) else ""
+        raise SettingsError(f"{where}: this is not TOML: {error}{comma}") from error
     except RecursionError as error:
         raise SettingsError(f"{where}: lists or tables are nested too deep; write it with fewer brackets") from error
     except ValueError as error:  # Python's limit, 4300 by default

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from daq_app.console import WrongValue
+from daq_app.console import WrongValue, behind_a_point
 from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
 from sessions.plan.protocols.protocol import HEIGHTS
@@ -36,7 +36,7 @@ def within(
         else:
             shown = str(value) if kind is int else f"{value:g}"
         if not least <= value <= greatest:
-            raise WrongValue(f"{name} {shown} is not allowed: {words or usual}")
+            raise WrongValue(f"{name} {shown} is not allowed: {words or usual}{behind_a_point(text)}")
         return value if per == 1 else value / per
 
     return read
@@ -76,7 +76,7 @@ def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str,
         except ValueError:
             number = math.nan
         if not key or not math.isfinite(number):
-            raise WrongValue(f"{option} {text} is not allowed: NAME=VALUE, such as {example}")
+            raise WrongValue(f"{option} {text} is not allowed: NAME=VALUE, such as {example}{behind_a_point(value)}")
         if key in numbers:
             raise WrongValue(f"{option} {key} is given twice")
         numbers[key] = number

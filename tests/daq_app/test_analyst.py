@@ -70,8 +70,8 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
     ],
 )
 def test_a_line_says_what_the_subject_answered_to_its_trial(state, answer, words):
-    given = AnswerFinding(3, "stickiness", 20, "K20", *answer)
-    answered = fold(state, m.ReportReady("predicted", replace(state.report, answers=(given,))))
+    finding = AnswerFinding(3, "stickiness", 20, "K20", *answer)
+    answered = fold(state, m.ReportReady("predicted", replace(state.report, answers=(finding,))))
     assert [row.trial for row in rows(answered) if words in words_of(row)] == [3]
 
 
@@ -84,8 +84,8 @@ def test_the_answers_shown_are_those_that_the_session_recorded():
 
 
 def test_a_session_of_scores_alone_has_a_line_for_each_answer():
-    given = [AnswerFinding(n, "stickiness", 20, "K20", "scored", 10.0 * n) for n in (1, 2)]
-    report = replace(example(), strokes=(), predictions=(), answers=tuple(given))
+    answers = [AnswerFinding(n, "stickiness", 20, "K20", "scored", 10.0 * n) for n in (1, 2)]
+    report = replace(example(), strokes=(), predictions=(), answers=tuple(answers))
     opened = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
     assert [words_of(row) for row in rows(opened)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
     chosen = fold(opened, m.Choose(1))

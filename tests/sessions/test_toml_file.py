@@ -179,6 +179,24 @@ def test_a_wrong_scene_file_is_refused_with_its_line(tmp_path, old, new, sentenc
     assert str(refusal.value).startswith(f"{path}, {sentence}")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ("mu = 0.67", "mu = 0,67", "; in 0,67 write the fraction behind a point"),
+        ("mu = 0.67", "mu = 0,67  # of the sample", "; in 0,67 write the fraction behind a point"),
+        ("mu = 0.67", "mu = 0.67\nmu = 0.67 # not 0,67", ""),
+        ("[friction]", "title = '0,67\n[friction]", ""),
+    ],
+)
+def test_a_comma_before_a_fraction_is_named(tmp_path, old, new, hint):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace(old, new))
+    with pytest.raises(SettingsError, match="this is not TOML") as refusal:
+        load_toml(path, Scene)
+    assert str(refusal.value).endswith(hint)
+    assert ("point" in str(refusal.value)) == bool(hint)
+
+
 def test_a_right_scene_file_gives_the_scene(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
