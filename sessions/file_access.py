@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import secrets
 import shutil
 import sqlite3
 from collections.abc import Generator, Iterator, Mapping
@@ -159,12 +160,16 @@ def holds_something(folder: Path) -> bool:
 
 @contextmanager
 def whole_folder(folder: Path) -> Generator[Path]:
-    """Lend a folder that gets the name of `folder`, new or empty, once it is whole; else nothing of it is left."""
-    part = folder.with_name(f".{folder.name}.part")
+    """Lend a folder that gets the name of `folder`, new or empty, once it is whole; else nothing of it is left.
+
+    Of two at once the first to be whole gets the name, and the other raises FileExistsError.
+    """
+    part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
     try:
-        shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
         yield part
+        if holds_something(folder):
+            raise FileExistsError(errno.EEXIST, "another program has written there meanwhile", str(folder))
         if folder.exists():
             folder.rmdir()
         part.replace(folder)
@@ -173,11 +178,16 @@ def whole_folder(folder: Path) -> Generator[Path]:
 
 
 @contextmanager
-def whole_or_nothing(folder: Path) -> Generator[None]:
-    """Remove a new folder again where what is done inside fails: all that it holds stands elsewhere too."""
+def whole_or_nothing(folder: Path, taken: type[Exception]) -> Generator[None]:
+    """Remove a new folder again where what is done inside fails: all that it holds stands elsewhere too.
+
+    Where it raises `taken`, what the folder holds is another program's, and stays.
+    """
     new = not holds_something(folder)
     try:
         yield
+    except taken:
+        raise
     except BaseException:
         if new:
             shutil.rmtree(folder, ignore_errors=True)

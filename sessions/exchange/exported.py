@@ -23,7 +23,7 @@ from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import Digest, different, digest_of
 from sessions.recording.reader import Recording
 from sessions.recording.replay import RecordedReadings
-from sessions.recording.schema import LIVE_FILE, RecordingError, check_format
+from sessions.recording.schema import LIVE_FILE, NotEmpty, RecordingError, check_format
 from sessions.recording.writer import SessionWriter
 from sessions.strokes.decisions import DECISIONS
 
@@ -162,12 +162,14 @@ def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
     Raises ImportRefused for a damaged export, RecordingError for a folder that cannot be written.
     """
     if holds_something(folder):
-        raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+        raise NotEmpty(folder)
     try:
         with ExitStack() as stack:
             with name_failure(RecordingError, f"{folder} cannot be made"):
                 part = stack.enter_context(whole_folder(folder))
             differences = restore(source, part)
+    except FileExistsError as error:
+        raise NotEmpty(folder) from error
     except _DAMAGED as error:
         raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error
     restored = Recording.open(folder)

@@ -4,6 +4,7 @@
 """
 
 import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,14 @@ class DiskRefused(RecordingError):
         """Take the sentence of a session that goes on when resumed, and the reason alone."""
         super().__init__(sentence)
         self.why = why
+
+
+class NotEmpty(RecordingError):
+    """A folder that was to be a new session's holds something, which stays."""
+
+    def __init__(self, folder: Path) -> None:
+        """Take the folder."""
+        super().__init__(f"{folder} is not empty; give a new folder, for nothing is written over")
 
 
 FORMAT = "daq-app session"

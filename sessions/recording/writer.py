@@ -90,12 +90,14 @@ class SessionWriter:
             for place in new:
                 sync_folder(place.parent)
             if any(folder.iterdir()):
-                raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+                raise schema.NotEmpty(folder)
             if reserve:
                 take_reserve(folder, reserve)
             path.touch(exist_ok=False)
         except OSError as error:
             _leave(folder)
+            if path.exists():  # made by another program since the look into the folder
+                raise schema.NotEmpty(folder) from error
             raise RecordingError(
                 f"{folder} cannot hold a recording ({error.strerror}); "
                 f"{remedy(error, new=True)}, or give another folder"

@@ -3,13 +3,14 @@
 import errno
 import os
 import sqlite3
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from recordings import record_session
 
 from daq_app.cli.main import run
-from sessions.file_access import read_within_limit, remedy, write_whole
+from sessions.file_access import read_within_limit, remedy, whole_folder, write_whole
 from sessions.recording import RecordingError, archive
 from sessions.recording.archive import seal
 from sessions.recording.derived import bytes_of, store_derived
@@ -126,3 +127,17 @@ def test_a_folder_is_never_written_over(tmp_path, monkeypatch, place):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(OSError, match="directory"):
         write_whole(Path(place), b"K1")
+
+
+def test_of_two_who_write_one_folder_at_once_the_first_to_end_has_it_and_nothing_is_mixed(tmp_path):
+    folder = tmp_path / "export"
+    slow = ExitStack()
+    (slow.enter_context(whole_folder(folder)) / "slow.csv").touch()
+    with whole_folder(folder) as quick:
+        (quick / "quick.csv").touch()
+    with pytest.raises(FileExistsError):
+        slow.close()
+    assert [path.relative_to(tmp_path).as_posix() for path in sorted(tmp_path.rglob("*"))] == [
+        "export",
+        "export/quick.csv",
+    ]

@@ -48,10 +48,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _whole_session(folder: Path) -> Generator[None]:
     """Leave a whole session or nothing; where the disk takes no more there is nothing to resume, and that is said."""
     from sessions.file_access import whole_or_nothing
-    from sessions.recording.schema import DiskRefused, RecordingError
+    from sessions.recording.schema import DiskRefused, NotEmpty, RecordingError
 
     try:
-        with whole_or_nothing(folder):
+        with whole_or_nothing(folder, taken=NotEmpty):
             yield
     except DiskRefused as error:
         raise RecordingError(
