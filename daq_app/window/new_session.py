@@ -9,7 +9,7 @@ from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.state import BenchState
-from daq_app.wording import sentence, tr
+from daq_app.wording import sentence, tr, two_meanings, typed_number
 from sessions.file_access import failure_sentence
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, is_code, plan, protocol
@@ -312,12 +312,12 @@ def _refusals(form: SessionForm, bench: Bench) -> Refusal:
     if form.height.strip() and (height is None or not lowest <= height <= highest):
         wrong["height"] = tr(
             "A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty.", highest=highest
-        )
+        ) + _doubt(form.height)
     area = _number(form.area)
     if form.area.strip() and (area is None or not AREAS[0] <= area <= AREAS[1]):
         wrong["area"] = tr(
             "An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty.", least=AREAS[0], most=AREAS[1]
-        )
+        ) + _doubt(form.area)
     if unusable := _why_unusable(folder_of(form)):
         wrong["folder"] = unusable
     if form.forces and not bench.connected:
@@ -341,11 +341,19 @@ def _why_unusable(place: Path) -> str:
 
 
 def _number(text: str) -> float | None:
-    """Return a number as it was typed, a comma for a point too; None where it is none."""
-    try:
-        return float(text.strip().replace(",", "."))
-    except ValueError:
-        return None
+    """Return a number as it was typed, a comma for a point too; None where it is none, or may be either of two."""
+    size = typed_number(_without_sign(text))
+    return -size if size is not None and text.strip().startswith(("-", "−")) else size
+
+
+def _without_sign(text: str) -> str:
+    return text.strip().removeprefix("+").removeprefix("-").removeprefix("−")
+
+
+def _doubt(text: str) -> str:
+    """Return what to type in place of a number whose comma may group thousands, "" for any other."""
+    meanings = two_meanings(_without_sign(text))
+    return "" if meanings is None else tr(" Type {whole} or {fraction}.", whole=meanings[0], fraction=meanings[1])
 
 
 def _sentence(error: Exception) -> str:

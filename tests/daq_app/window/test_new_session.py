@@ -75,6 +75,8 @@ def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind)
         (replace(FORM, height="900"), REAL, "height", "millimetres"),
         (replace(FORM, area="0"), REAL, "area", "mm²"),
         (replace(FORM, area="much"), REAL, "area", "mm²"),
+        (replace(FORM, area="1,250"), REAL, "area", "Type 1250 or 1.250."),
+        (replace(FORM, height="-1,250"), REAL, "height", "Type 1250 or 1.250."),
         (FORM, Bench(), "forces", "No transducer is connected"),
         (replace(FORM, simulated=True), REAL, "simulated", "Only the simulated bench"),
     ],
@@ -122,6 +124,8 @@ def test_a_session_that_another_window_records_is_not_said_to_be_cut_short(tmp_p
 
 
 def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():
+    for typed, height in (("-12.25", -12.25), ("−12,25", -12.25), ("+3", 3.0), (" 0,125 ", 0.125)):
+        assert check_form(replace(FORM, height=typed), REAL, NOW, 0).plan.frame.height == height
     assert check_form(replace(FORM, height="12,5"), REAL, NOW, 0).plan.frame == Frame("-z", "default", 12.5, "measured")
     assert check_form(FORM, REAL, NOW, 0).plan.frame.height_origin == "default"
 
