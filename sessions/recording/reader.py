@@ -275,7 +275,8 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
         except (ValueError, TypeError, AttributeError):
             sound = False
         if not sound:
-            raise RecordingError(f"{path}: {name} in its head is damaged (CRC-32 differs); restore it from a copy")
+            damage = f"{name} in its head is damaged (CRC-32 differs); restore it from a copy{_copy_of(path.parent)}"
+            raise RecordingError(f"{path}: {damage}")
     try:
         schema.check_format(head.get("format"))
     except ValueError as error:

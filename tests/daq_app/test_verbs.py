@@ -229,7 +229,12 @@ def test_a_csv_that_cannot_be_taken_is_one_sentence_and_leaves_no_folder(text, c
     assert not (tmp_path / "a").exists()
 
 
-@pytest.mark.parametrize("damage", [lambda live: live.unlink(), lambda live: os.truncate(live, 5000)])
+def damage_plan(live):
+    with closing(sqlite3.connect(live)) as connection, connection:
+        connection.execute("UPDATE head SET value = '{}' WHERE name = 'plan'")
+
+
+@pytest.mark.parametrize("damage", [lambda live: live.unlink(), lambda live: os.truncate(live, 5000), damage_plan])
 def test_a_live_file_that_is_gone_or_torn_is_made_again_of_the_sealed_copy_as_the_sentence_says(
     session, tmp_path, capsys, damage
 ):
