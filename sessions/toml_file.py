@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from datetime import date, time
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -16,6 +17,7 @@ from msgspec import inspect
 from sessions.file_access import LARGEST_TEXT, name_failure, read_within_limit
 
 T = TypeVar("T")
+_type_info = cache(inspect.type_info)  # it takes as long as reading a protocol
 
 
 class SettingsError(ValueError):
@@ -106,7 +108,7 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
     Unknown keys are refused, whole numbers are taken where a number with a fraction may stand, true and false are no
     numbers, nan and infinity are refused. Raises SettingsError.
     """
-    places = {key: (value, form) for key, value, form in _places(table, inspect.type_info(cls), "")}
+    places = {key: (value, form) for key, value, form in _places(table, _type_info(cls), "")}
     for key, (value, form) in places.items():
         if isinstance(value, float) and not math.isfinite(value):
             raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
