@@ -154,9 +154,8 @@ def predict_session(
     before = _read_or_empty(recording, PREDICTION)
     document = _with_firing(prediction, afferent or _afferent_of(before))
     lost = _no_longer(before, prediction.options)
-    if lost:
+    if _store(recording, PREDICTION, document, console) and lost:
         console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
-    _store(recording, PREDICTION, document, console)
     return prediction
 
 
@@ -285,9 +284,11 @@ def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
     return OpenVisit(recording)
 
 
-def _store(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:
-    """Store a document in the session's folder; a folder that cannot be written is named, and nothing fails."""
+def _store(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> bool:
+    """Store a document in the session's folder; name a folder that cannot be written, and return whether it could."""
     try:
         store_derived(recording.folder, name, document)
     except RecordingError as error:
         console.note(f"not kept: {error}")
+        return False
+    return True

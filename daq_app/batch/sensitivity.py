@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sessions.toml_file import SettingsError, toml_value
 from solver import Scene, SolveFailure, solve
-from solver.scene.tables import TISSUES
+from solver.scene.tables import TISSUES, SceneError
 
 Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
 
@@ -93,6 +93,11 @@ def check_design(design: Mapping[str, Any], scene: Scene, where: str) -> dict[st
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
             allowed = "[least, greatest], least below greatest"
             raise SettingsError(f"{where}: {name} = {toml_value(ends)} is not allowed: {allowed}")
+        try:
+            for end in numbers:
+                with_values(scene, {name: end})
+        except SceneError as error:
+            raise SettingsError(f"{where}: {error}") from error
         ranges[name] = (numbers[0], numbers[1])
     if len(ranges) < 2:
         raise SettingsError(f"{where}: a design needs two numbers at least")

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from daq_app.batch.derived import stored_document
 from daq_app.batch.pool import Shelf, content_of
 from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, finger_in
-from sessions.recording import Recording
+from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import seal
 from sessions.recording.derived import gain_error_set
 from sessions.report import findings
@@ -346,13 +347,19 @@ def test_what_was_set_is_exported_without_an_analysis_and_a_damaged_setting_is_n
     assert run(["analyse", str(small), "--calibration-error", "0.1"]) == 0
 
 
-def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_is_named(small, capsys):
+def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_is_named(small, capsys, monkeypatch):
     options = ["--afferent", "--afferent-set", "static_gain=30", "--intervals", "--beside", "none"]
     assert run(["predict", str(small), *options, "--json"]) == 0
     afferent = answer(capsys)["afferent"]
     assert json.loads((small / "prediction.json").read_text())["afferent"] == afferent
     assert run(["verify", str(small)]) == 0
     capsys.readouterr()
+    with monkeypatch.context() as full_disk:
+        full_disk.setattr("daq_app.batch.derived.store_derived", Mock(side_effect=RecordingError("the disk is full")))
+        run(["predict", str(small), "--beside", "none"])
+    said = capsys.readouterr().err
+    assert "not kept: the disk is full" in said
+    assert "intervals" not in said  # the file still holds them
     run(["predict", str(small), "--beside", "none"])
     assert "intervals of the SED (--intervals)" in capsys.readouterr().err
     document = json.loads((small / "prediction.json").read_text())["afferent"]

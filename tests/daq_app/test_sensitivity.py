@@ -105,6 +105,7 @@ def test_what_cannot_be_varied_is_named():
         ({"finger.toe": [1, 2]}, "finger.toe"),
         ({"friction.mu": [0.5, 0.5]}, "friction.mu"),
         ({"friction.mu": [0.5, 10**400]}, r"friction.mu = \[0.5, 1000"),
+        ({"friction.mu": [-1.0, 0.5]}, "design.toml: friction.mu = -1.0 is not allowed"),
     ):
         with pytest.raises(SettingsError, match=what):
             check_design(wrong, SCENE, "design.toml")
