@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -265,12 +266,14 @@ def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_
 def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, monkeypatch):
     monkeypatch.setattr(pooling, "ANSWERS", 5.0)
     monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 300.0)
-    by_client = pooling._by_client
+    cluster_client = pooling.cluster_client
 
-    def kill_first(*words):
-        scheduler.kill()
-        scheduler.wait()
-        yield from by_client(*words)
+    @contextmanager
+    def client_without_scheduler(address):
+        with cluster_client(address) as client:
+            scheduler.kill()
+            scheduler.wait()
+            yield client
 
     file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
@@ -279,7 +282,7 @@ def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, 
         try:
             _until(lambda: file.is_file() and file.read_text().endswith("}"))
             address = json.loads(file.read_text())["address"]
-            monkeypatch.setattr(pooling, "_by_client", kill_first)
+            monkeypatch.setattr(pooling, "cluster_client", client_without_scheduler)
             with pytest.raises(pooling.SchedulerError, match="the scheduler is gone"):
                 visits([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True), scheduler=address)
         finally:
