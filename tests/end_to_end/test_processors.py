@@ -48,12 +48,8 @@ def near(path):
 
     Rivals are compared by differences of correlations and by what is left once another is given: both divide by
     1 - r^2 of two quantities, and r is 0.99 to 0.999 here. With the round-off of r itself that leaves nine figures. An
-    estimated error is a difference of answers that agree to three figures. A term of a mixed model is near against the
-    far end of its interval, some t + 2 of its standard errors, and these are near themselves: t = estimate / error is
-    off by (2 t + 2) of `NEAR`, and p by twice the normal density times that, 2.2 at most.
+    estimated error is a difference of answers that agree to three figures.
     """
-    if path[-1] == "p" and "terms" in path:
-        return 2.2 * NEAR
     loses = "rivals" in path or "rivals_of_means" in path or str(path[-1]).endswith(("error", "error_estimate"))
     return 1e3 * NEAR if loses else NEAR
 
