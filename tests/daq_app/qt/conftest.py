@@ -103,7 +103,7 @@ def application(tmp_path_factory):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def none_stays(application):
+def no_window_stays(application):
     """Delete every window after the tests of its file: one that stays is styled again with each that opens."""
     yield
     for widget in application.topLevelWidgets():
