@@ -26,7 +26,6 @@ square root of the distance. So the force beyond a line between elements has its
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,16 +118,3 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     moment = sum(one * (at - place[line]) for one, at in zip(forces, place[line : last + 1], strict=True))
     least = place[last] - 0.35 * (place[last] - place[last - 1])
     return min(max(place[line] + 2.5 * moment / sum(forces), least), place[min(last + 1, len(place) - 1)])
-
-
-class SkinCompression(NamedTuple):
-    """Largest compression of the skin, and whether the skin has a crease.
-
-    A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
-    """
-
-    least: float  # least ratio of deformed to undeformed length, over halves of elements' sides
-    place: int  # element with the least ratio
-    lowest: float  # least stretch, at the ends of elements too: more accurate where elements are large
-    kink: float  # largest jump of the tangent between elements, by undeformed length: large at a crease.
-    # Only open, compressed skin counts: jumps where it touches, or is stretched at an edge of contact, are the mesh's.

@@ -135,9 +135,10 @@ def solve_active_set(
         sum_stiffness(body, control.kind, sums, loads)
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
     entries = np.zeros(size, np.int32)  # how often each node came into contact
-    history, recorded = np.empty((control.rounds + 1, 2, size), np.int32), 0
+    history = np.empty((control.rounds + 1, 2, size), np.int32)
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
-    one_by_one, may_hold = False, load.mu > 0.0 and load.tau > 0.0
+    may_hold = load.mu > 0.0 and load.tau > 0.0
+    one_by_one, recorded = size < 0, min(size, 0)  # False and 0, whose literals would compile subroutines twice
     for turn in range(control.rounds + 1):
         bounded_length(position.x, skin, system.length)
         if by_forces:

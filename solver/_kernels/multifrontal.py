@@ -113,14 +113,14 @@ def _factorise(top: Array, rest: Array) -> bool:
         if top[k - 1, k - 1] == 0.0:
             return False
         over[k - 1] = 1.0 / top[k - 1, k - 1]
-    for r in range(0, b - 3, 4):
-        _update_four(top, over, k + r, rest[r, r:], rest[r + 1, r:], rest[r + 2, r:], rest[r + 3, r:])
-    for r in range(b - b % 4, b):
-        _update_one(top, over, k, k + r, rest[r, r:])
+    for r in range(0, b - 1, 2):
+        _update_two(top, over, k, k + r, rest[r, r:], rest[r + 1, r:])
+    if b % 2 == 1:
+        _update_one(top, over, k, k + b - 1, rest[b - 1, b - 1 :])
     return True
 
 
-@compile_loop
+@subroutine
 def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Array) -> None:
     """Subtract the contributions of the first `count` rows from rows r and r + 1 of a front, given from column r on."""
     size = one.shape[0]
@@ -144,37 +144,7 @@ def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Ar
         p += 1
 
 
-@compile_loop
-def _update_four(top: Array, over: Array, r: int, one: Array, two: Array, three: Array, four: Array) -> None:
-    """Subtract the contributions of the rows of `top` from rows r to r + 3 of a front, given from column r on."""
-    p, count = 0, top.shape[0]
-    while p + 4 <= count:
-        d0, d1, d2, d3 = over[p], over[p + 1], over[p + 2], over[p + 3]
-        s0, s1, s2, s3 = top[p, r:], top[p + 1, r:], top[p + 2, r:], top[p + 3, r:]
-        a0, a1, a2, a3 = s0[0] * d0, s1[0] * d1, s2[0] * d2, s3[0] * d3
-        b0, b1, b2, b3 = s0[1] * d0, s1[1] * d1, s2[1] * d2, s3[1] * d3
-        c0, c1, c2, c3 = s0[2] * d0, s1[2] * d1, s2[2] * d2, s3[2] * d3
-        e0, e1, e2, e3 = s0[3] * d0, s1[3] * d1, s2[3] * d2, s3[3] * d3
-        for c in range(one.shape[0]):
-            x0, x1, x2, x3 = s0[c], s1[c], s2[c], s3[c]
-            one[c] -= a0 * x0 + a1 * x1 + a2 * x2 + a3 * x3
-            two[c] -= b0 * x0 + b1 * x1 + b2 * x2 + b3 * x3
-            three[c] -= c0 * x0 + c1 * x1 + c2 * x2 + c3 * x3
-            four[c] -= e0 * x0 + e1 * x1 + e2 * x2 + e3 * x3
-        p += 4
-    while p < count:
-        s0 = top[p, r:]
-        a0, b0, c0, e0 = s0[0] * over[p], s0[1] * over[p], s0[2] * over[p], s0[3] * over[p]
-        for c in range(one.shape[0]):
-            x0 = s0[c]
-            one[c] -= a0 * x0
-            two[c] -= b0 * x0
-            three[c] -= c0 * x0
-            four[c] -= e0 * x0
-        p += 1
-
-
-@compile_loop
+@subroutine
 def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None:
     """Subtract the contributions of the first `count` rows from row r of a front, given from column r on."""
     for p in range(count):

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array
+from solver.body.skin import SkinCompression
 from solver.constitutive import Law, stress, tangent
-from solver.contact import SkinCompression
 from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
 from solver.failures import NotConverged
 from solver.progress import check_stop, report_progress

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver._kernels import skin as skin_loops
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
+from solver.body.skin import SkinCompression, crosses_itself
 from solver.body.validation import check_loads
 from solver.constitutive import Law
-from solver.contact import SkinCompression
 from solver.continuation import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_stepping
@@ -291,13 +290,18 @@ class _OwnBody:
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        mesh, every = self.body.mesh, np.ones(len(state.state) // 2, bool)
-        return SkinCompression(*skin_loops.measure_compression(mesh.nodes, state.u, mesh.skin, every, state.state, 0))
+        before, after = self._skin(state)
+        return SkinCompression.of(before, after, np.ones(len(before) // 2, bool), state.touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        mesh = self.body.mesh
-        return skin_loops.crosses(mesh.nodes, state.u, mesh.skin)
+        return crosses_itself(self._skin(state)[1])
+
+    def _skin(self, state: EquilibriumState) -> tuple[Array, Array]:
+        """Return the undeformed and deformed positions (2 a + 1, 2) of the skin's nodes."""
+        skin = self.body.mesh.skin
+        before = self.body.mesh.nodes[skin]
+        return before, before + state.u[skin]
 
     def spoilt(self, state: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""

@@ -14,7 +14,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import SLIP, STICK
 from solver._kernels.contact_system import tributary
 from solver.arrays import Array, Flags, Indices
@@ -22,8 +21,9 @@ from solver.body import VALUES, Body, Endings, Patches
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import LinearBody, LinearPatches
 from solver.body.receptor import endings, join, middle
+from solver.body.skin import SkinCompression, crosses_itself
 from solver.constitutive import Law, Moduli, NeoHooke, Ogden, Prony
-from solver.contact import SkinCompression, width
+from solver.contact import width
 from solver.equilibrium import EquilibriumState, Newton
 from solver.failures import MIXED, NotConverged
 from solver.mesh import Q2P1, MeshError, distinct, line, with_middles
@@ -229,15 +229,20 @@ class FiniteFinger(Finger[FinitePatches]):
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return the compression of the skin, with its least stretch and its kinks."""
-        at = self.geometry
-        touchable = int(np.searchsorted(at.whole, at.mesh.skin[:1])[0])  # the first node that may touch
-        return SkinCompression(
-            *skin_loops.measure_compression(at.mesh.nodes, state.u, at.whole, at.loose, state.state, touchable)
-        )
+        mesh, loose = self.geometry.mesh, self.geometry.loose
+        before, after = self._skin(state)
+        touching = np.isin(self.geometry.whole, mesh.skin[state.touching])
+        return SkinCompression.of(before, after, loose, touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return skin_loops.crosses(self.geometry.mesh.nodes, state.u, self.geometry.whole)
+        return crosses_itself(self._skin(state)[1])
+
+    def _skin(self, state: EquilibriumState) -> tuple[Array, Array]:
+        """Return the undeformed and deformed positions (2 a + 1, 2) of all the skin's nodes."""
+        whole = self.geometry.whole
+        before = self.geometry.mesh.nodes[whole]
+        return before, before + state.u[whole]
 
 
 KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": FiniteFinger}  # by kinematics

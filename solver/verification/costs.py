@@ -26,11 +26,11 @@ PARTS = {
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
     "accuracy": "audits", "body.receptor": "receptor", "body.linear.average": "receptor",
     "body.linear._energy_forms": "receptor", "body.average": "receptor", "body.responses": "receptor",
-    "body.state": "receptor", "equilibrium.finger": "carrying states",
+    "body.state": "receptor", "body.skin": "proof of existence", "equilibrium.finger": "carrying states",
     "continuation.small_states": "iteration", "continuation.finite_states": "iteration",
     "response.finite_answers": "iteration",
     "_kernels.elements": "assembly", "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
-    "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "proof of existence",
+    "_kernels.active_set": "contact", "_kernels.contact_system": "contact",
 }  # fmt: skip
 ENTIRE = {"nested_numbers_of_all": "error estimate", "solve_nested": "error estimate", "with_viscosity": "evidence"}
 OTHER = "the rest"

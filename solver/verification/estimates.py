@@ -132,11 +132,16 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
 
 
 def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
-    """Return the estimates of an answer's numbers with their errors against `truth` (3,) of relative `doubt` (3,)."""
+    """Return the estimates of an answer's numbers with their errors against `truth` (3,) of relative `doubt` (3,).
+
+    Nothing where the answer says that its errors are unknown.
+    """
+    if answer.nested is None:
+        return []
     best, warned = answer.sed_ending_corrected, any(one.startswith(CUT_FOLDS) for one in answer.warnings)
     numbers = (  # place in the truth, value and estimate of each of `GOALS`
         (0, answer.sed_ending, answer.error_estimate),
-        (0, best, None if answer.nested is None else answer.corrected_error),
+        (0, best, answer.corrected_error),
         (1, answer.normal_force, answer.normal_force_error),
         (2, answer.tangential_force, answer.tangential_force_error),
     )
@@ -146,7 +151,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
         if estimate is None or not true > 0.0:
             continue
         error, off = abs(value) / true - 1.0, best / true - 1.0
-        better = (abs(off), error * (error - off) > 0.0) if name == NUMBERS[0] and answer.nested else (None, False)
+        better = (abs(off), error * (error - off) > 0.0) if name == NUMBERS[0] else (None, False)
         row = Estimate(
             answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
             float(doubt[place]), *better, warned or bool(stiffness_warning(answer.scene)),

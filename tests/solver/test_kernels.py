@@ -6,19 +6,15 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from solver._kernels import contact_system
 from solver._kernels import elements as element_loops
-from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive import LAWS, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
-from tests.solver.oracle.skin import crosses_itself, measure_compression
 
 
 def distorted_body(law, seed=1):
@@ -205,36 +201,6 @@ def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
     np.testing.assert_allclose(probes.energy(u), expected[probes.endings.probes.element], rtol=1e-9)
 
 
-def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one_is():
-    rng, crossings = np.random.default_rng(5), set()
-    for spread in np.geomspace(0.01, 1.0, 40):
-        nodes = np.stack([np.linspace(0.0, 3.0, 24), np.zeros(24)], axis=1)
-        u = spread * rng.normal(size=nodes.shape)
-        outline = np.arange(2, 23)
-        loose, touching = rng.random(10) < 0.8, rng.random(21) < 0.3
-        before, after = nodes[outline], (nodes + u)[outline]
-        first, state = 5, touching[5:18].astype(np.int32)
-        touching[:5] = touching[18:] = False  # skin that may not touch
-        assert skin_loops.measure_compression(nodes, u, outline, loose, state, first) == pytest.approx(
-            measure_compression(before, after, loose, touching), rel=1e-12
-        )
-        assert skin_loops.crosses(nodes, u, outline) == crosses_itself(after)
-        crossings.add(skin_loops.crosses(nodes, u, outline))
-    assert crossings == {True, False}
-
-
-@given(
-    st.floats(0.0, np.pi), st.lists(st.floats(0.01, 1.0), min_size=4, max_size=40), st.floats(-20.0, 20.0),
-    st.floats(0.0, 1e-15),
-)  # fmt: skip
-def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, pieces, offset, noise):
-    arc = np.concatenate([[0.0], np.cumsum(pieces)])
-    nodes = offset + np.stack([arc * np.cos(angle), arc * np.sin(angle)], axis=1)
-    u = noise * np.random.default_rng(len(pieces)).normal(size=nodes.shape)
-    assert not crosses_itself(nodes + u)
-    assert not skin_loops.crosses(nodes, u, np.arange(len(nodes)))
-
-
 @pytest.mark.slow
 def test_no_bit_depends_on_which_loops_a_process_called_before():
     solving = (
@@ -248,7 +214,7 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
     )
     other_loops = (
         "import numpy as np\n"
-        "from solver._kernels import active_set, contact_system, skin as skin_loops\n"
+        "from solver._kernels import active_set, contact_system\n"
         "from solver.arrays import ContactStates, LoadArguments, Skin, SkinPosition\n"
         "state, zero = np.zeros(3, np.int32), np.zeros(3)\n"
         "skin, load = Skin(state, state, zero), LoadArguments(0.1, 0.1, 0.1, 1)\n"

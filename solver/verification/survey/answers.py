@@ -8,7 +8,7 @@ import numpy as np
 from solver.accuracy.error_estimate import contrast_error
 from solver.arrays import Array
 from solver.failures import SolveFailure
-from solver.prediction import Prediction
+from solver.prediction import Prediction, percent
 from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.estimates import Estimate, compare
@@ -47,6 +47,7 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
         answers = solve_many([_with_tolerance(scene, tolerance, together=together) for scene in scenes])
         refusals += [str(answer) for answer in answers if isinstance(answer, SolveFailure)]
         good = [answer for answer in answers if isinstance(answer, Prediction)]
+        refusals += [f"errors unknown at {percent(tolerance)}" for answer in good if answer.nested is None]
         if together and len(good) == len(scenes):
             estimates.append(_difference(good, BY_TOLERANCE * tolerance, truth))
         elif good:

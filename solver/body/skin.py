@@ -1,0 +1,75 @@
+"""Compression, creases and self-intersection of the deformed skin, a polyline through its nodes."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.arrays import Array, Flags, Indices
+
+SQUEEZED = 0.85  # stretch on at least one side below which a jump of the tangent counts as a kink
+
+
+class SkinCompression(NamedTuple):
+    """Largest compression of the skin, and whether the skin has a crease.
+
+    A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
+    """
+
+    least: float  # least ratio of deformed to undeformed length, over halves of elements' sides
+    place: int  # element with the least ratio
+    lowest: float  # least stretch, at the ends of elements too: more accurate where elements are large
+    kink: float  # largest jump of the tangent between elements, by undeformed length: large at a crease.
+    # Only open, compressed skin counts: jumps where it touches, or is stretched at an edge of contact, are the mesh's.
+
+    @staticmethod
+    def of(before: Array, after: Array, loose: Flags, touching: Flags) -> "SkinCompression":
+        """Return how far the sides of a elements are squeezed, where `loose` (a,) is true.
+
+        `before` and `after` (2 a + 1, 2) are positions of their nodes, undeformed and deformed. Some are `touching`
+        (2 a + 1,).
+        """
+        if not loose.any():
+            return SkinCompression(np.inf, 0, np.inf, 0.0)
+        steps = np.diff(np.stack([before, after]), axis=1).reshape(2, -1, 2, 2)[:, loose]  # (2, l, halves, 2)
+        lengths = _length(steps)
+        squeezed = lengths[1] / lengths[0]
+        tangents = 3.0 * steps - steps[:, :, ::-1]  # at both ends
+        tangent = tangents[1] / _length(tangents[0])[..., None]
+        stretch = _length(tangent)
+        elements = np.flatnonzero(loose)
+        joints = (np.diff(elements) == 1) & ~touching[2 * elements[1:]]
+        joints &= np.minimum(stretch[1:, 0], stretch[:-1, 1]) < SQUEEZED
+        jumps = _length(tangent[1:, 0] - tangent[:-1, 1])[joints]
+        worst = int(squeezed.min(axis=1).argmin())
+        least = float(squeezed[worst].min())
+        lowest = min(float(stretch.min()), least)
+        return SkinCompression(least, int(elements[worst]), lowest, float(jumps.max(initial=0.0)))
+
+
+def _length(vectors: Array) -> Array:
+    return np.hypot(vectors[..., 0], vectors[..., 1])
+
+
+def crosses_itself(line: Array) -> bool:
+    """Return whether a polyline (n, 2) meets itself other than at the points that join its pieces.
+
+    In a straight line round-off decides on which side of each piece a point lies. So only pieces that overlap along x
+    and y can meet.
+
+    >>> crosses_itself(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, -1.0]]))
+    True
+    >>> crosses_itself(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 0.5]]))
+    False
+    """
+    start, end = line[:-1], line[1:]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    overlap = (high[:, None] >= low).all(axis=2) & (high >= low[:, None]).all(axis=2)
+    one, other = np.nonzero(np.triu(overlap, 2))
+    return bool(np.any(_cuts(start, end, one, other) & _cuts(start, end, other, one)))
+
+
+def _cuts(start: Array, end: Array, one: Indices, other: Indices) -> Flags:
+    """Return whether the line through each piece `one` (p,) has the ends of the piece `other` (p,) on both sides."""
+    along, first, last = (end - start)[one], start[other] - start[one], end[other] - start[one]
+    sides = [along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0] for to in (first, last)]
+    return np.asarray(sides[0] * sides[1] < 0.0)
