@@ -1,4 +1,4 @@
-"""Coverage of the 95 % intervals of friction on planted strokes, in nine kinds of trouble, and false static peaks.
+"""Coverage of the 95 % intervals of friction on simulated strokes, in nine kinds of trouble, and false static peaks.
 
 Every bench errs as its stated accuracy allows: gains and cross-talk of the forces are drawn with a standard deviation
 of 1 %, the tilt of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
@@ -35,7 +35,7 @@ RATE = 200.0  # [Hz]
 ACCURACY = 0.01  # standard deviation of gains and of cross-talk [-]
 LEAN = 1.0  # standard deviation of the face's lean about each axis [degrees]
 PUSH = 0.01  # standard deviation of a press's own push sideways, by N [-]
-FINE = 20000  # instants at which the planted greatest force is sought, and the planted mean formed
+FINE = 20000  # instants at which the true greatest force is sought, and the true mean formed
 HEIGHT = BenchSettings().height
 CALIBRATION = Calibration("FT0001", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array(RATED), "the bench's own")
 INFO = TransducerInfo("sim:", "net-ft", "SIMULATED", "FT0001", True, RATE, 7000.0, CALIBRATION, {})
@@ -97,7 +97,7 @@ class Visit:
         self._drop = draw.uniform(0.1, 0.3)  # of mu in each slip [-]
 
     def strokes(self) -> tuple[Analysis, list[Truth], list[Array]]:
-        """Return the analysis of the ten strokes, what was planted in each, and its true force (3,) half-way [N]."""
+        """Return the analysis of the ten strokes, the truth of each, and its true force (3,) half-way [N]."""
         parts: list[tuple[Trial, ReadingBlock]] = []
         truths: list[Truth] = []
         forces: list[Array] = []
@@ -110,13 +110,13 @@ class Visit:
         begin = 2.5 * self._trouble.presses + 0.5
         for number, surface in enumerate(surfaces.values(), 1):
             self._bench.mount(surface)
-            planted = self._bench.begin_stroke(self._subject.stroke(surface), begin)
-            time = np.arange(np.ceil((begin - 0.2) * RATE), (planted.end + 0.6) * RATE) / RATE
+            stroke = self._bench.begin_stroke(self._subject.stroke(surface), begin)
+            time = np.arange(np.ceil((begin - 0.2) * RATE), (stroke.end + 0.6) * RATE) / RATE
             trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
-            parts.append((trial, _block(time, self._measured_wrench(time, self._true_wrench(time, planted)))))
-            truths.append(self._truth(planted))
-            forces.append(self._true_wrench(np.array([np.mean(planted.steady)]), planted)[0, :3])
-            begin = planted.end + 1.0
+            parts.append((trial, _block(time, self._measured_wrench(time, self._true_wrench(time, stroke)))))
+            truths.append(self._truth(stroke))
+            forces.append(self._true_wrench(np.array([np.mean(stroke.steady)]), stroke)[0, :3])
+            begin = stroke.end + 1.0
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
         plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=Frame("-z", "set", HEIGHT, "set"))
         return analyse_blocks(parts, plan, INFO, AnalysisSettings()), truths, forces
@@ -144,33 +144,33 @@ class Visit:
             for name, (low, high, reported, truth) in ends.items()
         }
 
-    def _truth(self, planted: StrokeGroundTruth) -> Truth:
-        steady = np.linspace(*planted.steady, FINE)
-        whole = np.linspace(planted.touch, planted.end, FINE)
-        tangential = np.hypot(*self._true_wrench(whole, planted)[:, :2].T)
-        mu = planted.mu * (1.0 if self._trouble.level else float(self._factor(steady, planted).mean()))
-        return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": planted.speed}
+    def _truth(self, stroke: StrokeGroundTruth) -> Truth:
+        steady = np.linspace(*stroke.steady, FINE)
+        whole = np.linspace(stroke.touch, stroke.end, FINE)
+        tangential = np.hypot(*self._true_wrench(whole, stroke)[:, :2].T)
+        mu = stroke.mu * (1.0 if self._trouble.level else float(self._factor(steady, stroke).mean()))
+        return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": stroke.speed}
 
-    def _factor(self, time: Array, planted: StrokeGroundTruth) -> Array:
+    def _factor(self, time: Array, stroke: StrokeGroundTruth) -> Array:
         """Return friction over the surface's own (n,) [-] at `time` (n,) [s]."""
         factor = np.ones_like(time)
         if self._trouble.wander:
             waves = [np.sin(2 * np.pi * f * time + p) for f, p in zip((0.4, 0.9, 1.7), self._phases[:3], strict=True)]
             factor += self._trouble.wander * np.sqrt(2.0 / 3.0) * np.sum(waves, axis=0)
         if self._trouble.slips:
-            phase = np.maximum(time - planted.slip, 0.0) * self._slips_each % 1.0
+            phase = np.maximum(time - stroke.slip, 0.0) * self._slips_each % 1.0
             # A climb over nine tenths of the time, a drop in the last: 7 to 20 ms, as fingers' relaxation allows.
             saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
-            factor *= np.where(time > planted.slip, 1.0 - self._drop * (1.0 - saw), 1.0)
+            factor *= np.where(time > stroke.slip, 1.0 - self._drop * (1.0 - saw), 1.0)
         if self._trouble.law:
             pressed = np.maximum(-self._bench.true_wrench(time)[:, 2], 1e-3)
-            factor *= (pressed / planted.peak_normal_force) ** self._trouble.law
+            factor *= (pressed / stroke.peak_normal_force) ** self._trouble.law
         return factor
 
-    def _true_wrench(self, time: Array, planted: StrokeGroundTruth) -> Array:
+    def _true_wrench(self, time: Array, stroke: StrokeGroundTruth) -> Array:
         """Return the true wrench (n, 6) [N, N mm] in the face's frame."""
         plain = self._bench.true_wrench(time)
-        more = plain[:, :2] * (self._factor(time, planted) - 1.0)[:, None]
+        more = plain[:, :2] * (self._factor(time, stroke) - 1.0)[:, None]
         pressed = np.minimum(plain[:, 2], -1e-12)
         x = (HEIGHT * plain[:, 0] - plain[:, 4]) / pressed
         y = (plain[:, 3] + HEIGHT * plain[:, 1]) / pressed
@@ -211,7 +211,7 @@ def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
 
 
 def row(name: str, seeds: Sequence[int]) -> str:
-    """Return how often intervals of a set hold what was planted, over ten strokes of each seed, as a row of a table."""
+    """Return how often intervals of a set hold the truth, over ten strokes of each seed, as a row of a table."""
     hits: dict[str, list[bool | None]] = defaultdict(list)  # None: no interval
     alone: dict[str, list[bool]] = defaultdict(list)  # by intervals of the errors in common alone
     peaks: list[bool] = []

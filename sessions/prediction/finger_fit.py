@@ -22,7 +22,7 @@ from solver import Scene
 
 POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
-# Halving and doubling these moved ends of intervals by so much of their width, over twelve planted fingers.
+# Halving and doubling these moved ends of intervals by so much of their width, over twelve simulated fingers.
 DRAWS = 20_000  # of the posterior: 0.2 % in the median
 FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer tell hardly the noise
 GRID = 25  # contrasts along each axis: 0.5 % with 49, 2 % with 13 in the median

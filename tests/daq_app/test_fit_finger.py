@@ -1,4 +1,4 @@
-"""A finger planted in a session of presses comes back by the command line, and its file serves other verbs."""
+"""The command line estimates a simulated finger from a session of presses, and its file serves other verbs."""
 
 import json
 
@@ -23,7 +23,7 @@ def stage(time, begin):
 
 @pytest.fixture(scope="module")
 def presses(tmp_path_factory):
-    """Files of forces and of a stage, on one clock, of three presses of a planted finger without friction."""
+    """Files of forces and of a stage, on one clock, of three presses of a simulated finger without friction."""
     folder = tmp_path_factory.mktemp("pressed")
     time = np.arange(round(14.0 * RATE)) / RATE
     depth = np.max([stage(time, begin) for begin in (1.5, 5.5, 9.5)], axis=0)
@@ -49,7 +49,7 @@ def test_the_scene_of_a_finger_is_never_written_over_one_that_somebody_wrote(pre
 
 
 @pytest.mark.slow
-def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict(presses, tmp_path, capsys):
+def test_the_interval_holds_a_simulated_finger_and_its_scene_is_taken_by_solve_and_predict(presses, tmp_path, capsys):
     out = tmp_path / "own.toml"
     words = ["fit-finger", str(presses / "session"), "--displacement", str(presses / "stage.csv"), "--mu", "0"]
     capsys.readouterr()
@@ -61,7 +61,7 @@ def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict
     for touch in document["touch"]:
         assert touch == pytest.approx(TOUCH, abs=0.05)
     assert document["check"]["deviation"] < 0.02
-    assert document["relaxation"]["part"]["low"] < 0.02  # what was planted does not relax
+    assert document["relaxation"]["part"]["low"] < 0.02  # the simulated finger does not relax
     scene, _ = finger_in(out)
     depth = np.array([0.4, 0.8, 1.1])
     own = law([scene.materials.of(name).E for name in ("epidermis", "dermis", "fat")], depths=depth)

@@ -24,7 +24,7 @@ from sessions.recording.schema import FORMAT_VERSION  # noqa: E402
 from sessions.run.runner import run_session  # noqa: E402
 from sessions.run.steps import AskStroke  # noqa: E402
 
-NORMAL, TANGENTIAL, SPEED = 2.0, 1.0, 20.0  # N, N, mm/s: what was planted
+NORMAL, TANGENTIAL, SPEED = 2.0, 1.0, 20.0  # N, N, mm/s: the ground truth
 
 
 class Slider(StandIn):

@@ -307,7 +307,7 @@ def run_faulty_course_once(name, folder):
 
 
 def run_status_course(name, folder):
-    """Plant each status that the maker lists, in turn; return the device's info and health before and after each."""
+    """Set each status that the maker lists, in turn; return the device's info and health before and after each."""
     clock, faults, health_by_status = PacedClock(1.0), Faults(), {}
     with running_device(name, faults, clock, folder) as device, connect(device.uri, clock) as connection:
         transducer, now = connection.transducer, connection.bench_now or device.now

@@ -20,7 +20,7 @@ OFFSET = (1.0, -2.0, 3.5, 40.0, -50.0, 60.0)  # N, N mm
 STILL = BenchSettings(noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_torque=0.0, offset=OFFSET)
 
 
-def test_the_netft_package_reads_the_planted_wrench_from_the_networked_box():
+def test_the_netft_package_reads_the_simulated_wrench_from_the_networked_box():
     module = pytest.importorskip("NetFT")
     box = NetFtBox(Bench(3, STILL), RealClock())
     box.start()

@@ -1,4 +1,4 @@
-"""Presses of fingers whose layers are planted: forces from the solver itself, or by a power of depth."""
+"""Presses of fingers whose layers are known: forces from the solver itself, or by a power of depth."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from solver import Friction, Loading, Material, Materials, Scene, Solve, solve_m
 LAYERS = ("epidermis", "dermis", "fat")
 PUBLISHED = np.array([0.136, 0.08, 0.034])  # [MPa], the paper's Table 3
 SPREAD = float(np.log(2.0))  # standard deviation of each log stiffness in the prior
-DEPTHS = np.geomspace(0.05, 1.8, 20)  # depths at which a planted finger is solved [mm]
+DEPTHS = np.geomspace(0.05, 1.8, 20)  # depths at which a simulated finger is solved [mm]
 
 
 def published():

@@ -16,7 +16,7 @@ def test_three_turns_make_four_strokes_each_with_its_direction_friction_and_spee
 
 
 def test_a_way_begins_where_the_drag_changes_its_sign():
-    """Planted: T goes through zero 0.05 s after each turn, at 2.5, 4 and 5.5 s."""
+    """Simulated: T goes through zero 0.05 s after each turn, at 2.5, 4 and 5.5 s."""
     strokes = analyse(block(T, noisy(to_and_fro(T)))).strokes
     assert [stroke.onset for stroke in strokes[1:]] == pytest.approx([2.55, 4.05, 5.55], abs=0.01)
     assert [stroke.lift for stroke in strokes[:-1]] == [stroke.onset for stroke in strokes[1:]]

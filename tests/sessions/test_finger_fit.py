@@ -1,4 +1,4 @@
-"""A finger's stiffnesses from presses: planted ones come back, and what cannot be told apart is not told apart."""
+"""A finger's stiffnesses from presses: known ones are recovered, and what cannot be told apart is not told apart."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_a_calibration_that_is_off_by_5_per_cent_widens_the_overall_stiffness_by
 
 
 @pytest.mark.slow
-def test_intervals_hold_planted_stiffnesses_as_often_as_they_say():
+def test_intervals_hold_true_stiffnesses_as_often_as_they_say():
     model, rng = power_law_model(SPREAD, error=1e-5), np.random.default_rng(4)
     inside, count = 0, 60
     for _ in range(count):
@@ -126,7 +126,7 @@ def test_a_finger_all_of_whose_layers_are_twice_as_stiff_is_found_twice_as_stiff
 
 
 @pytest.mark.slow
-def test_planted_layers_lie_in_their_intervals_and_the_force_in_between_within_5_per_cent(model, true_force):
+def test_known_layers_lie_in_their_intervals_and_the_force_in_between_within_5_per_cent(model, true_force):
     finger_fit = fit(model, presses(true_force, 0.01, np.random.default_rng(3)))
     best = np.array([layer.stiffness.value for layer in finger_fit.layers])
     for layer_fit, true in zip(finger_fit.layers, STIFFNESSES, strict=True):
@@ -147,7 +147,7 @@ def test_friction_that_nobody_allows_for_is_taken_for_stiffness_and_one_that_is_
 
 
 @pytest.mark.slow
-def test_of_100_planted_fingers_intervals_hold_90_to_98_per_cent_and_forces_held_out_lie_within_5(model):
+def test_of_100_simulated_fingers_intervals_hold_90_to_98_per_cent_and_forces_held_out_lie_within_5(model):
     rng = np.random.default_rng(20)
     inside, deviations, test_depths = [], [], np.array([0.5, 0.85, 1.2, 1.55])
     for _ in range(100):

@@ -1,4 +1,4 @@
-"""Every flaw there is fires on the fault it is named after, planted in closed form, and costs what it says."""
+"""Every flaw there is fires on the fault it is named after, simulated in closed form, and costs what it says."""
 
 from dataclasses import dataclass, field, replace
 

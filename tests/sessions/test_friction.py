@@ -60,7 +60,7 @@ def test_cross_talk_and_lean_widen_the_intervals_of_mu_and_tau_max_as_the_closed
     assert (high - low) / 2.0 == pytest.approx(1.95996 * (cross_talk + lean) * 2.0 / 100.0, rel=0.1)
 
 
-def test_of_benches_whose_gains_are_off_the_interval_of_mu_holds_what_was_planted_in_nine_of_ten():
+def test_of_benches_whose_gains_are_off_the_interval_of_mu_holds_the_true_one_in_nine_of_ten():
     draw = np.random.default_rng(3)
     coverage = []
     for seed in range(60):

@@ -1,4 +1,4 @@
-"""Psychometric functions: against R's probit, psignifit, another maximiser, and planted observers."""
+"""Psychometric functions: against R's probit, psignifit, another maximiser, and simulated observers."""
 
 import math
 
@@ -132,7 +132,7 @@ STICKY = tuple(math.log(mu / 0.48) for mu in (0.28, 0.44, 0.64, 0.67))  # of the
 @pytest.mark.parametrize(
     ("ratios", "lapse", "correlation"), [(SIX, 0.04, 0.0), (SIX, 0.0, 0.0), (STICKY, 0.04, 0.0), (SIX, 0.04, 0.05)]
 )
-def test_intervals_hold_planted_observers_in_90_to_98_of_a_hundred(ratios, lapse, correlation):
+def test_intervals_hold_the_values_of_simulated_observers_in_90_to_98_of_a_hundred(ratios, lapse, correlation):
     parameters, coverage, fits = (0.05, 0.25, lapse, 0.04), np.zeros(4), 0
     for study in range(200):
         fit = psychometric(observer(np.random.default_rng([5, study]), ratios, 10, parameters, correlation))

@@ -1,4 +1,4 @@
-"""How a finger relaxes, from presses that are held: planted parts and times come back, short holds are told."""
+"""How a finger relaxes, from presses that are held: known parts and times are recovered, short holds are named."""
 
 from dataclasses import replace
 
@@ -42,7 +42,7 @@ def hold_curve(elastic, press, part, tau, rng, rise=0.5, hold=3.0, size=1.0):
 
 
 @pytest.mark.parametrize(("part", "tau"), [(0.4, 0.8), (0.2, 0.3)])
-def test_a_planted_part_and_time_come_back_within_their_intervals(model, elastic, part, tau):
+def test_intervals_hold_a_known_part_and_time(model, elastic, part, tau):
     rng = np.random.default_rng(2)
     estimate = relaxation(model, elastic, [hold_curve(elastic, press, part, tau, rng, size=1.3) for press in (0, 1)])
     assert estimate.part.low <= part <= estimate.part.high

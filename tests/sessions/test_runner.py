@@ -84,7 +84,7 @@ def test_the_events_of_a_trial_come_in_their_order(whole):
 def test_the_zero_is_recorded_with_mean_spread_and_duration_and_nothing_is_subtracted(whole):
     _, recording = whole
     zero = next(event.data for event in recording.events if event.kind == "zeroed")
-    # Planted: a bias of 0.1 N on Fz, hence -1e5 counts, with noise of 4e3 counts over 100 readings.
+    # Simulated: a bias of 0.1 N on Fz, hence -1e5 counts, with noise of 4e3 counts over 100 readings.
     assert zero["mean"][2] == pytest.approx(-1e5, abs=5 * 4e3 / 10)
     assert zero["spread"][2] == pytest.approx(4e3, rel=0.3)
     assert zero["normal_force"] == pytest.approx(0.1, abs=0.002)
@@ -97,7 +97,7 @@ def test_the_zero_is_recorded_with_mean_spread_and_duration_and_nothing_is_subtr
     assert block.raw[untouched, 2].mean() == pytest.approx(-1e5, abs=1e3)
 
 
-def test_onset_and_lift_are_seen_at_the_readings_where_they_were_planted(whole):
+def test_onset_and_lift_are_seen_at_their_true_readings(whole):
     session, recording = whole
     onsets = [event.data["time"] for event in recording.events if event.kind == "contact_onset"]
     lifts = [event.data["time"] for event in recording.events if event.kind == "finger_lifted"]

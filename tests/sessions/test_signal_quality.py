@@ -1,6 +1,6 @@
 """An axis that clips or freezes alone, and a wild reading, are named without a rated range; coarse steps are neither.
 
-Three strokes of 4 N with a ratio of 0.68 are planted in closed form; the calibration states no rated range.
+Three strokes of 4 N with a ratio of 0.68 are simulated in closed form; the calibration states no rated range.
 """
 
 from dataclasses import replace

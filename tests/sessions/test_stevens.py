@@ -1,4 +1,4 @@
-"""Stevens' exponent: exact laws, a planted exponent under errors in both, and Deming's closed form."""
+"""Stevens' exponent: exact laws, a known exponent under errors in both, and Deming's closed form."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_subjects_who_are_all_alike_give_no_interval():
 
 
 @pytest.mark.parametrize("subjects", [4, pytest.param(12, marks=pytest.mark.slow)])
-def test_intervals_hold_the_planted_exponent_in_90_of_a_hundred_studies_or_more(subjects):
+def test_intervals_hold_the_true_exponent_in_90_of_a_hundred_studies_or_more(subjects):
     exponents = [stevens_exponent(*study(np.random.default_rng([4, n]), 1.1, subjects)) for n in range(150)]
     coverage = [exponent.deming[1] <= 1.1 <= exponent.deming[2] for exponent in exponents]
     assert np.mean(coverage) >= 0.90  # three standard errors of 150 below 95 %

@@ -1,4 +1,4 @@
-"""How the face leans, told from presses: the lean is planted by turning a whole bench in closed form."""
+"""How the face leans, told from presses: the lean is simulated by turning a whole bench in closed form."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ def presses(pushes=(0.0, 0.0, 0.0)):
     return clean
 
 
-def test_a_lean_that_was_planted_comes_back_within_its_interval():
+def test_the_interval_of_a_lean_holds_the_true_one():
     tilt = analyse(block(T, noisy(leaning(presses())))).tilt
     assert len(tilt.presses) == 3
     assert tilt.lean == pytest.approx(LEAN, abs=0.05)
@@ -74,7 +74,7 @@ def test_a_stroke_tells_no_lean():
 
 
 def test_levelling_takes_the_error_of_the_lean_out_of_friction():
-    """mu is off by about e (1 + mu^2) under a lean of e along the stroke; levelled it is the planted one."""
+    """mu is off by about e (1 + mu^2) under a lean of e along the stroke; levelled it is the true one."""
     raw = noisy(leaning(slide(T, mu=0.5)))
     (leant,) = analyse(block(T, raw)).strokes
     assert leant.mu_dynamic - 0.5 == pytest.approx(np.radians(-LEAN[0]) * 1.25, rel=0.1)

@@ -54,7 +54,7 @@ def test_mu_tau_max_speed_and_direction_lie_in_the_wrench(surface, seed):
     assert truth.speed == pytest.approx(surface.speed, rel=0.1)
 
 
-def test_onset_and_lift_are_where_the_planted_force_crosses_three_deviations_of_the_noise():
+def test_onset_and_lift_are_where_the_true_force_crosses_three_deviations_of_the_noise():
     bench, truth = stroked_bench(SURFACES["stickiness", 50], at=3.0)
     times = np.array([truth.onset - 2e-5, truth.onset + 2e-5, truth.lift - 2e-5, truth.lift + 2e-5])
     normal = -bench.true_wrench(times)[:, 2]

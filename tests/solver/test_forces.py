@@ -281,7 +281,7 @@ def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_
 
 
 def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(monkeypatch):
-    """Planted: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
+    """Simulated: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
     press = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
     expected, of_depth, march = solve(press), existence.of_depth, load_stepping.march
 

@@ -1,4 +1,4 @@
-"""Surveys of error estimates: stored answers are not solved again, and each planted error counts."""
+"""Surveys of error estimates: stored answers are not solved again, and each injected error counts."""
 
 import sys
 from dataclasses import replace

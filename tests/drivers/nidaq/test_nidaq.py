@@ -54,7 +54,7 @@ def test_a_device_that_takes_another_range_than_asked_is_refused(library, addres
         open_nidaq(address, RealClock(), Deadline.for_opening())
 
 
-def test_its_readings_are_the_planted_wrench_at_the_rate_read_back(library, address):
+def test_its_readings_are_the_simulated_wrench_at_the_rate_read_back(library, address):
     transducer = open_nidaq(address, RealClock(), Deadline.for_opening())
     transducer.start()
     block = readings(transducer, 300)
