@@ -2,7 +2,7 @@
 
 A rival is decided where its Akaike weight is at least 0.95.
 
-Run from the repository's root: python -m benchmarks.rival_recovery [STUDIES [SEED [DESIGN ...]]]; 200 of each planted
+Run from the repository's root: python -m benchmarks.rival_recovery [STUDIES [SEED [DESIGN ...]]]; 200 of each
 quantity by default. Prints a table for the documentation.
 """
 
@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sessions.prediction.surface_series import AREA, StudyDesign, planted_strokes
-from sessions.statistics.power import PlantedEffects, preferred_rivals, study_weights, twins
+from sessions.prediction.surface_series import AREA, StudyDesign, simulated_strokes
+from sessions.statistics.power import AssumedEffects, preferred_rivals, study_weights, twins
 from solver.quantities import NAMES
 from solver.scene.published import STICKINESS
 
-PLANTED = ("mu", "tau_max", "sed", "shear_along_skin", "stretch_along_skin", "pressure")
+TRUE_QUANTITIES = ("mu", "tau_max", "sed", "shear_along_skin", "stretch_along_skin", "pressure")
 DECIDED = 0.95  # Akaike weight, as a posterior probability under equal priors
-EFFECTS = PlantedEffects(25.0 * 12.0**0.5, noise=4.0, level_sd=3.0, slope_sd=0.0)  # 25 points a standard deviation
+EFFECTS = AssumedEffects(25.0 * 12.0**0.5, noise=4.0, level_sd=3.0, slope_sd=0.0)  # 25 points a standard deviation
 POOL = 60  # simulated people whose strokes are predicted once; each study draws from them
 SPEEDS = (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5)  # [mm/s]
 WIDE_FORCES = (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2)  # in no order of friction [N]
@@ -50,39 +50,39 @@ CROSSED = StudyDesign(
 STUDIES = (Study("10 × 5", 10, PAPER), Study("20 × 12", 20, WIDE), Study("24 × 8 × 3", 24, CROSSED))
 
 
-def row(study: Study, planted: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
-    """Return a row of the table: how often what was planted, a twin of it, and a wrong one is preferred or decided."""
+def row(study: Study, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
+    """Return a row of the table: how often the quantity, a twin of it, and a wrong one is preferred or decided."""
     first = preferred_rivals(weights)
     sure = [name for name, one in zip(first, weights, strict=True) if one[name] >= DECIDED]
     wrong = [name for name in first if name not in alike]
     most = f"`{max(sorted(set(wrong)), key=wrong.count)}`" if wrong else "–"
     counts = [
-        first.count(planted),
+        first.count(quantity),
         sum(name in alike for name in first),
-        sum(name in NAMES and (planted not in NAMES or name not in alike) for name in first),
-        sure.count(planted),
+        sum(name in NAMES and (quantity not in NAMES or name not in alike) for name in first),
+        sure.count(quantity),
         sum(name not in alike for name in sure),
     ]
     shares = " | ".join(f"{100 * count / len(weights):.1f} %" for count in counts)
-    return f"| {study.name} | `{planted}` | {len(alike) - 1} | {shares} | {most} |"
+    return f"| {study.name} | `{quantity}` | {len(alike) - 1} | {shares} | {most} |"
 
 
 def main() -> None:
     """Print the table."""
     count, seed = (int(sys.argv[1]) if len(sys.argv) > 1 else 200), (int(sys.argv[2]) if len(sys.argv) > 2 else 1)
-    head = "study | planted | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
+    head = "study | true | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
     print(f"| {head} | wrong most often |")
     print("| --- " * (head.count("|") + 2) + "|")
     only = sys.argv[3:]
     for number, study in enumerate(STUDIES):
         if only and str(number) not in only:
             continue
-        pool = planted_strokes(study.design, POOL, np.random.default_rng([seed, number]))
+        pool = simulated_strokes(study.design, POOL, np.random.default_rng([seed, number]))
         surfaces = len(study.design.mu)
-        for planted in PLANTED:
-            draw = np.random.default_rng([seed, number, PLANTED.index(planted)])
-            weights = [study_weights(pool, study.people, surfaces, planted, EFFECTS, draw) for _ in range(count)]
-            print(row(study, planted, twins(pool, planted), weights), flush=True)
+        for quantity in TRUE_QUANTITIES:
+            draw = np.random.default_rng([seed, number, TRUE_QUANTITIES.index(quantity)])
+            weights = [study_weights(pool, study.people, surfaces, quantity, EFFECTS, draw) for _ in range(count)]
+            print(row(study, quantity, twins(pool, quantity), weights), flush=True)
 
 
 if __name__ == "__main__":

@@ -153,7 +153,7 @@ class NewSessionPage(Panel):
         if self.simulated.isChecked():
             words = tr(
                 "Nobody is needed: strokes and scores are simulated, and marked so. "
-                "A sample of your own has the friction that its protocol plants; without, the nearest of ten stands in."
+                "A sample of your own has the friction that its protocol sets; without, the nearest of ten stands in."
             )
         elif bench.simulated and self.with_forces.isChecked():
             words = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")

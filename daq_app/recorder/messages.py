@@ -58,7 +58,7 @@ class People:
 
     kind: Kind = "people"
     seed: int = 0  # of the simulated subject
-    planted: tuple[tuple[str, int, float], ...] = ()  # descriptor, index and friction of simulated surfaces [-]
+    friction: tuple[tuple[str, int, float], ...] = ()  # descriptor, index and friction of simulated surfaces [-]
 
 
 class StartSession(Struct, frozen=True):

@@ -18,7 +18,7 @@ from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display
 from daq_app.recorder.pipes import Inbox
-from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, SimulatedSubject, planted_surface
+from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, SimulatedSubject, simulated_surface
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
@@ -85,7 +85,7 @@ def _windows(state: int) -> bool:
 LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"
 ANY_FOLDER = "recorded in an unsafe folder"  # name of a setting
-PLANTED = "planted friction"  # likewise: descriptor, index and friction of simulated surfaces
+SURFACE_FRICTION = "planted friction"  # likewise: descriptor, index and friction of simulated surfaces
 Send = Callable[[m.Report], None]
 
 
@@ -146,7 +146,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     going_on, gap = resuming.continue_clock(recording, last, clock, datetime.now(UTC))
     people = _recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
-        people = replace(request.people, planted=people.planted)
+        people = replace(request.people, friction=people.friction)
     info = _reopen(request, recording, bench)
     _check_people(people, recording.plan, bench, folder)
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
@@ -200,9 +200,9 @@ def _recorded_people(recording: Recording) -> m.People:
     """Return who did what was asked for when the session began."""
     values = _recorded_settings(recording)
     with suppress(msgspec.DecodeError, msgspec.ValidationError):
-        planted = msgspec.json.decode(values.get(PLANTED, "[]"))
+        friction = msgspec.json.decode(values.get(SURFACE_FRICTION, "[]"))
         return msgspec.convert(
-            {"kind": values["people"], "seed": values.get("people seed", 0), "planted": planted}, m.People
+            {"kind": values["people"], "seed": values.get("people seed", 0), "friction": friction}, m.People
         )
     return m.People()
 
@@ -279,9 +279,9 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
 
     if people.kind == "simulated people":
         return SimulatedPeople(
-            subject, prepared.clock, connected, lambda trial: planted_surface(known(trial), people.planted)
+            subject, prepared.clock, connected, lambda trial: simulated_surface(known(trial), people.friction)
         )
-    return SimulatedHand(subject, connected, lambda trial: planted_surface(known(trial), people.planted))
+    return SimulatedHand(subject, connected, lambda trial: simulated_surface(known(trial), people.friction))
 
 
 def _index_of(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
@@ -311,8 +311,8 @@ def _people_settings(people: m.People, uri: str | None) -> list[Setting]:
     settings = [Setting("people", people.kind, "", "set")]
     if people.kind != "people":
         settings.append(Setting("people seed", people.seed, "", "set"))
-    if people.planted:
-        settings.append(Setting(PLANTED, msgspec.json.encode(people.planted).decode(), "", "set"))
+    if people.friction:
+        settings.append(Setting(SURFACE_FRICTION, msgspec.json.encode(people.friction).decode(), "", "set"))
     if uri is not None:
         settings.append(Setting("device", without_home(uri), "", "set"))
     return settings

@@ -1,4 +1,4 @@
-"""A whole study of simulated people, from plan to sealed folders: what was planted and spoilt is known.
+"""A whole study of simulated people, from plan to sealed folders, with its ground truth and faults.
 
 Ten subjects stroke and score the ten surfaces of the paper. Fingers differ in friction, transducers in calibration,
 people in how they use the scale; scores follow the maker's index and the friction that a subject's own finger feels,
@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from daq_app.console import Console, RecordingKept
-from daq_app.simulation.wiring import INPUT, Connection, SimulatedPeople, connect, planted_surface
+from daq_app.simulation.wiring import INPUT, Connection, SimulatedPeople, connect, simulated_surface
 from drivers.clock import Clock, SimulatedClock
 from sessions.file_access import holds_something, write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
@@ -33,7 +33,7 @@ from sessions.report.contents import GroundTruth
 from sessions.run import steps
 from sessions.run.resuming import RESUMABLE
 from sessions.run.runner import RunnerSettings, SessionEnd, Status, run_session
-from sessions.statistics.findings import Spoilt
+from sessions.statistics.findings import GROUND_TRUTH_FILE, VisitFaults
 from sessions.statistics.visit import EXCLUSIONS
 from sessions.strokes.stroke import FIXED, AreaLaw
 from simulators.bench import Bench, BenchSettings, DirectTransducer
@@ -101,11 +101,11 @@ class StudyCutShort(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Where the visits lie, and what was planted in the one with forces."""
+    """Where the visits lie, and the ground truth of the one with forces."""
 
     scored: tuple[Path, ...]  # a folder a subject
     stroked: Path
-    planted: tuple[GroundTruth, ...]  # a row a trial
+    ground_truth: tuple[GroundTruth, ...]  # a row a trial
     readings: int
     lost: int
 
@@ -133,11 +133,11 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
     with connect(f"sim:?seed={seed}&rate=200", clock) as bench:
         people = SimulatedPeople(SimulatedSubject(own), clock, bench)
         end = visit(plan(chosen, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
-        planted = tuple(
+        ground_truth = tuple(
             GroundTruth(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
             for trial, stroke in people.strokes.items()
         )
-    return Study(tuple(scored), folder, planted, end.readings, end.health.lost)
+    return Study(tuple(scored), folder, ground_truth, end.readings, end.health.lost)
 
 
 def _seed(study: int, subject: int) -> int:
@@ -149,7 +149,6 @@ def _study_seed(seed: int) -> Setting:
     return Setting("study seed", seed, "", "set")
 
 
-PLANTED = "planted.json"
 DAMAGED = "S11"
 PEOPLE = SubjectSettings(
     gain=0.75,
@@ -173,43 +172,43 @@ subject = "S07"
 why = "used both scales backwards, and said so afterwards"
 who = "simulated experimenter"
 """
-SPOILT: Mapping[str, Spoilt] = {
-    "S02": Spoilt(lost=3, expected="trial 3: lost_readings"),
-    "S04": Spoilt(frozen=6, expected="trial 6: frozen_sensor"),
-    "S05": Spoilt(light=2, expected="trial 2: too_little_force"),
-    "S06": Spoilt(unanswered=8, expected="trial 8 has no score"),
-    "S07": Spoilt(reversed=True, expected="the scale was used backwards"),
-    "S09": Spoilt(aborted=9, expected="trials 9 and 10 were not done"),
+FAULTS: Mapping[str, VisitFaults] = {
+    "S02": VisitFaults(lost=3, expected="trial 3: lost_readings"),
+    "S04": VisitFaults(frozen=6, expected="trial 6: frozen_sensor"),
+    "S05": VisitFaults(light=2, expected="trial 2: too_little_force"),
+    "S06": VisitFaults(unanswered=8, expected="trial 8 has no score"),
+    "S07": VisitFaults(reversed=True, expected="the scale was used backwards"),
+    "S09": VisitFaults(aborted=9, expected="trials 9 and 10 were not done"),
 }
 
 
 def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJECTS) -> None:
-    """Write the study below `out`: a folder a visit, one that is damaged, decisions, and `planted.json`.
+    """Write the study below `out`: a folder a visit, one that is damaged, decisions, and the ground truth.
 
     The same seed gives the same readings and answers. Raises RecordingError where `out` cannot be used.
     """
-    planted = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
+    strokes = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
     (out / DAMAGED).mkdir()
     (out / DAMAGED / LIVE_FILE).write_bytes((out / "S01" / LIVE_FILE).read_bytes()[:1000])
     (out / EXCLUSIONS).write_text(DECISIONS, encoding="utf-8")
     write_json(
-        out / PLANTED,
+        out / GROUND_TRUTH_FILE,
         {
-            "SIMULATED": "SIMULATED: this is what was planted in a simulated study",
+            "SIMULATED": "SIMULATED: this is the ground truth of a simulated study",
             "seed": seed,
-            "score": planted_slopes(PEOPLE),
+            "score": true_slopes(PEOPLE),
             "people": asdict(PEOPLE),
             "calibration_sd": CALIBRATION,
             "spoilt": {
-                **{code: asdict(spoilt) for code, spoilt in SPOILT.items() if int(code[1:]) <= subjects},
-                DAMAGED: asdict(Spoilt(expected="the file is damaged")),
+                **{code: asdict(faults) for code, faults in FAULTS.items() if int(code[1:]) <= subjects},
+                DAMAGED: asdict(VisitFaults(expected="the file is damaged")),
             },
-            "strokes": [row for rows in planted for row in rows],
+            "strokes": [row for rows in strokes for row in rows],
         },
     )
 
 
-def planted_slopes(people: SubjectSettings) -> dict[str, Any]:
+def true_slopes(people: SubjectSettings) -> dict[str, Any]:
     """Return the slopes of these people's scores on index, µ by descriptor, trials before and index before."""
     judgements = {name: SimulatedSubject(0, people).by_friction(name) for name in ("stickiness", "slipperiness")}
     by_index = people.gain * (1.0 - people.friction_weight)
@@ -217,19 +216,19 @@ def planted_slopes(people: SubjectSettings) -> dict[str, Any]:
 
 
 def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
-    """Record one subject's visit and return what was planted in it, a row a stroke."""
+    """Record one subject's visit and return its ground truth, a row a stroke."""
     subject, own = f"S{number:02d}", _seed(seed, number)
-    spoilt = SPOILT.get(subject, Spoilt(expected=""))
+    faults = FAULTS.get(subject, VisitFaults(expected=""))
     gains = np.random.default_rng([own, 7]).normal(1.0, CALIBRATION, 6)
     a, b, c, d, e, f = gains.tolist()
     bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
     clock = SimulatedClock()
-    transducer = DirectTransducer(bench, clock, lost=spoilt.lost, frozen=spoilt.frozen)
-    settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
+    transducer = DirectTransducer(bench, clock, lost=faults.lost, frozen=faults.frozen)
+    settings = replace(PEOPLE, gain=-PEOPLE.gain) if faults.reversed else PEOPLE
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
     planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
     people = SyntheticPeople(
-        SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), planned, spoilt
+        SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), planned, faults
     )
     study, run = [_study_seed(seed)], RunnerSettings(tick=TICK)
     conduct(planned, out / subject, people, console, settings=study, run=run, durable=False)
@@ -250,17 +249,17 @@ class SyntheticPeople(SimulatedPeople):
     """Simulated people whose finger, calibration and visit are their own, and what goes wrong in it."""
 
     def __init__(
-        self, subject: SimulatedSubject, clock: Clock, bench: Connection, planned: SessionPlan, spoilt: Spoilt
+        self, subject: SimulatedSubject, clock: Clock, bench: Connection, planned: SessionPlan, faults: VisitFaults
     ) -> None:
         super().__init__(subject, clock, bench, self._perceived_surface)
-        self._plan, self._spoilt = planned, spoilt
+        self._plan, self._faults = planned, faults
 
     def show(self, command: steps.Command) -> None:
-        """Do what the command asks for, but for what is spoilt."""
+        """Do what the command asks for, but for what goes wrong."""
         match command:
-            case steps.AskMount(trial) if trial.number == self._spoilt.aborted:
+            case steps.AskMount(trial) if trial.number == self._faults.aborted:
                 self.put(steps.Abort("the subject had to leave"))
-            case steps.AskScore(trial) if trial.number == self._spoilt.unanswered:
+            case steps.AskScore(trial) if trial.number == self._faults.unanswered:
                 self.put(steps.Scored(None, (), None, 0, None, INPUT), self.judging)
             case _:
                 super().show(command)
@@ -283,8 +282,8 @@ class SyntheticPeople(SimulatedPeople):
         return block, place, block.trials[place - 1].stimulus.known_index if place else None
 
     def _perceived_surface(self, trial: Trial) -> Surface:
-        surface = self.subject.perceived_surface(planted_surface(trial))
-        light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
+        surface = self.subject.perceived_surface(simulated_surface(trial))
+        light = LIGHT / surface.peak_normal_force if trial.number == self._faults.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
 
@@ -299,32 +298,32 @@ _FINGERS = np.linspace(-4.0, 4.0, 9)  # solved: friction of the finger, in its s
 
 
 @dataclass(frozen=True, slots=True)
-class PlantedRelation:
+class PopulationRelation:
     """How single scores go with SEDs within people at large."""
 
     r: float  # with the noise of judgement [-]
     slope: float  # drift and carry-over accounted for [points per kPa]
 
 
-def planted_relations(
+def population_relations(
     people: Mapping[str, float], options: PredictionOptions, area: AreaLaw
 ) -> dict[str, dict[str, float]]:
     """Return the relation for each descriptor with the SEDs of the published finger, which simulated people have.
 
-    None where a law of the area tells another tau_max than the planted one, and none at finite strain, where most
+    None where a law of the area tells another tau_max than the true one, and none at finite strain, where most
     sticky surfaces have no settled slide.
     """
     if options.kinematics == "finite" or area != FIXED:
         return {}
-    planted = relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
-    return {descriptor: asdict(relation) for descriptor, relation in planted.items()}
+    by_descriptor = relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
+    return {descriptor: asdict(relation) for descriptor, relation in by_descriptor.items()}
 
 
-def relations(people: SubjectSettings, seds: SedsAt) -> Mapping[str, PlantedRelation]:
+def relations(people: SubjectSettings, seds: SedsAt) -> Mapping[str, PopulationRelation]:
     """Return the relation for each descriptor; none where a surface has no settled slide."""
-    by_descriptor: dict[str, PlantedRelation] = {}
+    by_descriptor: dict[str, PopulationRelation] = {}
     for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
-        surfaces = [planted_surface(trial) for trial in block.trials]
+        surfaces = [simulated_surface(trial) for trial in block.trials]
         at = _seds_of_fingers(surfaces, block, people.moisture, seds)
         if at is not None:
             by_descriptor[surfaces[0].descriptor] = _relation(people, surfaces, at)
@@ -351,7 +350,7 @@ def _seds_of_fingers(
 
 def _relation(
     people: SubjectSettings, surfaces: Sequence[Surface], seds: Callable[[float], Sequence[float]]
-) -> PlantedRelation:
+) -> PopulationRelation:
     products = np.zeros((4, 4))  # of SED, place, index before, and score, each without the person's own mean
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
     for seed in range(_FIRST, _FIRST + DRAWN):
@@ -370,4 +369,4 @@ def _relation(
     noise = people.judgement_noise**2 * DRAWN * (len(surfaces) - 1)
     r = products[0, 3] / math.sqrt(products[0, 0] * (products[3, 3] + noise))
     slope = np.linalg.solve(products[:3, :3], products[:3, 3])[0]
-    return PlantedRelation(float(r), float(slope))
+    return PopulationRelation(float(r), float(slope))

@@ -84,19 +84,19 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
             yield Connection(inner.transducer, bench, box.now)
 
 
-def planted_surface(trial: Trial, planted: Sequence[tuple[str, int, float]] = ()) -> Surface:
+def simulated_surface(trial: Trial, friction: Sequence[tuple[str, int, float]] = ()) -> Surface:
     """Return the simulated surface of a trial, stroked as the trial asks.
 
     The simulated bench holds the ten surfaces of sensotact-friction. For any other stimulus the one with the nearest
     index stands in, of the same descriptor where there is one, so that every protocol can be rehearsed. A protocol
-    may plant friction of its own, as descriptor, index and mu [-]: such a surface is pressed as hard as its stand-in.
+    may set `friction`, as descriptor, index and mu [-]: such a surface is pressed as hard as its stand-in.
     """
     stimulus = trial.stimulus
     surfaces = paper_surfaces().values()
     alike = [surface for surface in surfaces if surface.descriptor == stimulus.descriptor]
     surface = min(alike or surfaces, key=lambda one: abs(one.index - stimulus.known_index))
     surface = replace(surface, direction=trial.direction)
-    for descriptor, index, mu in planted:
+    for descriptor, index, mu in friction:
         if (descriptor, index) == (stimulus.descriptor, stimulus.known_index):
             return replace(surface, mu=mu, tau_max=surface.tau_max * mu / surface.mu, index=index)
     return surface
@@ -109,7 +109,7 @@ class SimulatedHand:
     """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
 
     def __init__(
-        self, subject: SimulatedSubject, bench: Connection | None, surface: SurfaceOf = planted_surface
+        self, subject: SimulatedSubject, bench: Connection | None, surface: SurfaceOf = simulated_surface
     ) -> None:
         """Let the subject stroke the `surface` of each trial, unseen where there is no bench; it is a simulated one."""
         self.subject, self.surface = subject, surface
@@ -158,7 +158,7 @@ class SimulatedPeople(SimulatedHand):
         subject: SimulatedSubject,
         clock: Clock,
         bench: Connection | None = None,
-        surface: SurfaceOf = planted_surface,
+        surface: SurfaceOf = simulated_surface,
     ) -> None:
         """Let the subject answer on the session's clock; for the rest see `SimulatedHand`."""
         super().__init__(subject, bench, surface)

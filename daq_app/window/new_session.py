@@ -133,7 +133,7 @@ def check_form(
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)
     folder = parent / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
     hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
-    people = People("simulated people" if form.simulated else hand, seed, chosen.planted_friction)
+    people = People("simulated people" if form.simulated else hand, seed, chosen.simulated_friction)
     own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
     if form.study.strip() and not form.pilot:
         own.append(Setting("study", form.study.strip(), "", "set"))

@@ -128,8 +128,8 @@ class StudyDesign:
         return cls(tuple(mu), force, (USUAL_SPEED,) * len(force), depths)
 
 
-def planted_strokes(design: StudyDesign, people: int, draw: np.random.Generator) -> Mapping[str, Array]:
-    """Return every quantity of one stroke in each trial (people, surfaces within depths); nan where there is none.
+def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generator) -> Mapping[str, Array]:
+    """Return every quantity of each simulated stroke (people, surfaces within depths); nan where there is none.
 
     Friction, its bound and the normal force vary from stroke to stroke. The quantities of the model are those of the
     published finger in settled sliding at that friction.

@@ -44,13 +44,13 @@ def findings(
     analysis: Analysis,
     prediction: SessionPrediction | None = None,
     scores: Sequence[ScoreTable] | None = None,
-    planted: Sequence[GroundTruth] | None = None,
+    ground_truth: Sequence[GroundTruth] | None = None,
     further: Further | None = None,
 ) -> Report:
     """Return the findings of a session.
 
     `scores` are the tables of further visits, of this subject or others, joined by subject code; the session's own
-    scores are always among them. `planted` is what a simulator planted, trial by trial; None for real sessions.
+    scores are always among them. `ground_truth` is what a simulator set in each trial; None for real sessions.
     `further` is what took more solves, or was asked for.
     """
     plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
@@ -75,7 +75,7 @@ def findings(
         experiments=experiments(plan, tables, visit, analysis.settings.area, more.response),
         course=course(recording),
         fields=fields(prediction),
-        planted=tuple(planted or ()),
+        ground_truth=tuple(ground_truth or ()),
         sealed=visit.sealed if scored and alone.predictions else "",
         modelled=tuple(Fact(*fact) for fact in model_facts(prediction)),
         left_out=omissions(prediction),

@@ -173,7 +173,7 @@ class Report:
     predictions: tuple[PredictionFinding, ...]
     answers: tuple[AnswerFinding, ...] = ()  # of the subject, in the order of its trials
     fields: tuple[Field, ...] = ()
-    planted: tuple[GroundTruth, ...] = ()
+    ground_truth: tuple[GroundTruth, ...] = ()
     modelled: tuple[Fact, ...] = ()
     left_out: tuple[Fact, ...] = ()
     again: tuple[Fact, ...] = ()  # everything needed to do it again ...

@@ -52,10 +52,10 @@ def summary(study: StudyFindings) -> list[str]:
     sentences += chain.from_iterable(map(psychometric_sentences, study_functions(study)))
     if (f := study.friction) is not None:
         sentences.append(
-            f"Of {f.strokes} strokes the planted µ came back with a median error of "
+            f"The µ of {f.strokes} strokes was estimated with a median error of "
             f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
-            f"{f.covered} of {f.intervals} intervals of µ hold it, and those of one subject hold or miss together, for "
-            "the error of a transducer's calibration is one for all its strokes."
+            f"{f.covered} of {f.intervals} intervals hold the true µ, and those of one subject hold or miss together, "
+            "for the error of a transducer's calibration is one for all its strokes."
         )
     return sentences
 

@@ -1,4 +1,4 @@
-"""What a study finds, as plain data, and what was planted in a simulated one beside what is found of it."""
+"""What a study finds, as plain data, and how a simulated one recovers its ground truth."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -120,37 +120,36 @@ class DescriptorFindings:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class EffectRecovery:
-    """One planted effect beside the study's estimate of it."""
+class EffectRecovery(msgspec.Struct, frozen=True):
+    """The true value of an effect beside the study's estimate of it."""
 
     descriptor: str
     effect: str
-    planted: float
+    true_value: float = msgspec.field(name="planted")
     estimate: float
     low: float
     high: float
 
     @property
     def covered(self) -> bool:
-        """Say whether the interval holds what was planted."""
-        return self.low <= self.planted <= self.high
+        """Say whether the interval holds the true value."""
+        return self.low <= self.true_value <= self.high
 
 
 @dataclass(frozen=True, slots=True)
-class PlantedFriction:
-    """How friction of all strokes was recovered."""
+class FrictionRecovery:
+    """How well the mu of all strokes was estimated."""
 
-    strokes: int  # with a planted and a found mu
+    strokes: int  # with a true and an estimated mu
     median_error: float  # of mu, relative [-]
     worst_error: float
     intervals: int  # of mu that are given
-    covered: int  # of them hold what was planted
+    covered: int  # of them hold the true one
 
 
 @dataclass(frozen=True, slots=True)
-class PlantedFlaw:
-    """What was spoilt in one session, and whether the study says so."""
+class FlawDetection:
+    """What went wrong in one simulated session, and whether the study says so."""
 
     session: str
     expected: str  # for people
@@ -169,23 +168,25 @@ class StudyFindings:
     excluded: tuple[Exclusion, ...]
     reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
     descriptors: tuple[DescriptorFindings, ...]
-    effects: tuple[EffectRecovery, ...]  # planted, where the study is synthetic
-    friction: PlantedFriction | None
-    flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
+    effects: tuple[EffectRecovery, ...]  # where the study is synthetic
+    friction: FrictionRecovery | None
+    flaws: tuple[FlawDetection, ...] = ()  # where the study is synthetic
     synthetic: int | None = None  # the seed, where it is
     response: str = SED.name  # the quantity of the model that is held against scores
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         document: dict[str, Any] = {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
-        # Names until 2026-11-26, which stay for one release
-        for effect in document["effects"]:
-            effect["found"] = effect["estimate"]
+        # `found` and `both` are names until 2026-11-26, which stay for one release
+        document["effects"] = [msgspec.to_builtins(one) | {"found": one.estimate} for one in self.effects]
         for flaw in document["flaws"]:
             flaw["found"] = flaw["detected"]
         for exponent in filter(None, (one["exponent"] for one in document["descriptors"])):
             exponent["both"] = exponent["deming"]
         return document
+
+
+GROUND_TRUTH_FILE = "planted.json"  # of a simulated study
 
 
 class _Score(msgspec.Struct):
@@ -215,7 +216,7 @@ class _Stroke(msgspec.Struct):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spoilt:
+class VisitFaults:
     """What goes wrong in one subject's visit, by number of the trial; 0: nowhere."""
 
     lost: int = 0
@@ -233,49 +234,49 @@ class _GroundTruth(msgspec.Struct):
     strokes: list[_Stroke]
     calibration_sd: float = 0.0
     relation: dict[str, _Relation] = {}
-    spoilt: dict[str, Spoilt] = {}
+    spoilt: dict[str, VisitFaults] = {}
     seed: int | None = None
 
 
-def check_ground_truth(planted: object) -> dict[str, Any]:
+def check_ground_truth(document: object) -> dict[str, Any]:
     """Return a study's ground truth as its file holds it. Raises ValueError where it has another form."""
-    msgspec.convert(planted, _GroundTruth)
-    return cast("dict[str, Any]", planted)
+    msgspec.convert(document, _GroundTruth)
+    return cast("dict[str, Any]", document)
 
 
-def planted_effects(
-    descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]
+def effect_recoveries(
+    descriptors: Sequence[DescriptorFindings], ground_truth: Mapping[str, Any]
 ) -> tuple[EffectRecovery, ...]:
-    """Return the planted effects on the score, and spreads, beside what the study finds of them.
+    """Return the true effects on the score, and spreads, beside their estimates.
 
-    `planted["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
+    `ground_truth["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
     """
     return tuple(
         EffectRecovery(one.descriptor, name, truth[name], *ends)
         for one in descriptors
-        for truth in [_planted_values(one.descriptor, planted)]
+        for truth in [_true_values(one.descriptor, ground_truth)]
         for name, ends in _estimates(one).items()
         if name in truth
     )
 
 
-def _planted_values(descriptor: str, planted: Mapping[str, Any]) -> dict[str, float]:
-    """Return what was planted of one descriptor, by the names in `UNITS`."""
-    score, people = planted["score"], planted.get("people")
+def _true_values(descriptor: str, ground_truth: Mapping[str, Any]) -> dict[str, float]:
+    """Return the true values of one descriptor, by the names in `UNITS`."""
+    score, people = ground_truth["score"], ground_truth.get("people")
     values = {name: score[key] for name, key in ((INDEX, "gain"), (DRIFT, "drift"), (CARRY_OVER, "carry_over"))}
     values[FRICTION] = score.get("friction", {}).get(descriptor, 0.0)
-    if relation := planted.get("relation", {}).get(descriptor):
+    if relation := ground_truth.get("relation", {}).get(descriptor):
         values |= {WITHIN: relation["r"], SED_TERM: relation["slope"]}
     if people:
         values[LEVELS], values[NOISE] = people["offset_spread"], people["judgement_noise"]
         values[SLOPES] = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
         # A transducer's gains, of drag and of press, differ between visits as fingers do.
-        values[FINGERS] = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
+        values[FINGERS] = math.hypot(people["moisture"], math.sqrt(2.0) * ground_truth.get("calibration_sd", 0.0))
     return values
 
 
 def _estimates(one: DescriptorFindings) -> dict[str, tuple[float, float, float]]:
-    """Return the estimate and the ends of its interval of each effect that may be planted, by its name in `UNITS`.
+    """Return the estimate and the ends of its interval of each effect that has a true value, by its name in `UNITS`.
 
     How scores go with SEDs has the intervals for people at large on these surfaces.
     """
@@ -296,10 +297,10 @@ def _estimates(one: DescriptorFindings) -> dict[str, tuple[float, float, float]]
 _FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}
 
 
-def planted_flaws(
-    visits: Sequence[Visit], failed: Mapping[str, str], spoilt: Mapping[str, Mapping[str, Any]]
-) -> tuple[PlantedFlaw, ...]:
-    """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
+def flaw_detections(
+    visits: Sequence[Visit], failed: Mapping[str, str], faults_by_session: Mapping[str, Mapping[str, Any]]
+) -> tuple[FlawDetection, ...]:
+    """Return for each session with faults whether what it brings, or that it brings nothing, says so."""
     by_session = {visit.session: visit for visit in visits}
     backwards = {subject for subject, _, _ in reversed_subjects([scores_of(visit, visit.rows) for visit in visits])}
 
@@ -317,12 +318,13 @@ def planted_flaws(
         return bool(seen) and all(seen)
 
     return tuple(
-        PlantedFlaw(session, faults["expected"], detected(session, faults)) for session, faults in spoilt.items()
+        FlawDetection(session, faults["expected"], detected(session, faults))
+        for session, faults in faults_by_session.items()
     )
 
 
-def planted_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
-    """Return how the planted µ of the strokes was recovered; None where no stroke has both."""
+def friction_recovery(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> FrictionRecovery | None:
+    """Return how well the µ of the strokes was estimated; None where no stroke has both."""
     truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
     rows = [
         (row, truth[visit.subject, row.trial])
@@ -334,4 +336,4 @@ def planted_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any
         return None
     errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in rows]
     holds = [row.mu_low <= mu <= row.mu_high for row, mu in rows if row.mu_low is not None and row.mu_high is not None]
-    return PlantedFriction(len(rows), float(np.median(errors)), max(errors), len(holds), sum(holds))
+    return FrictionRecovery(len(rows), float(np.median(errors)), max(errors), len(holds), sum(holds))

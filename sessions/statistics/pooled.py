@@ -21,9 +21,9 @@ from sessions.statistics.findings import (
     NormalisedScores,
     StudyFindings,
     SurfaceMean,
-    planted_effects,
-    planted_flaws,
-    planted_friction,
+    effect_recoveries,
+    flaw_detections,
+    friction_recovery,
 )
 from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spreads
 from sessions.statistics.multiverse import PathTrial, path_findings
@@ -71,14 +71,14 @@ def pool_visits(
     visits: Sequence[Visit],
     failed: Sequence[tuple[str, str]] = (),
     exclusions: tuple[Exclusion, ...] = (),
-    planted: Mapping[str, Any] | None = None,
+    ground_truth: Mapping[str, Any] | None = None,
     options: VisitOptions | None = None,
     quantity: Quantity = SED,
 ) -> StudyFindings:
     """Return the findings of all visits together, which are taken in the order of their names.
 
     `options` is what was asked of each visit, `quantity` that response of the model which is held against scores.
-    `planted` is what a synthetic study tells of itself: handed in, used for nothing but the comparison.
+    `ground_truth` is that of a synthetic study; nothing but the comparison uses it.
     """
     ordered = tuple(sorted(visits, key=lambda visit: visit.session))
     same = by_key((visit.sha256, visit.session) for visit in ordered if visit.sha256)
@@ -104,10 +104,10 @@ def pool_visits(
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=descriptors,
-        effects=() if planted is None else planted_effects(descriptors, planted),
-        friction=None if planted is None else planted_friction(ordered, planted["strokes"]),
-        flaws=() if planted is None else planted_flaws(ordered, dict(failed), planted.get("spoilt", {})),
-        synthetic=None if planted is None else planted.get("seed"),
+        effects=() if ground_truth is None else effect_recoveries(descriptors, ground_truth),
+        friction=None if ground_truth is None else friction_recovery(ordered, ground_truth["strokes"]),
+        flaws=() if ground_truth is None else flaw_detections(ordered, dict(failed), ground_truth.get("spoilt", {})),
+        synthetic=None if ground_truth is None else ground_truth.get("seed"),
         response=quantity.name,
     )
 

@@ -1,8 +1,8 @@
 """What a study's design can tell: the power of its own test, and how often it names the quantity that scores follow.
 
-Power is the share of simulated studies whose test finds what is planted. For the second question scores are a line in a
-planted quantity with levels of people and noise. The rivals are all quantities of the report that a stroke has, and the
-one of the greatest Akaike weight is preferred. Twins of the planted quantity go with it over all strokes with r of at
+Power is the share of simulated studies whose test detects the assumed effect. For the second question scores are a line
+in one quantity with levels of people and noise. The rivals are all quantities of the report that a stroke has, and the
+one of the greatest Akaike weight is preferred. Twins of the true quantity go with it over all strokes with r of at
 least 0.99 in size. T is left out: with one area it is the bound itself.
 """
 
@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from drivers.arrays import Array
@@ -23,10 +24,10 @@ FRICTION = (0.24, 0.67)  # least and greatest µ of the published surfaces
 
 
 @dataclass(frozen=True, slots=True)
-class PlantedEffects:
+class AssumedEffects:
     """Effect and spreads of simulated scores. The default values are not measured: a pilot's mixed model gives them."""
 
-    effect: float = 20.0  # of the mean score, from the least to the greatest µ or planted quantity [0–100]
+    effect: float = 20.0  # of the mean score, from the least to the greatest µ or other quantity [0–100]
     noise: float = 12.0  # standard deviation of a score about its subject's line [0–100]
     level_sd: float = 12.0  # between subjects, of the level [0–100]
     slope_sd: float = 0.5  # between subjects, of the effect, by the mean effect [-]
@@ -34,18 +35,18 @@ class PlantedEffects:
 
     @property
     def rise(self) -> float:
-        """The effect of one standard deviation of what is planted, spread evenly over its range [0–100]."""
+        """The effect of one standard deviation of a quantity that is spread evenly over its range [0–100]."""
         return self.effect / math.sqrt(12.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """What a design finds."""
+    """How often studies of one design detect the effect."""
 
     subjects: int
     surfaces: int
-    detections: int  # studies of which the test finds the planted effect with its sign
-    wrong: int  # studies of which it finds the other sign
+    detections: int  # studies of which the test detects the effect with its sign
+    wrong: int  # studies of which it detects the other sign
     studies: int
 
     @property
@@ -60,7 +61,7 @@ class Power:
 
 
 def power(
-    planted: PlantedEffects,
+    effects: AssumedEffects,
     subjects: Sequence[int],
     surfaces: Sequence[int],
     studies: int,
@@ -77,22 +78,22 @@ def power(
     out: list[Power] = []
     for number, (people, count) in enumerate(designs):
         rng = np.random.default_rng([seed, people, count])
-        verdicts = [_verdict(*_study(planted, people, count, rng)) for _ in range(studies)]
-        sign = math.copysign(1.0, planted.effect)
+        verdicts = [_verdict(*_study(effects, people, count, rng)) for _ in range(studies)]
+        sign = math.copysign(1.0, effects.effect)
         out.append(Power(people, count, verdicts.count(sign), verdicts.count(-sign), studies))
         progress((number + 1) / len(designs))
     return out
 
 
 def _study(
-    planted: PlantedEffects, people: int, count: int, rng: np.random.Generator
+    effects: AssumedEffects, people: int, count: int, rng: np.random.Generator
 ) -> tuple[list[str], Array, Array]:
     """Return subject, µ as measured and score of each trial."""
     mu = np.linspace(*FRICTION, count)
-    own = mu * np.exp(rng.normal(0.0, planted.friction_sd, (people, count)))
-    slope = planted.effect * (1.0 + planted.slope_sd * rng.standard_normal((people, 1))) / (FRICTION[1] - FRICTION[0])
-    level = _MIDDLE + planted.level_sd * rng.standard_normal((people, 1))
-    scores = level + slope * (own - np.mean(FRICTION)) + planted.noise * rng.standard_normal((people, count))
+    own = mu * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
+    slope = effects.effect * (1.0 + effects.slope_sd * rng.standard_normal((people, 1))) / (FRICTION[1] - FRICTION[0])
+    level = _MIDDLE + effects.level_sd * rng.standard_normal((people, 1))
+    scores = level + slope * (own - np.mean(FRICTION)) + effects.noise * rng.standard_normal((people, count))
     names = [f"P{number}" for number in range(people) for _ in range(count)]
     return names, own.ravel(), np.clip(scores, *SCALE).ravel()
 
@@ -108,16 +109,15 @@ def _verdict(subjects: Sequence[str], mu: Array, scores: Array) -> float:
 TWIN = 0.99  # correlation over all strokes
 
 
-@dataclass(frozen=True, slots=True)
-class Recovery:
+class Recovery(msgspec.Struct, frozen=True):
     """What the studies of one design prefer."""
 
     people: int
     surfaces: int
     depths: tuple[float, ...]  # [mm]
-    planted: str
+    quantity: str = msgspec.field(name="planted")  # that scores follow
     twins: tuple[str, ...]
-    preferred: float  # share of studies that prefer the planted quantity [-]
+    preferred: float  # share of studies that prefer the true quantity [-]
     family: float  # share that prefer it or a twin [-]
     studies: int
 
@@ -126,40 +126,40 @@ def recovery(
     strokes: Mapping[str, Array],
     people: int,
     depths: tuple[float, ...],
-    planted: str,
-    effects: PlantedEffects,
+    quantity: str,
+    effects: AssumedEffects,
     studies: int,
     draw: np.random.Generator,
 ) -> Recovery:
-    """Return how often studies of so many of the people in `strokes` prefer the planted quantity."""
-    surfaces = strokes[planted].shape[1] // len(depths)
-    weights = [study_weights(strokes, people, surfaces, planted, effects, draw) for _ in range(studies)]
-    alike, first = twins(strokes, planted), preferred_rivals(weights)
-    shares = first.count(planted) / studies, sum(name in alike for name in first) / studies
-    return Recovery(people, surfaces, depths, planted, tuple(sorted(alike - {planted})), *shares, studies)
+    """Return how often studies of so many of the people in `strokes` prefer the quantity that scores follow."""
+    surfaces = strokes[quantity].shape[1] // len(depths)
+    weights = [study_weights(strokes, people, surfaces, quantity, effects, draw) for _ in range(studies)]
+    alike, first = twins(strokes, quantity), preferred_rivals(weights)
+    shares = first.count(quantity) / studies, sum(name in alike for name in first) / studies
+    return Recovery(people, surfaces, depths, quantity, tuple(sorted(alike - {quantity})), *shares, studies)
 
 
 def study_weights(
     strokes: Mapping[str, Array],
     people: int,
     surfaces: int,
-    planted: str,
-    effects: PlantedEffects,
+    quantity: str,
+    effects: AssumedEffects,
     draw: np.random.Generator,
 ) -> dict[str, float]:
     """Return the Akaike weight of each rival in one synthetic study of `people` drawn from `strokes` (people, trials).
 
     Trials go surface by surface within depths.
     """
-    own = draw.choice(len(strokes[planted]), people, replace=False)
+    own = draw.choice(len(strokes[quantity]), people, replace=False)
     values = {name: all_of[own] for name, all_of in strokes.items()}
     usable = np.isfinite(np.stack(list(values.values()))).all(axis=0)
-    known: Array = strokes[planted][np.isfinite(strokes[planted])]
+    known: Array = strokes[quantity][np.isfinite(strokes[quantity])]
     level, noise = draw.standard_normal((people, 1)), draw.standard_normal(usable.shape)
     slope = effects.rise * np.ones((people, 1))
     if effects.slope_sd:
         slope *= 1.0 + effects.slope_sd * draw.standard_normal((people, 1))
-    scores: Array = slope * (values[planted] - known.mean()) / known.std()
+    scores: Array = slope * (values[quantity] - known.mean()) / known.std()
     scores += _MIDDLE + effects.level_sd * level + effects.noise * noise
     subjects, trials = np.nonzero(usable)
     at = (trials % surfaces).tolist()
@@ -176,8 +176,8 @@ def preferred_rivals(weights: Sequence[Mapping[str, float]]) -> list[str]:
     return [max(one, key=one.__getitem__) for one in weights]
 
 
-def twins(strokes: Mapping[str, Array], planted: str) -> set[str]:
-    """Return the planted quantity and those that go with it over all strokes."""
+def twins(strokes: Mapping[str, Array], quantity: str) -> set[str]:
+    """Return the quantity and those that go with it over all strokes."""
     known = np.isfinite(np.stack(list(strokes.values()))).all(axis=0)
-    size = {name: abs(float(np.corrcoef(x[known], strokes[planted][known])[0, 1])) for name, x in strokes.items()}
-    return {name for name, r in size.items() if r >= TWIN} | {planted}
+    size = {name: abs(float(np.corrcoef(x[known], strokes[quantity][known])[0, 1])) for name, x in strokes.items()}
+    return {name for name, r in size.items() if r >= TWIN} | {quantity}

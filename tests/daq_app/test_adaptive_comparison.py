@@ -9,7 +9,7 @@ from test_constant_stimuli import stroked_visit
 
 from daq_app.console import Console
 from daq_app.simulation.synthetic import conduct
-from daq_app.simulation.wiring import SimulatedPeople, planted_surface
+from daq_app.simulation.wiring import SimulatedPeople, simulated_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.orders import next_comparison
 from sessions.plan.plan import Stimulus
@@ -31,7 +31,7 @@ ADAPTIVE = protocol("adaptive-comparison")
 def recording(tmp_path_factory):
     folder, clock = tmp_path_factory.mktemp("adaptive") / "S03", SimulatedClock()
     people = SimulatedPeople(
-        SimulatedSubject(3), clock, None, partial(planted_surface, planted=ADAPTIVE.planted_friction)
+        SimulatedSubject(3), clock, None, partial(simulated_surface, friction=ADAPTIVE.simulated_friction)
     )
     session_plan = plan(ADAPTIVE, "S03", 3, forces=False)
     conduct(session_plan, folder, people, Console(as_json=True), durable=False)
@@ -94,8 +94,8 @@ def test_a_session_compares_what_its_answers_ask_for_and_its_recording_says_so(r
     assert problems(recording.folder) == ()
 
 
-def test_the_function_of_an_adaptive_session_holds_what_was_planted_in_the_subject(recording):
-    (experiment,) = experiments(recording.plan, [], stroked_visit(recording, ADAPTIVE.planted_friction))
+def test_the_intervals_of_an_adaptive_session_hold_the_subject_s_true_values(recording):
+    (experiment,) = experiments(recording.plan, [], stroked_visit(recording, ADAPTIVE.simulated_friction))
     function, truth = experiment.psychometric, SubjectSettings()
     assert function.answers == 40
     assert function.pse.low < 0.0 < function.pse.high

@@ -1,4 +1,4 @@
-"""Constant stimuli from protocol to report: simulated people compare, and what was planted in them comes back."""
+"""Constant stimuli from protocol to report: simulated people compare, and intervals hold their true values."""
 
 from collections import Counter
 from dataclasses import replace
@@ -8,7 +8,7 @@ import pytest
 
 from daq_app.console import Console
 from daq_app.simulation.synthetic import conduct
-from daq_app.simulation.wiring import SimulatedPeople, planted_surface
+from daq_app.simulation.wiring import SimulatedPeople, simulated_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
@@ -34,10 +34,10 @@ def session(folder, seed):
     return Recording.open(folder)
 
 
-def stroked_visit(recording, planted=()):
-    """Return the visit with the friction that the simulated bench plants in every stroke."""
+def stroked_visit(recording, friction=()):
+    """Return the visit with the friction that the simulated bench has in every stroke."""
     visit = visit_of(recording, VisitOptions(), {})
-    mu = {record.trial.number: planted_surface(record.trial, planted).mu for record in recording.trials}
+    mu = {record.trial.number: simulated_surface(record.trial, friction).mu for record in recording.trials}
     return replace(visit, rows=tuple(replace(row, mu=mu[row.trial]) for row in visit.rows))
 
 
@@ -46,7 +46,7 @@ def recording(tmp_path_factory):
     return session(tmp_path_factory.mktemp("constant") / "S03", 3)
 
 
-def test_the_function_of_a_session_holds_what_was_planted_in_the_subject(recording):
+def test_the_intervals_of_a_session_hold_the_subject_s_true_values(recording):
     judged = experiments(recording.plan, [], stroked_visit(recording))
     truth = SubjectSettings()
     for outcome in judged:

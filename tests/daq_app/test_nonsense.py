@@ -17,7 +17,7 @@ from sessions.exchange.session_tables import tables
 from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import reveal
-from sessions.statistics.findings import check_ground_truth, planted_effects, planted_flaws, planted_friction
+from sessions.statistics.findings import check_ground_truth, effect_recoveries, flaw_detections, friction_recovery
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
 NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])
@@ -156,12 +156,12 @@ def pooled_study():
 
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-def test_what_was_planted_is_refused_as_a_whole_or_held_against_what_was_found(pooled_study, data):
+def test_a_ground_truth_is_refused_as_a_whole_or_held_against_the_estimates(pooled_study, data):
     truth = spoil(data, TRUTH)
     try:
         checked = check_ground_truth(truth)
     except ValueError:
         return
-    planted_effects(pooled_study.descriptors, checked)
-    planted_friction(pooled_study.visits, checked["strokes"])
-    assert len(planted_flaws(pooled_study.visits, {}, checked.get("spoilt", {}))) == len(checked.get("spoilt", {}))
+    effect_recoveries(pooled_study.descriptors, checked)
+    friction_recovery(pooled_study.visits, checked["strokes"])
+    assert len(flaw_detections(pooled_study.visits, {}, checked.get("spoilt", {}))) == len(checked.get("spoilt", {}))

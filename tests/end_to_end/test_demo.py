@@ -20,7 +20,7 @@ def test_ten_subjects_score_and_one_of_them_strokes(demo):
     )
 
 
-def test_what_was_planted_is_found_and_the_papers_finding_comes_out(demo):
+def test_estimates_match_the_ground_truth_and_the_papers_finding_comes_out(demo):
     rows = json.loads((demo / "S03-forces" / "prediction.json").read_text())["trials"]
     friction = {"stickiness": {0: 0.28, 20: 0.44, 50: 0.48, 80: 0.64, 100: 0.67}}  # the paper's Tables 1 and 2
     friction["slipperiness"] = {0: 0.62, 20: 0.55, 55: 0.44, 75: 0.52, 100: 0.24}

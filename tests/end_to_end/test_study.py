@@ -1,4 +1,4 @@
-"""A synthetic study from its seed to its page: made, computed once, spoilt parts named, the same wherever computed."""
+"""A synthetic study from its seed to its page: made, computed once, faults named, the same wherever computed."""
 
 import json
 import os
@@ -68,15 +68,15 @@ def test_a_session_that_nobody_may_read_is_named_and_left_out(study, tmp_path, c
 
 
 @pytest.mark.parametrize("content", ["[" * 100_000, "[]", "{"])
-def test_planted_numbers_that_are_damaged_are_named(study, tmp_path, capsys, content):
-    folder = tmp_path / "planted"
+def test_a_damaged_ground_truth_is_named(study, tmp_path, capsys, content):
+    folder = tmp_path / "damaged"
     shutil.copytree(study / "S01", folder / "S01")
     (folder / "planted.json").write_text(content)
     assert run(["study", str(folder)]) == 1
     assert "planted.json is damaged" in capsys.readouterr().err
 
 
-def test_each_planted_flaw_stands_beside_whether_it_was_found(pool):
+def test_each_simulated_flaw_stands_beside_whether_it_was_detected(pool):
     assert [(flaw["session"], flaw["detected"]) for flaw in pool["flaws"]] == [("S02", True), ("S11", True)]
     assert all(flaw["found"] == flaw["detected"] for flaw in pool["flaws"])  # the former name, for one release
     assert all(effect["found"] == effect["estimate"] for effect in pool["effects"])
@@ -89,12 +89,12 @@ def test_readings_lost_in_one_stroke_withhold_its_numbers_and_no_others(pool):
     assert all(row["sed"] is not None for trial, row in trials.items() if trial != 3)
 
 
-def test_friction_comes_back_as_planted_but_for_the_calibration(pool, study):
+def test_friction_is_the_true_one_but_for_the_calibration(pool, study):
     strokes = json.loads((study / "planted.json").read_bytes())["strokes"]
     truth = {(stroke["subject"], stroke["trial"]): stroke["mu"] for stroke in strokes}
     for visit in pool["visits"]:
         for row in visit["rows"]:
-            if row["mu"] is not None:  # each axis' gain is planted with a standard deviation of 1 %
+            if row["mu"] is not None:  # the gains of axes have a standard deviation of 1 %
                 assert row["mu"] == pytest.approx(truth[visit["subject"], row["trial"]], rel=0.05)
                 for name in ("mu", "tau_max", "speed", "sed"):
                     assert row[f"{name}_low"] < row[name] < row[f"{name}_high"]
@@ -351,7 +351,7 @@ def test_a_cluster_is_not_asked_for_what_is_kept(study):
 
 
 @pytest.mark.slow
-def test_the_whole_synthetic_study_names_everything_that_was_spoilt(tmp_path):
+def test_the_whole_synthetic_study_names_every_fault(tmp_path):
     folder = tmp_path / "study"
     assert run(["study", "--synthetic", "3", "--out", str(folder), "--json"]) == 3
     pool = json.loads((folder / "pooled" / "study.json").read_bytes())

@@ -289,7 +289,7 @@ def _contents():
         "strokes": strokes,
         "predictions": tuple(prediction(k, *surface) for k, surface in enumerate(numbered, 1)),
         "fields": (finger_field("stickiness", 100), finger_field("slipperiness", 100)),
-        "planted": tuple(
+        "ground_truth": tuple(
             GroundTruth(k, TABLES[d][i][0], TABLES[d][i][1], TABLES[d][i][2], DIRECTION[d])
             for k, (d, i) in enumerate(numbered, 1)
         ),
@@ -307,6 +307,6 @@ def bare(**changes):
     """A report without pictures, which is quick to write."""
     empty = {
         name: ()
-        for name in ("experiments", "strokes", "predictions", "fields", "planted", "flaws", "excluded", "again")
+        for name in ("experiments", "strokes", "predictions", "fields", "ground_truth", "flaws", "excluded", "again")
     }
     return example(**{**empty, "course": None, **changes})

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 from stand_ins import CALIBRATION, INFO, RATE
 
 from drivers.clock import SimulatedClock
@@ -22,12 +23,12 @@ FRAME = Frame("-z", "set", 20.0, "measured")
 def plan(subject="P01", *, forces=True, per_block=5):
     """Return the paper's experiment on the first surfaces of each block."""
     paper = protocols.protocol("sensotact-friction")
-    blocks = tuple(replace(block, indices=block.indices[:per_block], practice=()) for block in paper.blocks)
+    blocks = tuple(structs.replace(block, indices=block.indices[:per_block], practice=()) for block in paper.blocks)
     return protocols.plan(replace(paper, blocks=blocks), subject, 7, forces=forces, setting=VisitSetting(frame=FRAME))
 
 
 def record(folder, *, seed=1, subject="P01", forces=True, per_block=5, discard=None):
-    """Write a session; return the folder and what was planted, a list of (trial, StrokeGroundTruth)."""
+    """Write a session; return the folder and the ground truth, a list of (trial, StrokeGroundTruth)."""
     clock = SimulatedClock()
     session_plan = plan(subject, forces=forces, per_block=per_block)
     writer = SessionWriter.create(

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import test_planted_truth as planted_truth
+import test_ground_truth as ground_truth
 from closed_form import GAINS_ALONE, PLAIN, T, analyse, block, noisy
 
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
@@ -21,7 +21,7 @@ FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 
 @pytest.fixture(scope="module")
 def strokes():
-    return planted_truth.visit(1).analyse().strokes
+    return ground_truth.visit(1).analyse().strokes
 
 
 def width(interval):
@@ -93,7 +93,7 @@ def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
     columns = (t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
     curve = StrokeCurve(*columns, noise=(0.0, 0.0), quiet=0.0)
     crossing = replace(
-        planted_truth.visit(1).analyse().strokes[0],
+        ground_truth.visit(1).analyse().strokes[0],
         curve=curve,
         onset=None,
         steady=(0.0, 1.99),
@@ -163,7 +163,7 @@ def coverage_of(seeds, noise):
     for seed in seeds:
         a, b, c, d, e, f = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         bench = BenchSettings(gains=(a, b, c, d, e, f), noise_force=0.004 * noise, noise_torque=0.05 * noise)
-        visit = planted_truth.visit(seed, bench)
+        visit = ground_truth.visit(seed, bench)
         for number, (stroke, truth) in enumerate(zip(visit.analyse().strokes, visit.strokes, strict=True)):
             intervals = stroke_intervals(stroke, number, BootstrapSettings(cross_talk=0.0, tilt_error=(0.0, 0.0)))
             for name, true_value in truths(seed, truth):

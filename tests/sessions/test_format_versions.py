@@ -39,7 +39,7 @@ def test_a_sealed_session_of_every_version_opens_and_is_whole(tmp_path, version)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_sealed_session_of_every_version_gives_what_was_planted_in_it(tmp_path, version):
+def test_a_sealed_session_of_every_version_gives_its_ground_truth(tmp_path, version):
     strokes = analyse(Recording.open(copy_of(version, "sealed", tmp_path))).strokes
     assert len(strokes) == 2
     for stroke in strokes:

@@ -113,7 +113,9 @@ def test_every_link_and_clip_of_the_page_leads_to_exactly_one_place(page_text):
 
 
 def test_the_same_report_gives_the_same_bytes(report):
-    first_items = {n: getattr(report, n)[:1] for n in ("experiments", "strokes", "predictions", "fields", "planted")}
+    first_items = {
+        n: getattr(report, n)[:1] for n in ("experiments", "strokes", "predictions", "fields", "ground_truth")
+    }
     assert page(example(**first_items)) == page(example(**first_items))
 
 
@@ -169,18 +171,15 @@ def test_a_report_without_plan_scores_or_predictions_shows_what_it_has():
         strokes=strokes,
         predictions=(),
         fields=(),
-        planted=(),
+        ground_truth=(),
         modelled=(),
         left_out=(),
     )
-    words = Words(page(small_report))
-    assert "Friction" in words.words
-    assert not {
-        "Scores",
-        "Predicted responses",
-        "Prediction against score",
-        "Planted against recovered friction",
-    } & set(words.words)
+    html = page(small_report)
+    words = Words(html).words
+    assert "Friction" in words
+    assert not {"Scores", "Predicted responses", "Prediction against score"} & set(words)
+    assert 'id="table-planted"' not in html
 
 
 def test_a_report_with_nothing_in_it_is_still_a_page():
@@ -193,10 +192,10 @@ def test_every_table_that_tells_an_sed_names_the_model_it_is_of(report):
     assert [table.name for table in sed_tables if report.model not in table.caption] == []
 
 
-def test_planted_and_recovered_friction_stand_side_by_side(page_text):
+def test_true_and_estimated_friction_stand_side_by_side(page_text):
     table = page_text[page_text.index('id="table-planted"') :]
-    assert "<td>8.03</td>" in table  # planted tau_max of stickiness 0 [kPa]
-    assert "<td>−0.5</td>" in table  # recovered 0.995 of it
+    assert "<td>8.03</td>" in table  # true tau_max of stickiness 0 [kPa]
+    assert "<td>−0.5</td>" in table  # estimated as 0.995 of it
 
 
 @pytest.mark.usefixtures("reuse_pictures")

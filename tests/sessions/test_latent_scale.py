@@ -48,7 +48,7 @@ def study(rng, people):
     return latent_scales(trials, [paired_scale(choices, "Thurstone V")], ConstantStimuli({}, None, average(jnds)))
 
 
-def test_every_kind_of_judgement_finds_the_planted_values_in_one_unit():
+def test_every_kind_of_judgement_recovers_the_true_values_in_one_unit():
     scales = study(np.random.default_rng(4), 60)
     assert tuple(scales) == JUDGEMENTS
     for values in scales.values():
@@ -57,7 +57,7 @@ def test_every_kind_of_judgement_finds_the_planted_values_in_one_unit():
 
 
 @pytest.mark.parametrize("people", [3, 5, 12])
-def test_intervals_of_scores_hold_the_planted_values(people):
+def test_intervals_of_scores_hold_the_true_values(people):
     rng = np.random.default_rng(11)
     coverage = []
     for _ in range(100):

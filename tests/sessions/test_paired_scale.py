@@ -1,4 +1,4 @@
-"""Scales from choices between two: against a textbook's season of baseball, another maximiser, and planted values."""
+"""Scales from choices between two: against a textbook's season of baseball, another maximiser, and known values."""
 
 import math
 
@@ -79,7 +79,7 @@ def random_choices(rng, values, first, subjects, spread=0.0, repeats=1):
 
 
 @pytest.mark.parametrize(("subjects", "repeats"), [(4, 3), (20, 1)])
-def test_intervals_hold_planted_values_in_90_to_98_of_a_hundred(subjects, repeats):
+def test_intervals_hold_true_values_in_90_to_98_of_a_hundred(subjects, repeats):
     values, first = np.array([-0.8, -0.3, 0.0, 0.4, 0.7]), 0.2
     coverage, studies = np.zeros(6), 60
     for study in range(studies):

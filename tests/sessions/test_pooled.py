@@ -39,25 +39,25 @@ def test_a_study_says_what_to_type_for_its_numbers():
     expected = f"daq-app study 'my study' {options} --intervals --paths finite"
     assert command(pool_visits(VISITS, options=visit_options), "my study") == expected
     truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "seed": 21}
-    assert command(pool_visits(VISITS, planted=truth), "syn") == "daq-app study --synthetic 21 --out syn"
+    assert command(pool_visits(VISITS, ground_truth=truth), "syn") == "daq-app study --synthetic 21 --out syn"
 
 
-def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
+def test_true_gain_drift_and_carry_over_stand_beside_their_estimates():
     truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
-    effects = {effect.effect: effect for effect in pool_visits(VISITS, planted=truth).effects}
+    effects = {effect.effect: effect for effect in pool_visits(VISITS, ground_truth=truth).effects}
     assert set(effects) == {INDEX, FRICTION, DRIFT, CARRY_OVER}
     assert effects[INDEX].estimate == pytest.approx(0.8, abs=0.05)
     assert effects[INDEX].covered
 
 
-def test_the_planted_relation_of_people_at_large_stands_beside_the_intervals_for_them():
+def test_the_true_relation_of_people_at_large_stands_beside_the_intervals_for_them():
     score = {"gain": 0.0, "drift": 0.0, "carry_over": 0.0}
     truth = {"score": score, "strokes": [], "relation": {"stickiness": {"r": 0.9, "slope": 60.0}}}
-    findings = pool_visits(VISITS, planted=truth)
+    findings = pool_visits(VISITS, ground_truth=truth)
     effects = {effect.effect: effect for effect in findings.effects}
     finding = findings.descriptors[0]
-    assert (effects[WITHIN].planted, effects[WITHIN].low, effects[WITHIN].high) == (0.9, *finding.repeated.people)
-    assert (effects[SED_TERM].planted, effects[SED_TERM].low) == (60.0, finding.on_response.term(SED_TERM).low)
+    assert (effects[WITHIN].true_value, effects[WITHIN].low, effects[WITHIN].high) == (0.9, *finding.repeated.people)
+    assert (effects[SED_TERM].true_value, effects[SED_TERM].low) == (60.0, finding.on_response.term(SED_TERM).low)
 
 
 def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
@@ -194,20 +194,20 @@ def test_magnitude_estimates_of_any_modulus_come_to_the_same_means_at_one_modulu
     assert pool_visits([estimate_visit(1, 1.0), zero_visit]).descriptors[0].estimates.left_out == ("S04",)
 
 
-def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
-    spoilt = {
+def test_a_simulated_flaw_that_nobody_names_is_not_detected():
+    faults = {
         "S01": {"lost": 2, "expected": "trial 2: lost_readings"},
         "S02": {"unanswered": 3, "expected": "trial 3 has no score"},
         "S03": {"reversed": True, "expected": "backwards"},
         "S99": {"expected": "damaged"},
     }
-    truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": spoilt}
+    truth = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": faults}
     visits = [*VISITS[:2], visit(3, gain=-0.8)]
-    assert [flaw.detected for flaw in pool_visits(visits, planted=truth).flaws] == [False, False, True, False]
+    assert [flaw.detected for flaw in pool_visits(visits, ground_truth=truth).flaws] == [False, False, True, False]
     lossy = replace(
         visits[0], rows=tuple(replace(r, flaws=("lost_readings",)) if r.trial == 2 else r for r in visits[0].rows)
     )
-    flaws = pool_visits([lossy, *visits[1:]], [("S99", "damaged")], planted=truth).flaws
+    flaws = pool_visits([lossy, *visits[1:]], [("S99", "damaged")], ground_truth=truth).flaws
     assert [flaw.detected for flaw in flaws] == [True, False, True, True]
 
 

@@ -1,4 +1,4 @@
-"""Power of a study's test, against the t test of subjects' own slopes, and its error where nothing is planted."""
+"""Power of a study's test, against the t test of subjects' own slopes, and its error where there is no effect."""
 
 import json
 
@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from daq_app.cli.main import run
-from sessions.statistics.power import FRICTION, PlantedEffects, power
+from sessions.statistics.power import FRICTION, AssumedEffects, power
 
-PLAIN = PlantedEffects(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
+PLAIN = AssumedEffects(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
 
 
 def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_test_of_their_slopes():
@@ -22,15 +22,15 @@ def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_te
         assert design.share == pytest.approx(closed, abs=0.1)
 
 
-def test_where_nothing_is_planted_the_test_finds_something_in_about_five_of_a_hundred():
-    (design,) = power(PlantedEffects(effect=0.0), (10,), (5,), 600, 2)
+def test_without_an_effect_the_test_detects_one_in_about_five_of_a_hundred():
+    (design,) = power(AssumedEffects(effect=0.0), (10,), (5,), 600, 2)
     assert 0.02 <= (design.detections + design.wrong) / design.studies <= 0.08
 
 
 def test_more_subjects_find_more_and_spread_people_less():
-    few, many = power(PlantedEffects(), (4, 12), (5,), 150, 3)
+    few, many = power(AssumedEffects(), (4, 12), (5,), 150, 3)
     assert few.share + few.half < many.share
-    (spread,) = power(PlantedEffects(slope_sd=2.0), (12,), (5,), 150, 3)
+    (spread,) = power(AssumedEffects(slope_sd=2.0), (12,), (5,), 150, 3)
     assert spread.share + spread.half < many.share
 
 
@@ -42,7 +42,7 @@ def test_the_verb_prints_a_table_and_refuses_nonsense(capsys, monkeypatch):
     assert document["planted"]["effect"] == 30.0
     assert [(design["subjects"], design["surfaces"]) for design in document["designs"]] == [(4, 3)]
     assert run(["study", "--power", "--studies", "20"]) == 0
-    assert "assumed, not measured" in capsys.readouterr().out
+    assert "The usual values are not measured." in capsys.readouterr().out
     for wrong in (["effect"], ["effect=1000"], ["toe=1"], ["--studies", "2"], ["--seed", "-1"]):
         assert run(["study", "--power", *wrong]) == 2
         assert capsys.readouterr().err.startswith("daq-app: ")

@@ -335,7 +335,7 @@ def test_one_block_alone_cannot_be_counterbalanced(tmp_path):
 @pytest.mark.parametrize(
     ("friction", "sentence"), [("[0.3]", "one number for each"), ("[0.3, 0.0]", "between 0.01 and 5")]
 )
-def test_planted_friction_has_a_number_for_each_surface(tmp_path, friction, sentence):
+def test_simulated_friction_has_a_number_for_each_surface(tmp_path, friction, sentence):
     file = tmp_path / "own.toml"
     file.write_text(OWN.replace("[3, 70]", f"[3, 70]\nplanted_friction = {friction}"))
     with pytest.raises(SettingsError, match=sentence):

@@ -1,4 +1,4 @@
-"""Whether simulated studies prefer the quantity that was planted, on strokes whose quantities are known numbers."""
+"""Whether simulated studies prefer the true quantity, on strokes whose quantities are known numbers."""
 
 import json
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.cli.main import run
-from sessions.statistics.power import PlantedEffects, recovery, twins
+from sessions.statistics.power import AssumedEffects, recovery, twins
 
 DEPTHS = (1.0, 2.0)
 
@@ -18,19 +18,19 @@ def strokes(seed, likeness):
 
 
 @pytest.mark.parametrize("quantity", ["sed", "shear", "mu"])
-def test_a_planted_quantity_that_scores_follow_closely_is_preferred_in_every_study(quantity):
-    close = PlantedEffects(70.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
+def test_a_quantity_that_scores_follow_closely_is_preferred_in_every_study(quantity):
+    close = AssumedEffects(70.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
     result = recovery(strokes(1, 0.5), 10, DEPTHS, quantity, close, 8, np.random.default_rng(2))
     assert (result.preferred, result.family, result.twins, result.surfaces) == (1.0, 1.0, (), 4)
 
 
 def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often():
-    nothing = PlantedEffects(0.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
+    nothing = AssumedEffects(0.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
     result = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, 45, np.random.default_rng(2))
     assert result.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # 45 studies: three standard errors
 
 
-def test_a_twin_is_what_goes_with_the_planted_quantity_in_either_sense():
+def test_a_twin_is_what_goes_with_the_true_quantity_in_either_sense():
     alike = strokes(1, 0.999)
     alike["pressure"] = -alike["sed"]
     assert twins(alike, "sed") == {"sed", "shear", "pressure"}

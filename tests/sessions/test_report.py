@@ -28,7 +28,7 @@ from sessions.strokes.analysis import analyse
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """A session on the simulated bench, its third trial stroked twice; recording, analysis, what was planted."""
+    """A session on the simulated bench, its third trial stroked twice; recording, analysis, ground truth."""
     folder, strokes = record(tmp_path_factory.mktemp("bench") / "P01", discard=3)
     recording = Recording.open(folder)
     truth = [GroundTruth(trial, p.mu, p.tau_max, p.speed, p.direction) for trial, p in strokes]
@@ -38,14 +38,14 @@ def session(tmp_path_factory):
 @pytest.fixture(scope="module")
 def report(session):
     recording, analysis, truth = session
-    return findings(recording, analysis, planted=truth)
+    return findings(recording, analysis, ground_truth=truth)
 
 
 @pytest.fixture(scope="module")
 def prediction_and_report(session):
     recording, analysis, truth = session
     prediction = predict(analysis, recording.plan)
-    return prediction, findings(recording, analysis, prediction, planted=truth)
+    return prediction, findings(recording, analysis, prediction, ground_truth=truth)
 
 
 def record_foreign(folder, *, press=2.0):
@@ -74,9 +74,9 @@ def visit(subject, value, *, simulated=False):
     return ScoreTable(f"visit of {subject}", subject, simulated, (Score(subject, "stickiness", 50, value),))
 
 
-def test_every_planted_stroke_comes_back_within_two_per_cent(report):
-    assert [s.trial for s in report.strokes] == [p.trial for p in report.planted]
-    for stroke, truth in zip(report.strokes, report.planted, strict=True):
+def test_every_stroke_is_within_two_per_cent_of_its_ground_truth(report):
+    assert [s.trial for s in report.strokes] == [p.trial for p in report.ground_truth]
+    for stroke, truth in zip(report.strokes, report.ground_truth, strict=True):
         assert stroke.mu_dynamic == pytest.approx(truth.mu, rel=0.02)
         assert stroke.tau_max == pytest.approx(truth.tau_max, rel=0.03)
         assert stroke.direction == truth.direction

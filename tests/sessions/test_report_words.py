@@ -16,7 +16,7 @@ from sessions.report.figures.relation import paths_panel, relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import doubts, question, summary
 from sessions.report.tables import predictions as of_predictions
-from sessions.report.tables.session import paths_sentence, planted_table, relation_table
+from sessions.report.tables.session import ground_truth_table, paths_sentence, relation_table
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.trials import omissions
@@ -154,13 +154,13 @@ def test_an_exact_p_below_a_thousandth_is_not_shown_as_zero(report):
     assert [row[6].text for row in table.groups[0].rows if row[0].text == "mean score"] == ["< 0.001"]
 
 
-def test_a_trial_whose_planted_stroke_was_not_found_stands_among_its_experiment_s(report):
+def test_a_trial_whose_stroke_was_not_found_stands_among_its_experiment_s(report):
     without = replace(
         report,
         strokes=report.strokes[1:],
         predictions=(replace(report.predictions[0], stroke=None), *report.predictions[1:]),
     )
-    groups = {group.name: [row[:2] for row in group.rows] for group in planted_table(without).groups}
+    groups = {group.name: [row[:2] for row in group.rows] for group in ground_truth_table(without).groups}
     assert list(groups) == ["stickiness", "slipperiness"]
     assert [cell.text for cell in groups["stickiness"][0]] == ["1", "0"]
 

@@ -6,6 +6,7 @@ from typing import get_args
 
 import h5py
 import pytest
+from msgspec.inspect import type_info
 from recordings import rows
 from simulated_session import Session
 
@@ -81,8 +82,8 @@ def test_every_key_of_a_protocol_is_told():
         "blocks.": BlockOutline,
     }
     for prefix, kind in tables.items():
-        for name in kind.__dataclass_fields__:
-            assert f"`{prefix}{name}`" in page or f"[{name}]" in page
+        for field in type_info(kind).fields:
+            assert f"`{prefix}{field.encode_name}`" in page or f"[{field.encode_name}]" in page
 
 
 def test_the_least_protocol_of_the_page_needs_every_line_that_may_not_be_left_out(tmp_path):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import test_planted_truth as planted_truth
+import test_ground_truth as ground_truth
 
 from sessions.plan.plan import Block, SessionPlan
 from sessions.prediction import PredictionOptions, predict, uncertainty
@@ -26,16 +26,16 @@ def with_bootstrap(analysis, settings):
 
 @pytest.fixture(scope="module")
 def analysis():
-    visit = planted_truth.visit(1)
+    visit = ground_truth.visit(1)
     parts = [visit.parts[4], visit.parts[0]]  # sticky and hardly so
     return replace(visit, parts=parts, strokes=[visit.strokes[4], visit.strokes[0]]).analyse()
 
 
 @pytest.fixture(scope="module")
 def prediction(analysis):
-    trials = tuple(trial for trial, _ in planted_truth.visit(1).parts if trial.number in (1, 5))
+    trials = tuple(trial for trial, _ in ground_truth.visit(1).parts if trial.number in (1, 5))
     block = Block("b", "", 1, 2.0, ("", ""), trials[::-1])
-    plan = SessionPlan("sensotact", "S1", 0, "given", (block,), forces=True, frame=planted_truth.FRAME)
+    plan = SessionPlan("sensotact", "S1", 0, "given", (block,), forces=True, frame=ground_truth.FRAME)
     return predict(analysis, plan, PredictionOptions(course="steady", intervals=True))
 
 
@@ -206,7 +206,7 @@ def shallow(visit, number):
     (part,) = (part for part in visit.parts if part[0].number == number)
     alone = replace(visit, parts=[part], strokes=[visit.strokes[number - 1]])
     block = Block("b", "", 1, 1.0, ("", ""), (part[0],))
-    plan = SessionPlan("sensotact", "S1", 0, "given", (block,), forces=True, frame=planted_truth.FRAME)
+    plan = SessionPlan("sensotact", "S1", 0, "given", (block,), forces=True, frame=ground_truth.FRAME)
     return alone.analyse(), plan
 
 
@@ -217,7 +217,7 @@ FINITE = PredictionOptions(course="steady", kinematics="finite", intervals=True)
 @pytest.mark.parametrize("number", [1, 2, 4])  # with the bound felt, a little sticky, very
 def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     """Against each draw's own solve from nothing, on a mesh of its own."""
-    analysis, plan = shallow(planted_truth.visit(1), number)
+    analysis, plan = shallow(ground_truth.visit(1), number)
     (row,) = with_intervals(with_bootstrap(analysis, LEVEL), predict(analysis, plan, FINITE)).trials
     interval, scene = row.interval, row.prediction.scene
     draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
@@ -230,12 +230,12 @@ def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
-def test_intervals_of_200_visits_hold_the_sed_of_the_friction_planted(kinematics):
-    """The benches of the coverage of friction itself; the truth is the solve at what was planted, from nothing."""
+def test_intervals_of_200_visits_hold_the_sed_of_the_true_friction(kinematics):
+    """The benches of the coverage of friction itself; the truth is the solve at the true friction, from nothing."""
     options, hits = replace(FINITE, kinematics=kinematics), []
     for seed in range(1000, 1200):
         gains = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
-        visit = planted_truth.visit(seed, BenchSettings(gains=tuple(gains)))
+        visit = ground_truth.visit(seed, BenchSettings(gains=tuple(gains)))
         analysis, plan = shallow(visit, 2)
         (row,) = with_intervals(
             with_bootstrap(analysis, LEVEL), predict(analysis, plan, options), both_ways=False
@@ -248,7 +248,7 @@ def test_intervals_of_200_visits_hold_the_sed_of_the_friction_planted(kinematics
 
 @pytest.mark.slow
 def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled_slide():
-    analysis, plan = shallow(planted_truth.visit(1), 2)
+    analysis, plan = shallow(ground_truth.visit(1), 2)
     beyond = predict(analysis, plan, replace(FINITE, indentation=2.0))
     (row,) = with_intervals(analysis, beyond).trials
     assert row.interval.low is None

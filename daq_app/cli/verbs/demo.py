@@ -58,7 +58,7 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
 
     console.progress(0.9, "writing the report")
     scores = [score_table(Recording.open(folder)) for folder in study.scored]
-    report = findings(recording, analysis, prediction, scores, study.planted)
+    report = findings(recording, analysis, prediction, scores, study.ground_truth)
     page, pictures = out / "report.html", out / "pictures"
     drawings = plates(report)
     write_report(report, page, drawings)
@@ -84,14 +84,14 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
 def _rows(
     study: Study, analysis: Analysis, prediction: SessionPrediction, means: Mapping[tuple[str, int], float | None]
 ) -> list[dict[str, Any]]:
-    """Return a row for each trial: what was planted, what was found, what is predicted, what was scored."""
-    planted = {truth.trial: truth for truth in study.planted}
+    """Return a row for each trial: ground truth, estimates, prediction and score."""
+    truths = {truth.trial: truth for truth in study.ground_truth}
     speeds = {friction.trial: friction.speed for friction in analysis.friction}
     rows = [
         {
             "descriptor": row.stimulus.descriptor,
             "index": row.stimulus.index,
-            **{f"planted_{name}": getattr(planted[row.trial], name) for name in ("mu", "tau_max", "speed")},
+            **{f"planted_{name}": getattr(truths[row.trial], name) for name in ("mu", "tau_max", "speed")},
             "mu": row.mu,
             "tau_max": row.tau_max,
             "speed": speeds.get(row.trial),
@@ -106,7 +106,7 @@ def _rows(
 
 
 def _print(summary: Mapping[str, Any], rows: list[dict[str, Any]], console: Console) -> None:
-    head = ["SIMULATED", "mu planted", "found", "tau [kPa] planted", "found", "V [mm/s] planted", "found"]
+    head = ["SIMULATED", "true mu", "estimated", "true tau [kPa]", "estimated", "true V [mm/s]", "estimated"]
     head += ["SED [kPa]", "mean score"]
     cells = [
         [

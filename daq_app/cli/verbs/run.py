@@ -76,7 +76,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{what}_{stamp}"
     console.note(own_sentence(planned))
     simulated = options.simulate_subject
-    people = People() if simulated is None else People("simulated people", simulated, chosen.planted_friction)
+    people = People() if simulated is None else People("simulated people", simulated, chosen.simulated_friction)
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = open_device(recorder, options.device) if options.device else None

@@ -4,7 +4,7 @@ Results are kept by the content they were made of, in OUT/results: what was comp
 Ctrl-C loses nothing that was done. A session that cannot be read is named and left out. Subjects are left out by
 decisions in FOLDER/exclusions.toml ([[exclude]] subject, why, who, and descriptor for one alone).
 With --power no session is needed: simulated studies say how many subjects and surfaces one needs.
-With --synthetic a study of ten simulated subjects is made first, and what was planted is held against what is found.
+With --synthetic a study of ten simulated subjects is made first, and its ground truth is held against the estimates.
 """
 
 import argparse
@@ -14,6 +14,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from daq_app.batch.pool import Shelf, visits
@@ -31,12 +32,12 @@ from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number, span
 from sessions.file_access import json_text, json_value, read_within_limit
 from sessions.prediction import BY_NAME, SED, PredictionOptions
-from sessions.prediction.surface_series import StudyDesign, planted_strokes
+from sessions.prediction.surface_series import StudyDesign, simulated_strokes
 from sessions.recording import RecordingError
 from sessions.recording.derived import session_folders
-from sessions.statistics.findings import UNITS, StudyFindings, check_ground_truth
+from sessions.statistics.findings import GROUND_TRUTH_FILE, UNITS, StudyFindings, check_ground_truth
 from sessions.statistics.pooled import pool_visits
-from sessions.statistics.power import TWIN, PlantedEffects, Recovery, power, recovery
+from sessions.statistics.power import TWIN, AssumedEffects, Recovery, power, recovery
 from sessions.statistics.visit import VisitOptions, exclusions_in
 from sessions.strokes.stroke import FIXED
 
@@ -51,8 +52,8 @@ def add_power(parser: argparse.ArgumentParser) -> None:
         "--power",
         nargs="*",
         metavar="NAME=VALUE",
-        help="how many subjects and surfaces a study needs, by simulation; what is planted may be set: "
-        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(PlantedEffects))}",
+        help="how many subjects and surfaces a study needs, by simulation; what it assumes may be set: "
+        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(AssumedEffects))}",
     )
     parser.add_argument(
         "--depths",
@@ -70,19 +71,19 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     """Print the power of designs of so many subjects and surfaces."""
     if options.folder is not None or options.synthetic is not None:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
-    planted = _planted_values(options.power)
+    effects = _assumed_effects(options.power)
     powers = power(
-        planted, SUBJECTS, SURFACES, options.studies, options.seed, lambda part: console.progress(part, "designs")
+        effects, SUBJECTS, SURFACES, options.studies, options.seed, lambda part: console.progress(part, "designs")
     )
-    recoveries = _recovery(options, planted, console)
+    recoveries = _recovery(options, effects, console)
     designs = [{**asdict(one), "power": one.share} for one in powers]
-    console.result({"planted": asdict(planted), "designs": designs, "recovery": [asdict(one) for one in recoveries]})
+    console.result({"planted": asdict(effects), "designs": designs, "recovery": msgspec.to_builtins(recoveries)})
     rows = [
         [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in powers if one.subjects == people)]
         for people in SUBJECTS
     ]
-    values = ", ".join(f"{one.name} = {getattr(planted, one.name):g}" for one in fields(planted))
-    console.say(f"Planted: {values}. The usual values are assumed, not measured.")
+    values = ", ".join(f"{one.name} = {getattr(effects, one.name):g}" for one in fields(effects))
+    console.say(f"Assumed: {values}. The usual values are not measured.")
     console.say(table(rows, head=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
     console.say(
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
@@ -95,7 +96,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     return DONE
 
 
-def _recovery(options: argparse.Namespace, planted: PlantedEffects, console: Console) -> list[Recovery]:
+def _recovery(options: argparse.Namespace, effects: AssumedEffects, console: Console) -> list[Recovery]:
     """Return how often studies at the depths asked for tell the quantity from its rivals; [] where none are."""
     if not options.depths:
         return []
@@ -105,9 +106,9 @@ def _recovery(options: argparse.Namespace, planted: PlantedEffects, console: Con
     for surfaces in RIVAL_SURFACES:
         console.progress(len(recoveries) / count, f"strokes on {surfaces} surfaces")
         draw = np.random.default_rng([options.seed, surfaces])
-        strokes = planted_strokes(StudyDesign.even(surfaces, depths), max(RIVAL_SUBJECTS), draw)
+        strokes = simulated_strokes(StudyDesign.even(surfaces, depths), max(RIVAL_SUBJECTS), draw)
         for people in RIVAL_SUBJECTS:
-            recoveries.append(recovery(strokes, people, depths, options.quantity, planted, RIVAL_STUDIES, draw))
+            recoveries.append(recovery(strokes, people, depths, options.quantity, effects, RIVAL_STUDIES, draw))
             console.progress(len(recoveries) / count, f"{people} subjects, {surfaces} surfaces")
     return recoveries
 
@@ -132,9 +133,9 @@ def _say_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, c
     )
 
 
-def _planted_values(texts: Sequence[str]) -> PlantedEffects:
-    """Return what is planted, with the values that were set. Raises WrongValue."""
-    names = [field.name for field in fields(PlantedEffects)]
+def _assumed_effects(texts: Sequence[str]) -> AssumedEffects:
+    """Return what a power simulation assumes, with the values that were set. Raises WrongValue."""
+    names = [field.name for field in fields(AssumedEffects)]
     changes = numbers_by_key(texts, "--power", "effect=20")
     for name, value in changes.items():
         if name not in names:
@@ -142,11 +143,10 @@ def _planted_values(texts: Sequence[str]) -> PlantedEffects:
         least = -100.0 if name == "effect" else 0.0
         if not least <= value <= 100.0:
             raise WrongValue(f"--power {name}={value:g} is not allowed: {least:g} to 100")
-    return PlantedEffects(**changes)
+    return AssumedEffects(**changes)
 
 
 EXAMPLE = "daq-app study recordings --out results"
-PLANTED = "planted.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -208,9 +208,9 @@ def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console
     shelf = Shelf(out / "results", visit_options)
     done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
     if truth is not None and options.quantity == SED.name:
-        from daq_app.simulation.synthetic import planted_relations  # loaded only where it is needed
+        from daq_app.simulation.synthetic import population_relations  # loaded only where it is needed
 
-        truth["relation"] = planted_relations(truth["people"], visit_options.prediction, visit_options.area)
+        truth["relation"] = population_relations(truth["people"], visit_options.prediction, visit_options.area)
     study = pool_visits(done, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
@@ -222,13 +222,13 @@ def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console
 
 def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
     """Return the ground truth of a synthetic study, None of any other. Raises RecordingError where it is damaged."""
-    path = folder / PLANTED
+    path = folder / GROUND_TRUTH_FILE
     if not path.is_file():
         return None
     try:
         return check_ground_truth(json_value(read_within_limit(path)))
     except ValueError as damaged:
-        raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
+        raise RecordingError(f"{path} is damaged; delete it to pool the study without its ground truth") from damaged
 
 
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
@@ -258,7 +258,7 @@ def _print(study: StudyFindings, files: dict[str, str], console: Console) -> Non
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(
-            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {number(one.planted)}, "
-            f"found {number(one.estimate)} ({span(one.low, one.high)}): {inside}"
+            f"{one.descriptor}, {one.effect} [{UNITS[one.effect]}]: true {number(one.true_value)}, "
+            f"estimated {number(one.estimate)} ({span(one.low, one.high)}): {inside}"
         )
     console.say(*(f"{what:8}  {path}" for what, path in files.items()))

@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
+import msgspec
+
 from sessions.plan.orders import draw, opaque_codes
 from sessions.plan.plan import Frame, Phase, Rests, Visibility
 from sessions.plan.protocols.languages import (
@@ -25,8 +27,7 @@ LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equali
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 
 
-@dataclass(frozen=True, slots=True)
-class BlockOutline:
+class BlockOutline(msgspec.Struct, frozen=True):
     """The stimuli of one descriptor and how they are stroked and judged; their order is not decided yet."""
 
     name: str
@@ -40,7 +41,8 @@ class BlockOutline:
     strokes_allowed: int = 1  # in a trial, before the answer
     repetitions: int = 1  # of each stimulus, or of each pair
     practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
-    planted_friction: tuple[float, ...] = ()  # µ of each of `indices` on the simulated bench, for rehearsals [-]
+    # µ of each of `indices` on the simulated bench, for rehearsals [-]
+    simulated_friction: tuple[float, ...] = msgspec.field(default=(), name="planted_friction")
     standard: int | None = None  # of `indices`: every pair is of it and another; None: every two are compared
     adaptive: int | None = None  # comparisons with the standard, each chosen by the answers before it; None: planned
 
@@ -59,15 +61,15 @@ class BlockOutline:
         check_range("repetitions", self.repetitions, 1, 20)
         if not set(self.practice) <= set(self.indices):
             raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
-        self._check_planted_friction()
+        self._check_simulated_friction()
         self._check_standard()
 
-    def _check_planted_friction(self) -> None:
-        if self.planted_friction and len(self.planted_friction) != len(self.indices):
+    def _check_simulated_friction(self) -> None:
+        if self.simulated_friction and len(self.simulated_friction) != len(self.indices):
             count = f"one number for each of the {len(self.indices)} indices, or none at all"
-            raise NotAllowed("planted_friction", list(self.planted_friction), count)
-        if not all(0.01 <= mu <= 5.0 for mu in self.planted_friction):
-            raise NotAllowed("planted_friction", list(self.planted_friction), "each must lie between 0.01 and 5")
+            raise NotAllowed("planted_friction", list(self.simulated_friction), count)
+        if not all(0.01 <= mu <= 5.0 for mu in self.simulated_friction):
+            raise NotAllowed("planted_friction", list(self.simulated_friction), "each must lie between 0.01 and 5")
 
     def _check_standard(self) -> None:
         if self.adaptive is not None:
@@ -218,13 +220,13 @@ class Protocol:
         return dict(zip(stimuli, opaque_codes(len(stimuli), self.label_seed), strict=True))
 
     @property
-    def planted_friction(self) -> tuple[tuple[str, int, float], ...]:
+    def simulated_friction(self) -> tuple[tuple[str, int, float], ...]:
         """Return descriptor, index and μ of every stimulus whose friction the simulated bench uses."""
         return tuple(
             (block.descriptor, index, mu)
             for block in self.blocks
-            if block.planted_friction
-            for index, mu in zip(block.indices, block.planted_friction, strict=True)
+            if block.simulated_friction
+            for index, mu in zip(block.indices, block.simulated_friction, strict=True)
         )
 
     @property
@@ -240,7 +242,9 @@ class Protocol:
         if not texts:
             raise NotAllowed("language", language, f"{self.name} has its texts in {', '.join(self.languages)}")
         blocks = tuple(
-            replace(block, instruction=text.instruction, scale_ends=text.scale_ends, question=text.question)
+            msgspec.structs.replace(
+                block, instruction=text.instruction, scale_ends=text.scale_ends, question=text.question
+            )
             for block in self.blocks
             for text in [texts[block.name]]
         )

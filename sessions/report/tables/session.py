@@ -1,4 +1,4 @@
-"""The tables of a session: strokes, scores, how predictions go with them, and what had been planted."""
+"""The tables of a session: strokes, scores, how predictions go with them, and the ground truth."""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -121,14 +121,14 @@ def _estimate(stroke: StrokeFinding, name: str, shown: Format, unit: float = 1.0
     return estimate_cell(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, unit=unit)
 
 
-def planted_table(report: Report) -> Table | None:
+def ground_truth_table(report: Report) -> Table | None:
     """Return the simulator's ground truth beside the numbers of the analysis."""
     # Of several strokes in a trial the model gets the first.
     strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     predictions = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
-        "trial | index | µ planted [1] | µ found [1] | off by [%] | τ max planted [kPa] | "
-        "τ max found [kPa] | off by [%] | speed planted [mm/s] | speed found [mm/s] | off by [%] | direction"
+        "trial | index | true µ [1] | estimated µ [1] | off by [%] | true τ max [kPa] | estimated τ max [kPa] | "
+        "off by [%] | true speed [mm/s] | estimated speed [mm/s] | off by [%] | direction"
     )
 
     def row(p: GroundTruth) -> Row:
@@ -148,12 +148,12 @@ def planted_table(report: Report) -> Table | None:
             off = None if value is None else 100 * (value / truth - 1)
             cells += [shown(truth), cell, number_cell(off, with_sign, reason)]
         right = stroke is not None and stroke.direction == p.direction
-        cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
+        cells.append(Cell("right" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
 
     names = {trial: one.experiment for trial, one in {**predictions, **strokes_by_trial}.items()}
-    groups = group_by_experiment(report, report.planted, lambda p: names.get(p.trial, ""), row)
-    return table("table-planted", caption("session-planted"), columns, groups)
+    groups = group_by_experiment(report, report.ground_truth, lambda p: names.get(p.trial, ""), row)
+    return table("table-planted", caption("session-ground-truth"), columns, groups)
 
 
 def score_table(report: Report) -> Table | None:
@@ -308,6 +308,6 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
         ),
         "afferent": (of_predictions.afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
-        "planted": (planted_table(report),),
+        "ground_truth": (ground_truth_table(report),),
     }
     return sections_of(sections)

@@ -8,7 +8,7 @@ from sessions.report.tables import Cell, Row, Table, number_cell, range_cell, se
 from sessions.report.tables.rivals import rival_tables
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
-from sessions.report.tables.study_models import flaws_table, models_table, planted_table, study_model, trials_table
+from sessions.report.tables.study_models import flaws_table, ground_truth_table, models_table, study_model, trials_table
 from sessions.report.wording import (
     NONE,
     caption,
@@ -48,7 +48,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "models": (models_table(study),),
         "visits": (_visits(study),),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
-        "planted": (planted_table(study), flaws_table(study)),
+        "ground_truth": (ground_truth_table(study), flaws_table(study)),
         "trials": (trials_table(study),),
     }
     return sections_of(sections)

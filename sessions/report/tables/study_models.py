@@ -1,4 +1,4 @@
-"""Tables of a study's page: mixed models, planted and estimated values, and every trial."""
+"""Tables of a study's page: mixed models, true and estimated values, and every trial."""
 
 from collections.abc import Callable, Iterable
 from itertools import combinations
@@ -101,28 +101,28 @@ def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
                 yield row(name, unit, s.sd, s)
 
 
-def planted_table(study: StudyFindings) -> Table | None:
-    """Return the planted effects of a simulated study beside their estimates."""
+def ground_truth_table(study: StudyFindings) -> Table | None:
+    """Return the true effects of a simulated study beside their estimates."""
     rows = tuple(
         (
             one.descriptor,
             one.effect,
             UNITS[one.effect],
-            three_figures(one.planted),
+            three_figures(one.true_value),
             three_figures(one.estimate),
             range_cell(one.low, one.high, three_figures),
             "yes" if one.covered else "no",
         )
         for one in study.effects
     )
-    columns = "descriptor | effect | unit | planted | found | 95 % interval | inside"
-    return table("table-planted", caption("study-planted"), columns, [("", rows)])
+    columns = "descriptor | effect | unit | true | estimated | 95 % interval | inside"
+    return table("table-planted", caption("study-ground-truth"), columns, [("", rows)])
 
 
 def flaws_table(study: StudyFindings) -> Table | None:
-    """Return what was spoilt in a simulated study, and whether it was found."""
+    """Return what went wrong in a simulated study, and whether the analysis detected it."""
     rows = tuple((one.session, one.expected, "yes" if one.detected else "no") for one in study.flaws)
-    return table("table-planted-flaws", caption("study-planted-flaws"), "session | planted | found", [("", rows)])
+    return table("table-planted-flaws", caption("study-flaws"), "session | simulated | detected", [("", rows)])
 
 
 _FEW = "too few readings"

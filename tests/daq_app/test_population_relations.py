@@ -1,4 +1,4 @@
-"""The relation planted in a synthetic study, of people at large, against what can be worked out by hand."""
+"""The true relation of a synthetic study, that of people at large, against what can be worked out by hand."""
 
 import math
 

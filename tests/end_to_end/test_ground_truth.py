@@ -1,4 +1,4 @@
-"""What the simulated bench plants, the analysis finds again: ten surfaces of the paper, default bench.
+"""Estimates of the analysis against the ground truth of the simulated bench: ten surfaces of the paper, default bench.
 
 Three seeds in `make test`, fifty in `make test-long`.
 """
@@ -28,7 +28,7 @@ FRAME = Frame("-z", "set", BenchSettings().height, "set")
 
 @dataclass(frozen=True)
 class Visit:
-    """One subject's ten strokes: what was recorded and what was planted, in the same order."""
+    """One subject's ten strokes: what was recorded and the ground truth, in the same order."""
 
     parts: list[tuple[Trial, ReadingBlock]]
     strokes: list[StrokeGroundTruth]
@@ -64,7 +64,7 @@ def visits(request):
 
 @pytest.fixture(scope="module")
 def rows(visits):
-    """Return (stroke, friction, planted) of every trial of every seed."""
+    """Return (stroke, friction, ground truth) of every trial of every seed."""
     rows = []
     for visit in visits:
         analysis = visit.analyse()
