@@ -71,14 +71,14 @@ class Notice(Panel):
 
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
-        self._send, self._folds = send, False
+        self._send, self._collapsible = send, False
         self._banner: Banner | None = None
         self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
         self._said: object = None
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
-        self.show_folding(False)
+        self.set_collapsible(False)
         hbox((self._words, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
     def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
@@ -100,14 +100,14 @@ class Notice(Panel):
         self._button.setVisible(banner is not None and banner.sends is not None)
         self._button.setText("" if banner is None else banner.action)
         self._button.setAccessibleName(self._button.text() or tr("what the notice offers"))
-        if self._folds:
+        if self._collapsible:
             self.setVisible(bool(text))
 
-    def show_folding(self, folds: bool) -> None:
+    def set_collapsible(self, collapsible: bool) -> None:
         """Keep the line's place while it is empty; or give it up, where there is no room to keep."""
-        self._folds = folds
-        self.setMinimumHeight(0 if folds else px(52))
-        self.setVisible(not folds or bool(self._words.text()))
+        self._collapsible = collapsible
+        self.setMinimumHeight(0 if collapsible else px(52))
+        self.setVisible(not collapsible or bool(self._words.text()))
 
     def warn(self, sentence: str) -> None:
         self.warning = sentence

@@ -310,7 +310,7 @@ class MainWindow(QMainWindow):
         self.strip.setVisible(not shown and width >= 800)
         self.live.set_room(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
         self.to_do.show_small(height < TALL or width < ROOMY)
-        self.notice.show_folding(height < LOW)
+        self.notice.set_collapsible(height < LOW)
         self.keys.fit()
 
     def _lay_out(self) -> QWidget:

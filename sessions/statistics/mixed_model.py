@@ -119,7 +119,7 @@ class Fit:
     exact: bool  # hardly anything is left
 
 
-def restricted_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int) -> Fit:
+def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int) -> Fit:
     """Return the fit of y (n) by `columns` (n, p) of full rank, whose first `own` also differ between subjects (n).
 
     Columns should be of about one size.
@@ -273,7 +273,7 @@ def mixed_model(
         return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
     if fits_exactly(np.hstack([_levels(subjects), columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
-    fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own=2)
+    fit = reml_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own=2)
     if fit.exact:
         return "each subject's scores lie on a line of their own: there is nothing to tell an error from"
     level_sd, slope_sd = (np.sqrt(np.diag(fit.among)) / scale[:2]).tolist()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from sessions.statistics.mixed_model import difference_of_squares, mixed_model, restricted_fit, spreads
+from sessions.statistics.mixed_model import difference_of_squares, mixed_model, reml_fit, spreads
 from sessions.statistics.within_subjects import (
     agreement,
     differences,
@@ -122,7 +122,7 @@ def test_a_balanced_mixed_model_has_the_slope_and_error_of_the_closed_form():
     subjects = [f"S{k}" for k in range(12) for _ in range(5)]
     levels = np.repeat(rng.normal(0, 20, 12), 5)
     score = 10.0 + 3.0 * x + levels + rng.normal(0, 4, 60)
-    fit = restricted_fit(score, np.column_stack([np.ones(60), x]), subjects, own=1)
+    fit = reml_fit(score, np.column_stack([np.ones(60), x]), subjects, own=1)
     # Balanced, with the same x for all: the slope is that of least squares within subjects.
     centred = score - np.repeat(score.reshape(12, 5).mean(axis=1), 5)
     expected = float((x - 2.0) @ centred) / float((x - 2.0) @ (x - 2.0))
@@ -251,7 +251,7 @@ def test_nothing_is_likelier_than_the_fit_singular_or_not_and_rounding_moves_its
     codes = np.repeat(np.arange(10), 5)
     columns = np.column_stack([np.ones(50), np.tile(np.linspace(-1, 1, 5), 10), rng.uniform(-1, 1, 50)])
     y = columns @ [50.0, 30.0, 2.0] + (seed > 2) * np.repeat(rng.normal(0, 5, 10), 5) + rng.normal(0, 4, 50)
-    fit, again = (restricted_fit(y * (1.0 + step), columns, codes, 2) for step in (0.0, rng.uniform(-1, 1, 50) * 2e-16))
+    fit, again = (reml_fit(y * (1.0 + step), columns, codes, 2) for step in (0.0, rng.uniform(-1, 1, 50) * 2e-16))
     assert fit.deviance == pytest.approx(
         min(
             optimize.minimize(restricted_deviance, start, (y, columns, codes), "Nelder-Mead", tol=1e-10).fun
@@ -296,7 +296,7 @@ def test_a_kept_library_comes_to_the_same_model():
     child, distance, age = children()
     columns = np.column_stack([np.ones(108), np.array(age) - 11.0])
     theirs = MixedLM(np.array(distance), columns, np.array(child), columns).fit(reml=True, method="lbfgs")
-    ours = restricted_fit(np.array(distance), columns, child, 2)
+    ours = reml_fit(np.array(distance), columns, child, 2)
     assert ours.estimates == pytest.approx(theirs.fe_params, rel=1e-6)
     assert ours.errors == pytest.approx(theirs.bse_fe, rel=1e-4)
     assert ours.among == pytest.approx(theirs.cov_re, rel=1e-3)
