@@ -41,10 +41,7 @@ class CalibrationFile:
 
 
 def read_calibration_file(path: Path) -> CalibrationFile:
-    """Return what the calibration file at `path` says, which may begin with ~ for the user's home.
-
-    Raises SetupError where it cannot be read or makes no sense.
-    """
+    """Return what the file at `path` says, ~ being the user's home. Raises SetupError where it makes no sense."""
     try:
         with path.expanduser().open("rb") as file:
             data = file.read(LONGEST + 1)

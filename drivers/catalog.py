@@ -38,10 +38,7 @@ def open_transducer(uri: str, clock: Clock) -> Transducer:
 
 
 def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Probe, ...]:
-    """Return what answers now at the usual addresses and at those `named`, within `patience` real seconds each.
-
-    Only reads who is there: a device in use is not disturbed.
-    """
+    """Return what answers at the usual addresses and those `named`, within `patience` [s] each; disturbs no device."""
     usual = [uri for driver in DRIVERS for uri in driver.usual]
     return tuple(_probe(uri, patience) for uri in dict.fromkeys([*usual, *named]))
 

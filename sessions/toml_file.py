@@ -54,10 +54,7 @@ def check_scale_ends(ends: tuple[str, str] | None) -> None:
 
 
 def load_toml(path: Path, cls: type[T]) -> T:
-    """Return the dataclass that a TOML file describes.
-
-    Raises OSError where it cannot be read, SettingsError for anything wrong in it.
-    """
+    """Return the dataclass that a TOML file describes. Raises OSError, and SettingsError for anything wrong in it."""
     return from_toml(text_of(path), cls, str(path))
 
 

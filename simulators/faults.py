@@ -114,10 +114,7 @@ class Faults:
         return wrench
 
     def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
-        """Return what really leaves by `now` [s] when the box sends `datagrams`, each at its time [s].
-
-        That is those, hurt, and what was held back until now.
-        """
+        """Return what leaves by `now` [s] of `datagrams`, each at its time [s], and of those held back before."""
         leaving: list[bytes] = []
         for time, datagram in datagrams:
             leaving += self._overdue(time)

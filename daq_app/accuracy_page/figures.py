@@ -141,7 +141,6 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
 
 
 def _mark(problem: str) -> str:
-    """Return the mark of a problem, whatever its parameters."""
     marks = {"thick cylinder": "o", "Cook's membrane": "s", "finger": "D", "half-plane under a round body": "^"}
     return marks.get(problem.split(",")[0], "x")
 

@@ -263,10 +263,7 @@ class OpenVisit(NamedTuple):
 
 
 def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
-    """Return a session, or a subject's visit with forces to a study; sessions that cannot be read are named.
-
-    Raises RecordingError, StudyError, WrongValue.
-    """
+    """Return a session, or a visit to a study; names unreadable ones. Raises RecordingError, StudyError, WrongValue."""
     if is_study(path):
         if subject is None:
             raise WrongValue(f"{path} is a study: say whose visit with --subject")

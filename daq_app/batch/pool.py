@@ -157,10 +157,7 @@ def by_cluster(
 
 
 def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> None:  # noqa: ANN401
-    """Raise SchedulerError where one of the workers at some addresses would compute with other versions, or cannot.
-
-    A worker that has gone by now says nothing.
-    """
+    """Raise SchedulerError where a worker has other versions, or cannot compute; one that has gone says nothing."""
     answers: dict[str, Any] = client.run(software_versions, workers=list(workers), on_error="return")
     for worker, versions in answers.items():
         if isinstance(versions, ImportError):
@@ -313,10 +310,7 @@ def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[
 
 
 def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A | Lost]]:
-    """Yield each job's name and what `work` makes of it, as it comes from processes of this computer.
-
-    There are `workers` processes, or as many as there are cores.
-    """
+    """Yield each job's name and what `work` makes of it, from `workers` processes here, or as many as cores."""
     left = dict(jobs)
     try:
         for name, answer in _in_pool(work, dict(left), workers) if left else ():

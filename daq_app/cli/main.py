@@ -150,7 +150,6 @@ def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 
 def _failure(error: Exception) -> tuple[str, int]:
-    """Return the sentence and the exit code for what went wrong."""
     sentence = " ".join(str(error).split())
     if len(sentence) > LONGEST:  # a damaged file put the middle into it
         sentence = f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"

@@ -79,7 +79,6 @@ class Terminal:
             self._print(PAUSED)
 
     def _prompt_of(self, command: steps.Command) -> Prompt | None:
-        """Return what a command asks for; None for one that asks for nothing."""
         match command:
             case steps.AskBegin():
                 return Prompt("Press Enter to begin.", steps.Begin())
@@ -204,8 +203,6 @@ def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession
 
 
 class _Attendance:
-    """What changes while a session is attended."""
-
     def __init__(self, recorder: Recorder, console: Console, interrupted: Interruptions) -> None:
         self._recorder = recorder
         self._console = console

@@ -175,7 +175,6 @@ class Bridge(QObject):
         threading.Thread(target=lambda: self._from_threads.put(what()), daemon=True).start()
 
     def _settle(self, judged: Judged) -> None:
-        """Ask for the full solve of a stroke that was looked at."""
         session, stroke, friction = self.state.session, judged.quality.stroke, judged.quality.friction
         if session and friction and stroke and stroke.steady and stroke.normal_force:
             self.model.settle(Settle(session.plan, friction, stroke.normal_force, stroke.steady))

@@ -151,10 +151,7 @@ class ScreenFields(QWidget):
         self.show_form()
 
     def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
-        """Say how the tablet is reached, or what is known of its line; `missing` is why no session can begin.
-
-        `picture` is its address for a camera (PNG), or empty.
-        """
+        """Say how the tablet is reached; why no session can begin; its address for a camera (PNG, or empty)."""
         self._line_words, self.missing = words, missing
         shown = QPixmap()
         shown.loadFromData(picture)

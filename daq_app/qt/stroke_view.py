@@ -211,7 +211,6 @@ class StrokeView(QWidget):
         self._fill()
 
     def _fill(self) -> None:
-        """Fill the steady window between its edges as they are drawn."""
         there = self._stroke is not None and self._stroke.steady is not None
         ends = [float(self._lines[edge][0].value()) for edge in ("steady begin", "steady end")]
         for window in self._windows:

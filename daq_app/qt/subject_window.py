@@ -220,7 +220,6 @@ class SubjectWindow(QWidget):
         return page
 
     def _place_next(self, hand: Hand) -> None:
-        """Put Next where the answering hand is."""
         ways = QBoxLayout.Direction
         self._next_row.setDirection(ways.LeftToRight if hand == "right" else ways.RightToLeft)
 

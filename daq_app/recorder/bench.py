@@ -165,7 +165,6 @@ class Bench:
             self._send(tared)
 
     def _start(self) -> None:
-        """Let the open transducer stream for the display."""
         assert self.connected is not None
         self._display.stream_began()
         self._streaming = True

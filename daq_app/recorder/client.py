@@ -137,7 +137,6 @@ class Recorder:
         self._to_send.put(None)
 
     def _read(self) -> None:
-        """Take reports until there are no more."""
         assert self._process.stdout is not None
         said = ""
         with self._process.stdout as pipe:

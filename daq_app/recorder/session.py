@@ -127,10 +127,7 @@ def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
 
 
 def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup:
-    """Go on with a session that was cut short; its transducer is opened again.
-
-    Raises RecordingError, NotNow, and what opening the transducer raises.
-    """
+    """Go on with a session that was cut short. Raises RecordingError, NotNow, and as opening its transducer does."""
     folder = Path(request.folder)
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
@@ -159,10 +156,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
 
 
 def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
-    """Run the session to its end, send all that happens in it, and seal it unless it can go on.
-
-    Raises RecordingError.
-    """
+    """Run the session to its end, send all that happens, and seal it unless it can go on. Raises RecordingError."""
     writer = prepared.writer
     operator = _Operator(prepared, bench, display, inbox, send)
     writer.safe = operator.take_safe
@@ -197,7 +191,6 @@ def _recorded_settings(recording: Recording) -> dict[str, Any]:
 
 
 def _recorded_people(recording: Recording) -> m.People:
-    """Return who did what was asked for when the session began."""
     values = _recorded_settings(recording)
     with suppress(msgspec.DecodeError, msgspec.ValidationError):
         friction = msgspec.json.decode(values.get(SURFACE_FRICTION, "[]"))

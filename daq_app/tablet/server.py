@@ -189,10 +189,7 @@ class TabletServer:
 
 
 def own_address() -> str:
-    """Return the address of this machine on its network, the machine's own loop where it has none.
-
-    No packet is sent: the system only looks up which way one would take.
-    """
+    """Return this machine's network address, or its own loop; the system only looks up a route, no packet is sent."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # documentation's own network (RFC 5737): no machine is there

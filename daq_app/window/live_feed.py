@@ -33,10 +33,7 @@ KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Shares of the rated range, the greatest of some readings; 1 is the rated load.
-
-    nan where no range is stated, and before the first reading.
-    """
+    """Greatest shares of the rated range (1: rated load); nan without a range and before the first reading."""
 
     shares: tuple[float, ...] = (nan,) * 7  # of LOADS, as `drivers.calibration.loads` has them
 

@@ -76,10 +76,7 @@ class LiveTrace:
         self._columns = self._no_columns()
 
     def between(self, first: float, last: float, every: int = 1) -> tuple[Array, Array]:
-        """Return time (n,) [s] and values (channels, n) of the readings from `first` to `last` [s], or of each `every`.
-
-        The newest is always one of them.
-        """
+        """Return time (n,) [s] and values (channels, n) from `first` to `last` [s]: each `every`, and the newest."""
         a, b = self._positions(first, last)
         at = slice(a + (b - a - 1) % every if b > a else a, b, every)
         return self._time[at], self._values[:, at].astype(np.float64)

@@ -99,10 +99,7 @@ def bench_summary(view: BenchView) -> str:
 
 
 def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> BenchView:
-    """Return what is shown of the bench; while a session is recorded it is neither disconnected nor tared.
-
-    `unheard` is for how long the recorder was not heard [s].
-    """
+    """Return what is shown of the bench; `recording` keeps it connected. It was `unheard` for so long [s]."""
     info = bench.info
     lamp, words = _bench_lamp(bench, recording=recording)
     counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"

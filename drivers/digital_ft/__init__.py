@@ -41,10 +41,7 @@ class _Where:
 
 
 def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
-    """Return the transducer at `address`, its calibration in force, not streaming.
-
-    Raises SetupError, LinkLost or DeviceFault with the reason.
-    """
+    """Return the transducer at `address`, calibrated, not streaming. Raises SetupError, LinkLost or DeviceFault."""
     place = _where(address)
     with at(address), contextlib.closing(_line(place, deadline)) as link:
         bound = deadline.bound(link)

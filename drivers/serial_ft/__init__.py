@@ -43,10 +43,7 @@ class _Where:
 
 
 def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
-    """Return the controller at `address`, set and watched for its rate, not streaming.
-
-    Raises SetupError, LinkLost or DeviceFault with the reason.
-    """
+    """Return the controller at `address`, set, its rate watched. Raises SetupError, LinkLost or DeviceFault."""
     place = _where(address)
     conversation = _ControllerConversation(binary=place.binary)
     with at(address):

@@ -183,10 +183,7 @@ CLOCKS = ("time_s", "received_ns", "sequence")  # as `readings.csv` of an export
 
 
 def displacement_log(path: Path) -> DisplacementLog:
-    """Return a stage's log from a CSV file with a header; columns that it does not need are left alone.
-
-    Raises ImportRefused.
-    """
+    """Return a stage's log from a CSV file with a header; columns not needed are left alone. Raises ImportRefused."""
     rows = records(path, content_of(path))
     _, header = next(rows, (0, [""]))
     names = [cell.strip() for cell in header]

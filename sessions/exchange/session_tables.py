@@ -258,10 +258,7 @@ def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column
 
 
 def logged_event(cells: Mapping[str, str], kind: str) -> LoggedEvent:
-    """Return the event in the cells of a row, by heading; `kind` is the heading of what happened.
-
-    Raises LookupError, ValueError.
-    """
+    """Return the event in a row's cells, by heading; `kind` heads what happened. Raises LookupError, ValueError."""
     data = event_data(cells[kind], cells["data"])
     trial = int(cells["trial"]) if cells["trial"] else None
     return LoggedEvent(int(cells["number"]), int(cells["time_ns"]), cells[kind], trial, int(cells["readings"]), data)

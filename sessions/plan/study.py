@@ -309,7 +309,6 @@ def study_key(folder: Path) -> Key | None:
 
 
 def _new_key(protocol: Protocol) -> Key:
-    """Deal codes to the stimuli by chance that nobody knows."""
     stimuli = list(protocol.labels)
     codes = opaque_codes(len(stimuli), secrets.randbelow(2**31))
     return Key(secrets.token_hex(16), dict(zip(codes, stimuli, strict=True)))

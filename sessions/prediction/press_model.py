@@ -140,10 +140,7 @@ class Check(NamedTuple):
 
 
 def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
-    """Solve presses up to a depth [mm] of the finger with layers of a `stiffness` (3,) [MPa] and compare forces.
-
-    Raises FitError.
-    """
+    """Solve presses to a depth [mm] with layers of a `stiffness` (3,) [MPa] and compare forces. Raises FitError."""
     finger = model.finger(stiffness)
     mean, contrast = model.place(stiffness)
     upto = np.flatnonzero(model.depth <= deepest)[-CHECKED:]

@@ -168,10 +168,7 @@ def _posterior(
 
 
 def _fading(time: Array, elastic: Array, times: Array) -> Array:
-    """Return h (n, t) for an elastic force (n,) that grows evenly between instants, for relaxation times (t,).
-
-    Exact for that (Taylor, Pister and Goudreau 1970).
-    """
+    """Return h (n, t) for an elastic force (n,) linear between instants, exactly (Taylor, Pister and Goudreau 1970)."""
     out = np.zeros((len(time), len(times)))
     out[0] = elastic[0]
     for at in range(1, len(time)):
@@ -201,7 +198,6 @@ def _ends(values: Array, weight: Array) -> tuple[float, float]:
 
 
 def _sentence(part: Interval, time: Interval) -> str:
-    """Say what the holds tell."""
     if part.low is not None and part.low < LEAST_PART:
         return "The holds do not show that the finger relaxes: the part that does may be none."
     if time.high is None or part.high is None:

@@ -195,10 +195,7 @@ def quick(scene: Scene) -> Scene:
 def seds_at(
     strokes: Sequence[tuple[float, float, float, int, float]], options: PredictionOptions
 ) -> tuple[float | None, ...]:
-    """Return the settled SED [MPa] of the options' finger for each mu, tau_max [MPa], depth [mm], direction and speed.
-
-    None where there is no settled state.
-    """
+    """Return the settled SED [MPa] by mu, tau_max [MPa], depth [mm], direction and speed; None where none settles."""
     base = template(options)
     course = Solve(options.kinematics, "steady", base.solve.tolerance)
     scenes = [

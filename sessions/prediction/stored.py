@@ -141,10 +141,7 @@ def settled_numbers(answer: Prediction) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialNumbers:
-    """The numbers that the model gives of one trial, or of one stroke of a recording without trials.
-
-    A number is None where `reasons` says why, under the number's name.
-    """
+    """The model's numbers of one trial, or one stroke without trials; None where `reasons` says why, by name."""
 
     trial: Annotated[int | None, Meaning("", "number of the trial")]
     stroke: Annotated[int | None, Meaning("", "position of the stroke it was made for, from 0")]

@@ -109,7 +109,6 @@ def intervals_of(
 
 
 def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale: float) -> SedInterval:
-    """Return the interval of the settled SED that was found."""
     if slide is None:
         return SedInterval(None, None, None, reason="the state found depends on the way to it")
     loads = _loads(prediction.scene, drawn, scale)
@@ -272,7 +271,6 @@ def _answers_of_prediction(prediction: SessionPrediction, variant: Variant) -> _
 
 
 def _solve_variant(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Answers:
-    """Solve the scenes of a variant, and return their answers."""
     scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
     answers = iter(predict_scenes([scene for scene in scenes if not isinstance(scene, str)], progress))
     return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]

@@ -212,10 +212,7 @@ def reveal(recording: Recording) -> Recording:
 
 
 def session_folders(folder: Path) -> tuple[Path, ...]:
-    """Return the folders in a folder that hold a session, by name, and those that nobody may look into.
-
-    Raises OSError where the folder itself cannot be read.
-    """
+    """Return the session folders in a folder, by name, and those that nobody may look into. Raises OSError."""
     inside = (path for path in folder.iterdir() if path.is_dir())
     return tuple(sorted(p for p in inside if not os.access(p, os.R_OK | os.X_OK) or (p / LIVE_FILE).is_file()))
 

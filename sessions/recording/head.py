@@ -201,10 +201,7 @@ def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> 
 
 
 def compact_json(value: object) -> str:
-    """Return `value` as compact JSON in which every float survives to the last bit.
-
-    Raises ValueError for nan and infinities: JSON has none.
-    """
+    """Return `value` as compact JSON, every float exact. Raises ValueError for nan and infinities: JSON has none."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
@@ -239,10 +236,7 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
 
 
 def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
-    """Return the transducer that `info_to_dict` gave `data` for.
-
-    Raises ValueError for another shape, and when the matrix is not the one its hash was taken of.
-    """
+    """Return the transducer `info_to_dict` gave `data` for. Raises ValueError for another shape or matrix hash."""
     info = as_type(data, _Info)
     stored = info.calibration
     if len(stored.tool) not in (0, 6):

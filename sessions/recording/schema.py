@@ -131,10 +131,7 @@ def summary(block: ReadingBlock) -> tuple[int, ...]:
 
 
 def block_from_blobs(columns: tuple[bytes, ...]) -> ReadingBlock:
-    """Return the readings whose columns are `columns`, in the order of `COLUMNS`.
-
-    Raises ValueError when the columns differ in length.
-    """
+    """Return the readings of `columns`, in the order of `COLUMNS`. Raises ValueError when they differ in length."""
     arrays: dict[str, Indices | Array] = {
         name: np.frombuffer(column, kind) for (name, kind), column in zip(COLUMNS.items(), columns, strict=True)
     }

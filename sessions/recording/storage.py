@@ -66,10 +66,7 @@ def check_room(folder: Path, need: Need) -> None:
 
 
 def take_reserve(folder: Path, size: int) -> None:
-    """Take room in advance, to be given back when the disk is full so that the end can be written.
-
-    Raises OSError where there is no such room, a quota's limit included.
-    """
+    """Take room in advance, given back on a full disk to write the end. Raises OSError where disk or quota lack it."""
     with open_new(folder / RESERVE_FILE) as file:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(file.fileno(), 0, size)

@@ -56,10 +56,7 @@ class ReportError(Exception):
 
 
 def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
-    """Return the page: no script, nothing asked of any network; the same report gives the same bytes.
-
-    `drawings` are its `plates`, where they were drawn already.
-    """
+    """Return the page, without script or network, from `drawings` if given; one report always gives the same bytes."""
     tables, further = split_off_appendix(session_tables(report), BODY)
     return _page(
         "report.html.jinja",

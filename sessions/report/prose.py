@@ -191,7 +191,6 @@ def distinctions(report: Report) -> tuple[str, ...]:
 
 
 def _strokes(report: Report) -> str:
-    """Return how many strokes were found and how many gave friction."""
     n = len(report.strokes)
     if n == 0:
         return "No stroke was found in the recording; the flaws below say why."

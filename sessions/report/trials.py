@@ -154,10 +154,7 @@ _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_
 def predictions(
     prediction: SessionPrediction | None, firing: Sequence[Firing] = (), undone: Set[int] = frozenset()
 ) -> tuple[PredictionFinding, ...]:
-    """Return a finding for each trial, or for each stroke of a recording without trials.
-
-    `undone` are the numbers of trials that the session did not come to.
-    """
+    """Return a finding for each trial, or stroke where there are none; the session did not come to trials `undone`."""
     if prediction is None:
         return ()
     rates = {one.trial: one for one in firing}

@@ -30,10 +30,7 @@ UNDONE = "the redo was undone"
 
 
 def start(plan: SessionPlan) -> Step:
-    """Return the state a session is in before it begins, and the first commands.
-
-    Raises ValueError for a plan without trials: an imported recording is not run.
-    """
+    """Return the state before a session begins, and the first commands. Raises ValueError for a plan without trials."""
     if not plan.trials:
         raise ValueError(f"the plan of {plan.subject} has no trials, so there is nothing to run")
     return Idle(Place(plan, 0, (Progress(),) * len(plan.trials))), (steps.AskBegin(),)

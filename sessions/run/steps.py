@@ -102,10 +102,7 @@ class _WithReason(Struct, frozen=True):
 
 
 class Redo(_WithReason, frozen=True):
-    """The trial in hand is to be done again; just before a trial begins, the one before it.
-
-    Of two stimuli that are compared both are presented again.
-    """
+    """The trial in hand is to be done again, or just before it begins the one before it; of two compared, both."""
 
 
 class UndoRedo(Struct, frozen=True):

@@ -120,10 +120,7 @@ class Fit:
 
 
 def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int) -> Fit:
-    """Return the fit of y (n) by `columns` (n, p) of full rank, whose first `own` also differ between subjects (n).
-
-    Columns should be of about one size.
-    """
+    """Return the fit of y (n) by `columns` (n, p), alike in size; their first `own` also differ between subjects."""
     whose = _levels(subjects)
     random = (whose[:, :, None] * columns[:, None, :own]).reshape(len(y), -1)
     places = np.tril_indices(own)
@@ -295,7 +292,6 @@ def mixed_model(
 
 
 def _term(name: str, estimate: float, error: float, dof: int) -> Term:
-    """Return a fixed effect with a t interval of `dof` degrees of freedom."""
     half, p = t_quantile(dof) * error, 2.0 * float(special.stdtr(dof, -abs(estimate / error)))
     return Term(name, estimate, estimate - half, estimate + half, p)
 

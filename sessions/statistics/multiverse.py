@@ -225,10 +225,7 @@ class PathTrial:
 def path_findings(
     trials: Sequence[PathTrial], kinematics: str, law: AreaLaw = FIXED, *, within: bool
 ) -> tuple[PathFinding, ...]:
-    """Return how predictions go with scores along each path.
-
-    Correlations within subjects are taken where `within` says so. Empty where no trial went along the paths.
-    """
+    """Return how predictions go with scores along each path, also `within` subjects; empty where no trial has paths."""
     along = [trial for trial in trials if trial.values]
     if not along:
         return ()

@@ -99,10 +99,7 @@ class MeanScore:
 
 
 def score_table(recording: "Recording") -> ScoreTable:
-    """Return the scores on the line that one session's experiment gave; practice and pre-evaluation are left out.
-
-    Raises Blinded while the stimuli's key is sealed.
-    """
+    """Return a session's scores on the line, of main trials alone. Raises Blinded while the stimuli's key is sealed."""
     subject = recording.plan.subject
     scores = tuple(
         Score(subject, record.trial.stimulus.descriptor, record.trial.stimulus.known_index, record.score)
@@ -158,10 +155,7 @@ def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
 
 
 def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, float], ...]:
-    """Return (subject, descriptor, r) of all whose scores fall as the index rises.
-
-    They perhaps used the scale backwards; nothing is turned round for them.
-    """
+    """Return (subject, descriptor, r) of all whose scores fall as the index rises; nothing is turned round for them."""
     points = by_key(((one.subject, one.descriptor), (one.index, one.score)) for one in subject_scores(tables))
     rs = ((key, pearson(*zip(*pairs, strict=True))) for key, pairs in points.items())
     return tuple((*key, r) for key, r in rs if r is not None and r < 0)

@@ -256,9 +256,6 @@ def check_analysis(document: Mapping[str, Any]) -> None:
 
 
 def bootstrap_settings(stored: Mapping[str, Any]) -> BootstrapSettings:
-    """Return the settings of stored intervals; what an older program did not draw has its default.
-
-    Raises SettingsError.
-    """
+    """Return the settings of stored intervals, the default for what was not drawn then. Raises SettingsError."""
     current = {name: value for name, value in stored.items() if name not in _REPLACED}
     return from_table(current, BootstrapSettings, "bootstrap")

@@ -170,7 +170,6 @@ def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
 
 
 def _spread(stretch: list[float]) -> float:
-    """Return the standard deviation."""
     mean = fmean(stretch)
     return sqrt(sum((reading - mean) ** 2 for reading in stretch) / (len(stretch) - 1))
 

@@ -168,10 +168,7 @@ class Decisions:
 
     @property
     def in_force(self) -> tuple[Decision, ...]:
-        """Return the decisions that act, by number: neither undone nor set anew since.
-
-        What undoes a line may be undone itself; the line is then in force again.
-        """
+        """Return the decisions that act, by number: not undone (undoing can be undone too), nor set anew since."""
         acting: dict[tuple[int | None, int | None, str], Decision] = {}
         for decision in self.standing:
             if decision.undoes is None:
@@ -205,10 +202,7 @@ class Decisions:
         return next((cast("Span", one.new) for one in self.in_force if one.what == "tilt"), None)
 
     def with_line(self, decision: Decision) -> "Decisions":
-        """Return them with one more that is not recorded, as to see what it would do.
-
-        Raises DecisionError where it cannot be.
-        """
+        """Return them with one more, not recorded, to see what it would do. Raises DecisionError where it cannot be."""
         _check(decision, self)
         last = max((line.number for line in self.lines), default=0)
         return replace(self, lines=(*self.lines, replace(decision, number=last + 1)))

@@ -119,10 +119,7 @@ def movement(time: Array, position: Array, rate: float, settings: AnalysisSettin
 
 
 def displacement(position: Array) -> float:
-    """Return how far position (n, 2) [mm] lies apart between the first and the last fifth of its readings.
-
-    nan where it is not known.
-    """
+    """Return how far position (n, 2) [mm] moves from the first to the last fifth of its readings; nan if not known."""
     finite = position[np.isfinite(position).all(axis=1)]
     fifth = max(1, len(finite) // 5)
     if len(finite) < 2 * fifth:

@@ -166,10 +166,7 @@ class StrokeZero:
 
 
 def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
-    """Return the zero for a stroke from the unloaded stretches around it; None where there is none.
-
-    `idle` (n,) marks the readings in which nothing presses.
-    """
+    """Return a stroke's zero from unloaded stretches around it, if any; nothing presses where `idle` (n,) is set."""
     onset, lift, longest = contact.onset, contact.lift, span.settings.zero.zero_stretch
     before = None if onset is None else span.windows.before(onset, longest)
     after = None if lift is None else span.windows.after(lift, longest)

@@ -63,7 +63,6 @@ def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
 
 
 def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
-    """Say how the face leans, and whether that was levelled."""
     ends = (tilt.x_interval, tilt.y_interval)
     rows = [
         f"{number(a)}° ({number(low)} to {number(high)}) to +{axis}"

@@ -39,7 +39,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> int:
-    """Run the study into `out`, and print what came of it."""
     began = time.monotonic()
     clock = clock_at(1.0 if options.real_time else PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")

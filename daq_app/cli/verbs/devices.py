@@ -74,7 +74,6 @@ def _description(device: Probe) -> dict[str, Any]:
 
 
 def _life_words(life: Life) -> str:
-    """Return a transducer's history in one sentence."""
     overloads = f"{life.overloads} overloads, the last on {life.last_overload}" if life.overloads else "no overload"
     if not life.zeros:
         return f"{overloads} since it is known here"

@@ -98,8 +98,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 class _Outcome(NamedTuple):
-    """What came of the presses."""
-
     fit: FingerFit
     check: Check
     relaxation: RelaxationFit | None

@@ -60,7 +60,6 @@ def _whole_session(folder: Path) -> Generator[None]:
 
 
 def _restore_export(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
-    """Make a session of an export of ours again."""
     from sessions.exchange.exported import import_session
     from sessions.recording.archive import seal
 
@@ -78,7 +77,6 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
 
 
 def _import_foreign(options: argparse.Namespace, console: Console) -> int:
-    """Import a CSV file of somebody else's."""
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
     from sessions.recording.archive import seal
     from sessions.recording.manifest import list_in_manifest

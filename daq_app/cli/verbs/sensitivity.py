@@ -167,7 +167,6 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
 def _print_shares(
     shares: Mapping[str, tuple[float, float, float] | None], fingers: int, without_answer: int, console: Console
 ) -> None:
-    """Print how often fingers drawn at random keep both published signs of each quantity."""
     console.say(
         f"\n{fingers} fingers drawn at random from ranges that nobody measured (below), "
         f"{without_answer} of them without a settled state on three surfaces of each series. "
@@ -203,7 +202,6 @@ def _cells(answer: Answer | str, series: str, at: int) -> tuple[str, str]:
 
 
 def _print_map(radii: dict[float, Answer | str], at: int, console: Console) -> None:
-    """Print the signs of stickiness and slipperiness for each tip radius and place of the receptor."""
     console.say(
         f"\nSigns of r of the {QUANTITIES[at].label} with stickiness and with slipperiness, over the receptor's place "
         "along the skin [mm, positive to the tip] and the tip radius [mm]:"

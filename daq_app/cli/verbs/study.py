@@ -195,7 +195,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console) -> int:
-    """Pool the sessions in `folder`, and write what comes of it into `out`."""
     sessions = session_folders(folder)
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
@@ -232,7 +231,6 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
 
 
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
-    """Write page, table and numbers and return where they are."""
     from sessions.report import pages  # drawing is slow to load
 
     files = {

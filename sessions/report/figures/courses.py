@@ -104,10 +104,7 @@ SPEED = StrokeQuantity(
 
 
 def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str) -> Panel | None:
-    """Return a quantity of one experiment's strokes from contact onset on; None where nothing can be drawn.
-
-    Strokes whose speed was refused are left out of speeds.
-    """
+    """Return a quantity of an experiment's strokes since contact, None without curves; refused speeds stay out."""
     if of is SPEED:
         strokes = [stroke for stroke in strokes if stroke.speed is not None]
     drawn = sheet(328, 290)

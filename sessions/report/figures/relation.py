@@ -281,10 +281,7 @@ Value = float | None
 def comparison_panel(
     names: Sequence[str], sessions: tuple[str, str], rows: Sequence[tuple[str, Sequence[tuple[Value, Value]]]]
 ) -> Panel | None:
-    """Return the picture of `rows`: a stimulus and its values of both sessions for each of `names`.
-
-    None where no stimulus has both.
-    """
+    """Return the picture of `rows`: stimuli, and both sessions' values of each of `names`; None where none has both."""
     if not any(None not in pair for _, pairs in rows for pair in pairs):
         return None
     drawn = sheet(560, 150 * len(names) + 60, tuple(1.0 for _ in names), share_x=True)

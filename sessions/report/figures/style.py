@@ -253,10 +253,7 @@ def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list
 
 
 def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "") -> None:
-    """Write labels right of the axes, each with a thin line to its point; `head` stands over the column of labels.
-
-    They find their heights when the axes have theirs.
-    """
+    """Write labels under `head` right of the axes, each with a line to its point, once the axes have their heights."""
     if not labels:
         return
     write = partial(axes.text, transform=axes.get_yaxis_transform(), va="center", ha="left")

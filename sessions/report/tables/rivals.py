@@ -20,10 +20,7 @@ Compared = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its riv
 
 
 def rival_tables(compared: Compared, quantity: str, model: str) -> tuple[Table | None, Table | None]:
-    """Return what was measured beside a quantity of the model in each group, and the model's other quantities.
-
-    `model` says in short which model it is.
-    """
+    """Return what was measured beside a quantity of the `model`, named in short, and the model's other quantities."""
     within = "Steiger (1980), within subjects by the jackknife" if _weighed(compared) else "Steiger (1980)"
     aic = "AIC: crossed mixed models. " if _weighed(compared) else ""
     measured = caption("rivals", label=quantity, model=model, within=within, aic=aic)
