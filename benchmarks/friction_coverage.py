@@ -24,6 +24,7 @@ from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import Analysis, analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws, drag_direction
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
+from sessions.strokes.trial_analysis import TrialContext
 from simulators.bench import RATED, Bench, BenchSettings, StrokeGroundTruth
 from simulators.stroke import CONTACT_AREA, paper_surfaces
 from simulators.subject import SimulatedSubject
@@ -119,7 +120,7 @@ class Visit:
             begin = stroke.end + 1.0
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
         plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=Frame("-z", "set", HEIGHT, "set"))
-        return analyse_blocks(parts, plan, INFO, AnalysisSettings()), truths, forces
+        return analyse_blocks(parts, TrialContext(plan, INFO, AnalysisSettings())), truths, forces
 
     def errors_alone(self, force: Array, settings: BootstrapSettings) -> dict[str, bool]:
         """Say whether intervals of nothing but gains, cross-talk and lean hold mu and T of a true force (3,) [N]."""

@@ -142,7 +142,7 @@ def predict_session(
     recording: Recording,
     analysis: Analysis,
     console: Console,
-    options: PredictionOptions | None = None,
+    options: PredictionOptions,
     afferent: AfferentSettings | None = None,
 ) -> SessionPrediction:
     """Return what the model predicts for a session, and keep it in the session's folder.
@@ -202,17 +202,16 @@ def changes(name: str, stored: Mapping[str, Any], fresh: Mapping[str, Any]) -> l
 
 
 def _predict(
-    analysis: Analysis, plan: SessionPlan, options: PredictionOptions | None, progress: Progress
+    analysis: Analysis, plan: SessionPlan, options: PredictionOptions, progress: Progress
 ) -> SessionPrediction:
     """Return the prediction with all that its options ask for beside it."""
-    intervals = options is not None and options.intervals
-    parts = 1 + intervals + (options is not None and options.variants != "none")
+    parts = 1 + options.intervals + (options.variants != "none")
 
     def part(number: int) -> Progress | None:
         return part_of(progress, number / parts, (number + 1) / parts)
 
     prediction = predict(analysis, plan, options, part(0))
-    if intervals:
+    if options.intervals:
         prediction = with_intervals(analysis, prediction, progress=part(1))
     return with_alternatives(prediction, part(parts - 1), analysis)
 

@@ -65,7 +65,6 @@ def compute_visit(folder: Path, options: VisitOptions) -> Answer:
 
 
 def _contents(folder: Path, options: VisitOptions) -> tuple[Any, ...]:
-    """Return the arguments of `compute_sent_visit` for a session on this disk. Raises RecordingError."""
     return folder.name, content_of(folder), options
 
 

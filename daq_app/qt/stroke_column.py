@@ -98,6 +98,9 @@ class StrokeColumn(QWidget):
             readings = self._read.readings
             self.readings.go_to(int(readings.block.time.searchsorted(self._stroke.steady[0])))
 
+    def _choose(self, row: int) -> None:
+        self._ask(m.Choose(row))
+
     def go_to_numbers(self) -> None:
         self.tabs.setCurrentIndex(NUMBERS)
         self._scroll.setFocus()
@@ -105,9 +108,6 @@ class StrokeColumn(QWidget):
     def play(self) -> None:
         """Play the readings from their beginning as soon as they are there."""
         self._play_next = True
-
-    def _choose(self, row: int) -> None:
-        self._ask(m.Choose(row))
 
     def _show_readings(self, state: AnalystState) -> None:
         stroke, read = self._stroke, state.read

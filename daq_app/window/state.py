@@ -105,11 +105,6 @@ class BenchState:
     life: Life | None = None  # of its serial number, where anything is kept of it
 
 
-def bench_after(bench: BenchState, message: Message) -> BenchState:
-    """Return the bench after a message; the same object where it does not concern the bench."""
-    return _fold_readings(_fold_link(bench, message), message)
-
-
 def _fold_link(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.Connect(uri):
@@ -190,7 +185,7 @@ def fold(state: AppState, message: Message) -> AppState:
     """Return the state after a message: what was sent to the recorder, what came from it, or the window's own."""
     if type(message) in _FROM_RECORDER:
         state = replace(state, heard=state.now)
-    bench = bench_after(state.bench, message)
+    bench = _fold_readings(_fold_link(state.bench, message), message)
     session = state.session and session_after(state.session, message, state.now)
     if bench is not state.bench or session is not state.session:
         state = replace(state, bench=bench, session=session)

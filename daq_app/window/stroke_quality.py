@@ -23,6 +23,7 @@ from sessions.run import steps
 from sessions.strokes import AnalysisSettings, FlawName
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.stroke import Stroke
+from sessions.strokes.trial_analysis import TrialContext
 
 KEEP_OFF = tr_noop("Keep the finger off until the stroke.")
 AFTER = 0.35  # unloaded readings after a lift that belong to the picture of a stroke [s]
@@ -55,7 +56,7 @@ PRESS_ON = tr_noop("Keep pressing until the end.")
 
 def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial) -> Quality:
     """Return the quality of the stroke in the readings of one take, judged as the analysis of a recording judges it."""
-    analysis = analyse_blocks([(trial, block)], plan, info, AnalysisSettings())
+    analysis = analyse_blocks([(trial, block)], TrialContext(plan, info, AnalysisSettings()))
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
     mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in FLAWS]

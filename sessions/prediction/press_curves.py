@@ -11,6 +11,7 @@ from sessions.prediction.relaxation_fit import HoldCurve
 from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings, Stroke
 from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.trial_analysis import TrialContext
 
 LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
 STANDS = 0.01  # a stage stands while it is so near its greatest travel, as a share of that [-] ...
@@ -48,10 +49,11 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
         if recording.plan.blocks
         else [(None, recording.readings())]
     )
+    context = TrialContext(recording.plan, recording.info, settings)
     presses: list[tuple[LoadingCurve, str, HoldCurve | None]] = []
     left_out: list[str] = []
     for trial, block in parts:
-        analysis = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
+        analysis = analyse_blocks([(trial, block)], context)
         clocks: Mapping[str, Array] = {
             "time_s": block.time,
             "received_ns": block.received_ns.astype(np.float64),

@@ -70,14 +70,14 @@ class Psychometric:
     reason: str = ""
 
 
-def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychometric:
-    """Return the function fitted to answers; `lapse`, where given, is held at that share."""
+def psychometric(levels: Sequence[Level]) -> Psychometric:
+    """Return the function fitted to answers."""
     shown = [one for one in levels if one.presented]
     none = Psychometric(sum(one.presented for one in shown))
     ratios = {one.log_ratio for one in shown}
     if len(ratios) < LEAST_LEVELS:
         return replace(none, reason=f"it takes {LEAST_LEVELS} comparisons of different friction")
-    task = _Task(shown, lapse)
+    task = _Task(shown)
     if task.flat:
         return replace(none, reason="answers hardly go with friction: the JND lies beyond all comparisons")
     slope = task.profile(_SLOPE)
@@ -103,7 +103,7 @@ def binomial_deviance(k: Array, n: Array, p: Array) -> float:
 class _Task:
     """The likelihood of answers, its maximum, and its profiles."""
 
-    def __init__(self, levels: Sequence[Level], lapse: float | None) -> None:
+    def __init__(self, levels: Sequence[Level]) -> None:
         self.x = np.array([one.log_ratio for one in levels])
         self.side = np.array([float(one.order) for one in levels])
         self.k = np.array([float(one.chosen) for one in levels])
@@ -123,7 +123,7 @@ class _Task:
             (float(self.x.min()) - far, float(self.x.max()) + far),
             (-self.steepest, self.steepest),
             order,
-            (0.0, MOST_LAPSES) if lapse is None else (lapse, lapse),
+            (0.0, MOST_LAPSES),
             scatter,
         )
         self.scale = np.array([self.spread, 1.0 / self.spread, self.spread, 0.1, 0.1])

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from drivers.readings import ReadingBlock
-from drivers.transducer import TransducerInfo
 from sessions.file_access import complete
-from sessions.plan.plan import SessionPlan, Trial
+from sessions.plan.plan import Trial
 from sessions.strokes.bootstrap import StrokeIntervals, stroke_intervals
 from sessions.strokes.decisions import OF_SESSION, Decision, DecisionError, Decisions, Value, read
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
@@ -91,23 +90,15 @@ def analyse(
     warm_up = [(trial, recording.readings(trial.number)) for trial in takes if trial.phase != "main"]
     context = TrialContext(recording.plan, recording.info, settings, decisions)
     analysis = _without_intervals(main if recording.plan.blocks else [(None, recording.readings())], context, losses)
-    presses = _without_intervals(warm_up, context._replace(decisions=Decisions()), ()).presses + analysis.presses
+    undecided = TrialContext(recording.plan, recording.info, settings)
+    presses = _without_intervals(warm_up, undecided, ()).presses + analysis.presses
     analysis = replace(analysis, simulated=recording.simulated, presses=presses)
     return _with_intervals(replace(analysis, flaws=(*analysis.flaws, *_assumed_tilt_flaw(analysis))))
 
 
-def analyse_blocks(
-    parts: Blocks,
-    plan: SessionPlan,
-    info: TransducerInfo,
-    settings: AnalysisSettings,
-    flaws: Iterable[Flaw] = (),
-    decisions: Decisions | None = None,
-) -> Analysis:
-    """Return the strokes in the readings of trials; `flaws` of the recording come before those that are found."""
-    return _with_intervals(
-        _without_intervals(parts, TrialContext(plan, info, settings, decisions or Decisions()), flaws)
-    )
+def analyse_blocks(parts: Blocks, context: TrialContext) -> Analysis:
+    """Return the strokes in the readings of trials."""
+    return _with_intervals(_without_intervals(parts, context, ()))
 
 
 def _without_intervals(parts: Blocks, context: TrialContext, flaws_before: Iterable[Flaw]) -> Analysis:

@@ -44,7 +44,7 @@ class TrialContext(NamedTuple):
     plan: SessionPlan
     info: TransducerInfo
     settings: AnalysisSettings
-    decisions: Decisions
+    decisions: Decisions = Decisions()
 
     @property
     def zero_is_stated(self) -> bool:

@@ -17,7 +17,7 @@ from daq_app.cli.verbs import devices
 from daq_app.recorder.messages import HealthReport
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connect
-from daq_app.window.state import BenchState, bench_after
+from daq_app.window.state import AppState, BenchState, fold
 from daq_app.window.view import bench_view
 from daq_app.wording import COUNT_WORDS
 from drivers.clock import RealClock
@@ -89,10 +89,13 @@ def test_a_session_in_which_the_units_change_ends_and_names_the_readings_in_doub
     assert any(f"the last {end.health.off_units} readings" in problem for problem in problems)
 
 
+OPEN = AppState(bench=BenchState(link="open"))
+
+
 def test_the_window_names_a_fault_of_the_device():
     health = Health(received=200, doubtful=200, flagged={"gauge excitation current too low": 200})
     report = HealthReport(health, 200.0, (0.0,) * 7, (0.0,) * 7, 200)
-    view = bench_view(bench_after(BenchState(link="open"), report), recording=True)
+    view = bench_view(fold(OPEN, report).bench, recording=True)
     assert view.lamp == "wrong"
     assert "gauge excitation current too low" in view.lamp_words
     assert ("doubtful", "200") in view.counters
@@ -101,7 +104,7 @@ def test_the_window_names_a_fault_of_the_device():
 def test_every_count_of_a_transducer_s_health_is_shown_in_words():
     assert set(COUNT_WORDS) == {"received", *COUNTS}
     report = HealthReport(Health(received=200, off_units=12), 200.0, (0.0,) * 7, (0.0,) * 7, 0)
-    view = bench_view(bench_after(BenchState(link="open"), report), recording=True)
+    view = bench_view(fold(OPEN, report).bench, recording=True)
     assert view.lamp_words == "12 in other units"
     assert "_" not in "".join(name for name, _ in view.counters)
 

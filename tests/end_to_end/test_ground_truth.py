@@ -16,6 +16,7 @@ from sessions.strokes import AnalysisSettings
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.contacts import ContactDetector, Lift, Onset
 from sessions.strokes.forces import normal_force
+from sessions.strokes.trial_analysis import TrialContext
 from simulators.bench import RATED, Bench, BenchSettings, StrokeGroundTruth
 from simulators.stroke import paper_surfaces
 from simulators.subject import SimulatedSubject
@@ -36,7 +37,7 @@ class Visit:
     def analyse(self):
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in self.parts)),)
         plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=FRAME)
-        return analyse_blocks(self.parts, plan, INFO, AnalysisSettings())
+        return analyse_blocks(self.parts, TrialContext(plan, INFO, AnalysisSettings()))
 
 
 def visit(seed, settings=None, rate=RATE):

@@ -11,6 +11,7 @@ from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.bootstrap import BootstrapSettings
 from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.trial_analysis import TrialContext
 
 HEIGHT = 12.0  # [mm]
 NOISE = np.array([0.004] * 3 + [0.05] * 3)  # [N, N mm]
@@ -83,7 +84,7 @@ def plan(trials=(), frame=None):
 
 def analyse(readings, *, of=None, frame=None, info=INFO, settings=SETTINGS):
     """Return the analysis of a block: of a trial, or of a recording without trials."""
-    return analyse_blocks([(of, readings)], plan([of] if of else [], frame), info, settings)
+    return analyse_blocks([(of, readings)], TrialContext(plan([of] if of else [], frame), info, settings))
 
 
 def names(analysis, grade=None):

@@ -19,6 +19,7 @@ from sessions.recording.archive import problems, seal
 from sessions.strokes.analysis import analyse_blocks, with_present
 from sessions.strokes.bootstrap import stroke_intervals
 from sessions.strokes.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parse, read
+from sessions.strokes.trial_analysis import TrialContext
 
 WINDOW = Decision("E02", "the ramp was in it", "steady", 1, 1, (1.1, 2.9), (1.5, 2.5))
 
@@ -192,7 +193,8 @@ def analyse_with(*decisions, raw=None, t=T, of=True):
     frame = Frame("-z", "set", 12.0, "set")
     readings = block(t, noisy(SLOW) if raw is None else raw)
     parts = [(of_trial, readings)]
-    return analyse_blocks(parts, plan([of_trial] if of_trial else [], frame), INFO, SETTINGS, (), Decisions(lines))
+    of_plan = plan([of_trial] if of_trial else [], frame)
+    return analyse_blocks(parts, TrialContext(of_plan, INFO, SETTINGS, Decisions(lines)))
 
 
 def rising():

@@ -22,13 +22,17 @@ from closed_form import (
     trial,
 )
 from closed_form import wrench as made
+from recordings import record_session
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusTable, bit
 from sessions.plan.plan import Frame
+from sessions.recording import Recording
+from sessions.strokes.analysis import analyse as analyse_recording
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.decisions import Decision, Decisions
-from sessions.strokes.stroke import Flaw, FlawName
+from sessions.strokes.stroke import FlawName
+from sessions.strokes.trial_analysis import TrialContext
 
 ALONG = 25.0 * (T - 2.0)
 HALF = 0.5 * np.ones_like(T)
@@ -118,7 +122,6 @@ CASES = {
     "wild_reading": Case(with_rows(slice(420, 421), np.array([20.0, 0, 0, 0, 0, 0])), given_numbers=FRICTION),
     "irregular_time": Case(block(T + np.random.default_rng(3).uniform(0, 0.002, len(T)), noisy(PLAIN))),
     "unknown_rate": Case(block(0 * T, noisy(PLAIN)), (), ()),
-    "recording": Case(block(T, noisy(PLAIN)), extra={"told": [Flaw(FlawName.RECORDING, "Lost.", "doubtful")]}),
     "no_unloaded_stretch": Case(
         block(T[INSIDE], noisy(made(T, SWAYING, HALF, ALONG))[INSIDE]),
         (*FRICTION, "speed", "direction", "onset", "lift"),
@@ -189,16 +192,20 @@ CASES = {
 
 
 def analyse_case(case, of):
-    arguments = {"frame": None, "info": INFO, "told": (), "decisions": None, **case.extra}
-    session_plan = plan([of], arguments["frame"])
-    return analyse_blocks(
-        [(of, case.readings)], session_plan, arguments["info"], SETTINGS, arguments["told"], arguments["decisions"]
-    )
+    setting = {"frame": None, "info": INFO, "decisions": Decisions(), **case.extra}
+    context = TrialContext(plan([of], setting["frame"]), setting["info"], SETTINGS, setting["decisions"])
+    return analyse_blocks([(of, case.readings)], context)
 
 
 def test_every_flaw_there_is_has_a_fault_here():
-    # That the lean is assumed is a flaw of a whole recording: see test_tilt.py.
-    assert {*CASES, "tilt_assumed"} == {str(name) for name in FlawName}
+    # That the lean is assumed is a flaw of a whole recording: see test_tilt.py. So are its losses: see below.
+    assert {*CASES, "tilt_assumed", "recording"} == {str(name) for name in FlawName}
+
+
+def test_what_a_recording_lost_is_a_flaw_of_its_analysis(tmp_path):
+    whole = Recording.open(record_session(tmp_path / "S01"))
+    flaw = analyse_recording(replace(whole, _log_losses=("Readings are lost.",))).flaws[0]
+    assert (flaw.name, flaw.sentence, flaw.grade) == (FlawName.RECORDING, "Readings are lost.", "doubtful")
 
 
 @pytest.mark.parametrize("name", CASES)

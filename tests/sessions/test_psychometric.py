@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, special, stats
 
+from sessions.statistics import psychometric as module
 from sessions.statistics.psychometric import QUARTILE, Level, psychometric
 
 # Brightness of a light by one of 35 units (Gegenfurtner 1992, Behav. Res. Methods 24, 560): level, presented, brighter.
@@ -21,9 +22,10 @@ def scattered():
     return [Level(at, chosen, 20) for at, chosen in SCATTERED]
 
 
-def test_without_lapses_the_function_is_the_probit_that_r_prints():
+def test_without_lapses_the_function_is_the_probit_that_r_prints(monkeypatch):
     # R: glm(cbind(Yes, Trial - Yes) ~ Intensity, binomial(link = "probit")) prints -2.874139, 0.077472, deviance 2.8119
-    fit = psychometric(brightness(), lapse=0.0)
+    monkeypatch.setattr(module, "MOST_LAPSES", 0.0)
+    fit = psychometric(brightness())
     assert fit.pse.value == pytest.approx(2.874139 / 0.077472, abs=3e-4)
     assert fit.jnd.value == pytest.approx(0.6744898 / 0.077472, abs=1e-4)
     assert fit.deviance == pytest.approx(2.8119, abs=5e-5)
@@ -188,8 +190,9 @@ def test_answers_that_step_between_two_levels_bound_the_jnd_above_and_the_pse_on
     assert -0.3 < fit.pse.low < -0.14 < 0.14 < fit.pse.high < 0.3
 
 
-def test_a_jnd_that_the_answers_do_not_bound_has_no_upper_end():
-    fit = psychometric([Level(-0.3, 3, 10), Level(-0.1, 4, 10), Level(0.1, 6, 10), Level(0.3, 7, 10)], lapse=0.0)
+def test_a_jnd_that_the_answers_do_not_bound_has_no_upper_end(monkeypatch):
+    monkeypatch.setattr(module, "MOST_LAPSES", 0.0)
+    fit = psychometric([Level(-0.3, 3, 10), Level(-0.1, 4, 10), Level(0.1, 6, 10), Level(0.3, 7, 10)])
     assert fit.jnd.high is None
     assert fit.jnd.low > 0.0
 

@@ -11,7 +11,7 @@ from sessions.recording import Recording
 from sessions.strokes.analysis import analyse as analyse_recording
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws
-from sessions.strokes.trial_analysis import tilt_of
+from sessions.strokes.trial_analysis import TrialContext, tilt_of
 
 T = times(12.0)
 LEAN = (2.0, -1.2)  # degrees, to +x and to +y
@@ -90,7 +90,8 @@ def test_a_lean_that_was_levelled_is_still_told_as_that_of_the_face():
 
 def test_presses_of_practice_count_and_its_strokes_do_not():
     practice = replace(trial(), phase="practice")
-    analysis = analyse_blocks([(practice, block(T, noisy(leaning(presses()))))], plan([practice]), INFO, SETTINGS)
+    parts = [(practice, block(T, noisy(leaning(presses()))))]
+    analysis = analyse_blocks(parts, TrialContext(plan([practice]), INFO, SETTINGS))
     assert [press.trial for press in analysis.presses] == [1, 1, 1]
 
 
@@ -102,8 +103,8 @@ def width(analysis):
 def test_three_presses_narrow_the_interval_of_mu_and_a_lean_that_nobody_levelled_moves_it_over_the_true_mu():
     clean = [leaning(slide(T, mu=0.5)), leaning(presses())]
     parts = [(trial(number=number), block(T, noisy(raw))) for number, raw in zip((1, 2), clean, strict=True)]
-    analysis = analyse_blocks(parts, plan([of for of, _ in parts]), INFO, SETTINGS)
-    alone = analyse_blocks(parts[:1], plan([parts[0][0]]), INFO, SETTINGS)
+    analysis = analyse_blocks(parts, TrialContext(plan([of for of, _ in parts]), INFO, SETTINGS))
+    alone = analyse_blocks(parts[:1], TrialContext(plan([parts[0][0]]), INFO, SETTINGS))
     (low, high), mu = analysis.strokes[0].mu_dynamic_interval, analysis.strokes[0].mu_dynamic
     assert low <= mu < 0.5 < high  # told is off by 2 degrees: 0.044
     assert width(alone) > 1.2 * (high - max(low, mu))
