@@ -70,17 +70,17 @@ class SimulatedSubject:
         `place` counts the trials of the block before this one, `before` is the index judged last; None: the first.
         """
         noise = self._draw(surface, repetition, 4).normal(0.0, self.settings.judgement_noise)
-        return round(min(max(self.meant(surface, place, before) + float(noise), 0.0), 100.0), 1)
+        return round(min(max(self.expected_score(surface, place, before) + float(noise), 0.0), 100.0), 1)
 
-    def meant(self, surface: Surface, place: int = 0, before: int | None = None) -> float:
+    def expected_score(self, surface: Surface, place: int = 0, before: int | None = None) -> float:
         """Return what `score` would be without the noise of a single judgement and without an end of the line."""
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
         rubbing = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
         judgement = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
-        judged = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * judgement
-        carried = 0.0 if before is None else settings.carry_over * (before - 50)
-        return 50.0 + self._gain * (judged - 50.0) + self._offset + settings.drift * place + carried
+        target = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * judgement
+        carry_over = 0.0 if before is None else settings.carry_over * (before - 50)
+        return 50.0 + self._gain * (target - 50.0) + self._offset + settings.drift * place + carry_over
 
     def by_friction(self, descriptor: str) -> float:
         """Return how many points a score rises with each unit of µ felt, over subjects of these settings."""

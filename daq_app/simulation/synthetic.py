@@ -103,8 +103,8 @@ class StudyCutShort(Exception):
 class Study:
     """Where the visits lie, and the ground truth of the one with forces."""
 
-    scored: tuple[Path, ...]  # a folder a subject
-    stroked: Path
+    scores: tuple[Path, ...]  # a folder a subject
+    forces: Path
     ground_truth: tuple[GroundTruth, ...]  # a row a trial
     readings: int
     lost: int
@@ -117,17 +117,17 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
     """
     chosen = protocol(PROTOCOL)
 
-    def visit(planned: SessionPlan, folder: Path, people: SimulatedPeople) -> SessionEnd:
-        end = conduct(planned, folder, people, console, settings=[_study_seed(seed)])
+    def visit(session_plan: SessionPlan, folder: Path, people: SimulatedPeople) -> SessionEnd:
+        end = conduct(session_plan, folder, people, console, settings=[_study_seed(seed)])
         if not end.complete:
             raise StudyCutShort(f"{end.reason}; what was recorded is in {folder.parent}")
         return end
 
-    scored: list[Path] = []
+    scores: list[Path] = []
     for number in range(1, SUBJECTS + 1):
         subject, own = f"S{number:02d}", _seed(seed, number)
-        scored.append(out / f"{subject}-scores")
-        visit(plan(chosen, subject, own, forces=False), scored[-1], SimulatedPeople(SimulatedSubject(own), clock))
+        scores.append(out / f"{subject}-scores")
+        visit(plan(chosen, subject, own, forces=False), scores[-1], SimulatedPeople(SimulatedSubject(own), clock))
     subject, own = f"S{STROKING:02d}", _seed(seed, STROKING)
     folder = out / f"{subject}-forces"
     with connect(f"sim:?seed={seed}&rate=200", clock) as bench:
@@ -137,7 +137,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
             GroundTruth(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
             for trial, stroke in people.strokes.items()
         )
-    return Study(tuple(scored), folder, ground_truth, end.readings, end.health.lost)
+    return Study(tuple(scores), folder, ground_truth, end.readings, end.health.lost)
 
 
 def _seed(study: int, subject: int) -> int:
@@ -226,12 +226,12 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     transducer = DirectTransducer(bench, clock, lost=faults.lost, frozen=faults.frozen)
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if faults.reversed else PEOPLE
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
-    planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
+    session_plan = plan(protocol(PROTOCOL), subject, own, setting=setting)
     people = SyntheticPeople(
-        SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), planned, faults
+        SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), session_plan, faults
     )
     study, run = [_study_seed(seed)], RunnerSettings(tick=TICK)
-    conduct(planned, out / subject, people, console, settings=study, run=run, durable=False)
+    conduct(session_plan, out / subject, people, console, settings=study, run=run, durable=False)
     return [
         {
             "subject": subject,
@@ -239,9 +239,9 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
             "descriptor": trial.stimulus.descriptor,
             "index": trial.stimulus.index,
             **{name: getattr(stroke, name) for name in ("mu", "tau_max", "speed", "direction")},
-            **people.meant(trial),
+            **people.true_judgement(trial),
         }
-        for trial, stroke in zip(people.stroked, bench.ground_truth(), strict=True)
+        for trial, stroke in zip(people.stroke_trials, bench.ground_truth(), strict=True)
     ]
 
 
@@ -249,10 +249,10 @@ class SyntheticPeople(SimulatedPeople):
     """Simulated people whose finger, calibration and visit are their own, and what goes wrong in it."""
 
     def __init__(
-        self, subject: SimulatedSubject, clock: Clock, bench: Connection, planned: SessionPlan, faults: VisitFaults
+        self, subject: SimulatedSubject, clock: Clock, bench: Connection, session_plan: SessionPlan, faults: VisitFaults
     ) -> None:
         super().__init__(subject, clock, bench, self._perceived_surface)
-        self._plan, self._faults = planned, faults
+        self._plan, self._faults = session_plan, faults
 
     def show(self, command: steps.Command) -> None:
         """Do what the command asks for, but for what goes wrong."""
@@ -269,10 +269,10 @@ class SyntheticPeople(SimulatedPeople):
         _, place, before = self._order(trial)
         return self.subject.score(self.surface(trial), 1, place, before)
 
-    def meant(self, trial: Trial) -> dict[str, Any]:
+    def true_judgement(self, trial: Trial) -> dict[str, Any]:
         """Return a trial's depth, its place, what was stroked before, and the score without noise."""
         block, place, before = self._order(trial)
-        score = self.subject.meant(self.surface(trial), place, before)
+        score = self.subject.expected_score(self.surface(trial), place, before)
         return {"indentation": block.indentation, "place": place, "before": before, "score": score}
 
     def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
@@ -338,10 +338,10 @@ def _seds_of_fingers(
     loads = [
         (s.mu * m, s.tau_max * m, block.indentation, s.direction, s.speed) for m in times.tolist() for s in surfaces
     ]
-    solved = [sed for sed in seds(loads) if sed is not None]
-    if len(solved) < len(loads):
+    known_seds = [sed for sed in seds(loads) if sed is not None]
+    if len(known_seds) < len(loads):
         return None
-    table = 1e3 * np.array(solved).reshape(len(times), len(surfaces))
+    table = 1e3 * np.array(known_seds).reshape(len(times), len(surfaces))
     if not moisture:
         return lambda _: table[0].tolist()
     spline = CubicSpline(np.log(times), table)
@@ -360,7 +360,7 @@ def _relation(
         before: list[int | None] = [None, *(indices[one] for one in order[:-1])]
         rows = np.array(
             [
-                (own[one], place, 0 if last is None else last - 50, person.meant(perceived[one], place, last))
+                (own[one], place, 0 if last is None else last - 50, person.expected_score(perceived[one], place, last))
                 for place, (one, last) in enumerate(zip(order, before, strict=True))
             ]
         )

@@ -114,7 +114,7 @@ class SimulatedHand:
         """Let the subject stroke the `surface` of each trial, unseen where there is no bench; it is a simulated one."""
         self.subject, self.surface = subject, surface
         self.connected = bench
-        self.stroked: list[Trial] = []  # in order, a trial once for each take
+        self.stroke_trials: list[Trial] = []  # in order, a trial once for each take
 
     @property
     def strokes(self) -> dict[int, StrokeGroundTruth]:
@@ -122,7 +122,7 @@ class SimulatedHand:
         assert self.connected is not None
         assert self.connected.bench is not None
         ground_truth = self.connected.bench.ground_truth()
-        return {trial.number: stroke for trial, stroke in zip(self.stroked, ground_truth, strict=True)}
+        return {trial.number: stroke for trial, stroke in zip(self.stroke_trials, ground_truth, strict=True)}
 
     def show(self, command: steps.Command) -> None:
         """Do what the command asks a hand for."""
@@ -131,7 +131,7 @@ class SimulatedHand:
             case steps.AskMount(trial) if bench is not None:
                 bench.mount(self.surface(trial))
             case steps.AskStroke(trial):
-                self.stroked.append(trial)
+                self.stroke_trials.append(trial)
                 if bench is not None and self.connected is not None and self.connected.bench_now is not None:
                     stroke = self.subject.stroke(self.surface(trial), self.take(trial))
                     bench.begin_stroke(stroke, self.connected.bench_now())
@@ -140,7 +140,7 @@ class SimulatedHand:
 
     def take(self, trial: Trial) -> int:
         """Return how often a trial was stroked."""
-        return sum(one.number == trial.number for one in self.stroked)
+        return sum(one.number == trial.number for one in self.stroke_trials)
 
     def poll(self) -> tuple[steps.Event, ...]:
         """Return nothing: the transducer measures what a hand does."""

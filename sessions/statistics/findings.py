@@ -28,6 +28,7 @@ LEVELS = "spread of subjects' levels"
 SLOPES = "spread of subjects' slopes on the index"
 NOISE = "noise of single scores"
 FINGERS = "spread of log µ between fingers and transducers"
+GROUND_TRUTH_FILE = "planted.json"
 WITHIN = "r of score and SED within subjects"
 UNITS = {
     INDEX: "points per index",
@@ -186,9 +187,6 @@ class StudyFindings:
         return document
 
 
-GROUND_TRUTH_FILE = "planted.json"  # of a simulated study
-
-
 class _Score(msgspec.Struct):
     gain: float
     drift: float
@@ -234,7 +232,7 @@ class _GroundTruth(msgspec.Struct):
     strokes: list[_Stroke]
     calibration_sd: float = 0.0
     relation: dict[str, _Relation] = {}
-    spoilt: dict[str, VisitFaults] = {}
+    faults: dict[str, VisitFaults] = msgspec.field(default={}, name="spoilt")
     seed: int | None = None
 
 
@@ -304,21 +302,21 @@ def flaw_detections(
     by_session = {visit.session: visit for visit in visits}
     backwards = {subject for subject, _, _ in reversed_subjects([scores_of(visit, visit.rows) for visit in visits])}
 
-    def detected(session: str, faults: Mapping[str, Any]) -> bool:
+    def is_detected(session: str, faults: Mapping[str, Any]) -> bool:
         visit = by_session.get(session)
         if visit is None:
             return session in failed
         rows = {row.trial: row for row in visit.rows}
         if any(faults.get(name) and faults[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
             return False  # a trial that the session does not have
-        seen = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
-        seen += [rows[faults["unanswered"]].score is None] if faults.get("unanswered") else []
-        seen += [rows[faults["aborted"]].outcome == "open" and not visit.complete] if faults.get("aborted") else []
-        seen += [visit.subject in backwards] if faults.get("reversed") else []
-        return bool(seen) and all(seen)
+        checks = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
+        checks += [rows[faults["unanswered"]].score is None] if faults.get("unanswered") else []
+        checks += [rows[faults["aborted"]].outcome == "open" and not visit.complete] if faults.get("aborted") else []
+        checks += [visit.subject in backwards] if faults.get("reversed") else []
+        return bool(checks) and all(checks)
 
     return tuple(
-        FlawDetection(session, faults["expected"], detected(session, faults))
+        FlawDetection(session, faults["expected"], is_detected(session, faults))
         for session, faults in faults_by_session.items()
     )
 

@@ -107,7 +107,7 @@ def chance_visit(seed, subject):
         near, own = draw.normal(size=2).tolist()
         index = round(50 + 15 * near)
         surface_felt = person.perceived_surface(Surface(mu=0.45 + 0.06 * (0.8 * near + 0.6 * own), index=index))
-        score = person.meant(surface_felt, place, before) + PEOPLE.judgement_noise * draw.normal()
+        score = person.expected_score(surface_felt, place, before) + PEOPLE.judgement_noise * draw.normal()
         trial_row = row(trial, block, place, score, mu=surface_felt.mu, sed=stand_in(surface_felt.mu))
         rows.append(replace(trial_row, index=index, before=before))
         before = index

@@ -47,7 +47,7 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
     except StudyCutShort as cut:
         console.note(f"daq-app: {cut}")
         return FLAWED
-    recording = Recording.open(study.stroked)
+    recording = Recording.open(study.forces)
     analysis = analyse_session(recording, console)
     prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, variants="small"))
     # Imported here: drawing is slow to load, and the session is on the disk by now.
@@ -56,7 +56,7 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
     from sessions.statistics.scores import score_table
 
     console.progress(0.9, "writing the report")
-    scores = [score_table(Recording.open(folder)) for folder in study.scored]
+    scores = [score_table(Recording.open(folder)) for folder in study.scores]
     report = findings(recording, analysis, prediction, scores, study.ground_truth)
     page, pictures = out / "report.html", out / "pictures"
     drawings = plates(report)
@@ -69,7 +69,7 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
         "rows": rows,
         "report": str(page),
         "pictures": str(pictures),
-        "session": str(study.stroked),
+        "session": str(study.forces),
         "readings": study.readings,
         "lost": study.lost,
         "flaws": [flaw.sentence for flaw in analysis.flaws],

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import msgspec
+from msgspec import structs
 
 from sessions.plan.orders import draw, opaque_codes
 from sessions.plan.plan import Frame, Phase, Rests, Visibility
@@ -41,8 +42,7 @@ class BlockOutline(msgspec.Struct, frozen=True):
     strokes_allowed: int = 1  # in a trial, before the answer
     repetitions: int = 1  # of each stimulus, or of each pair
     practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
-    # µ of each of `indices` on the simulated bench, for rehearsals [-]
-    simulated_friction: tuple[float, ...] = msgspec.field(default=(), name="planted_friction")
+    simulated_friction: tuple[float, ...] = msgspec.field(default=(), name="planted_friction")  # µ of `indices` [-]
     standard: int | None = None  # of `indices`: every pair is of it and another; None: every two are compared
     adaptive: int | None = None  # comparisons with the standard, each chosen by the answers before it; None: planned
 
@@ -65,7 +65,7 @@ class BlockOutline(msgspec.Struct, frozen=True):
         self._check_standard()
 
     def _check_simulated_friction(self) -> None:
-        if self.simulated_friction and len(self.simulated_friction) != len(self.indices):
+        if len(self.simulated_friction) not in (0, len(self.indices)):
             count = f"one number for each of the {len(self.indices)} indices, or none at all"
             raise NotAllowed("planted_friction", list(self.simulated_friction), count)
         if not all(0.01 <= mu <= 5.0 for mu in self.simulated_friction):
@@ -225,8 +225,7 @@ class Protocol:
         return tuple(
             (block.descriptor, index, mu)
             for block in self.blocks
-            if block.simulated_friction
-            for index, mu in zip(block.indices, block.simulated_friction, strict=True)
+            for index, mu in zip(block.indices, block.simulated_friction, strict=False)  # or none has any
         )
 
     @property
@@ -242,9 +241,7 @@ class Protocol:
         if not texts:
             raise NotAllowed("language", language, f"{self.name} has its texts in {', '.join(self.languages)}")
         blocks = tuple(
-            msgspec.structs.replace(
-                block, instruction=text.instruction, scale_ends=text.scale_ends, question=text.question
-            )
+            structs.replace(block, instruction=text.instruction, scale_ends=text.scale_ends, question=text.question)
             for block in self.blocks
             for text in [texts[block.name]]
         )
