@@ -113,6 +113,7 @@ class ZoomedPlot(pg.PlotWidget):
         if curves:
             size = f"{font(SMALL).pixelSize()}px"
             self._names = pg.LegendItem(offset=None, colCount=len(curves), labelTextSize=size, pen=None, brush=None)
+            self._names.layout.setContentsMargins(GRID, 0, GRID, 0)
             self._names.setParentItem(self.getPlotItem().getViewBox())
             self._names.anchor(corner, corner)
             self._names.setLabelTextColor(self._text)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtGui import QFocusEvent, QFontMetricsF, QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.frame import read_out
@@ -17,7 +17,7 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
-WORDS: dict[Edge, float] = {"onset": 0.92, "steady begin": 0.8, "steady end": 0.6, "lift": 0.92}  # share of the height
+ROWS: dict[Edge, int] = {"onset": 0, "steady begin": 1, "steady end": 1, "lift": 0}  # of the words above the curves
 
 
 class EdgeHandle(QPushButton):
@@ -120,7 +120,7 @@ class StrokeView(QWidget):
             pg.PlotCurveItem(pen=pg.mkPen(colour, width=2), connect="finite", name=name)
             for colour, name in ((N, "N"), (T, "T"), (MU, "µ"))
         ]
-        self._plots[0].name_curves(self._curves[:2])
+        self._plots[0].name_curves(self._curves[:2], (0.5, 0.0))
         for item in (*self._recorded, *self._curves[:2], self._windows[0]):
             self._plots[0].addItem(item)
         for item in (self._curves[2], self._windows[1]):
@@ -136,6 +136,9 @@ class StrokeView(QWidget):
             handle.recorded.connect(self.moved.emit)
         strip = hbox(*((handle, 1) for handle in self.handles.values()), spacing=GRID // 2)
         vbox(*((plot, 1) for plot in self._plots), strip, on=self, spacing=GRID // 2)
+        self._bare = self._fitted = (0.0, 1.0)  # ranges of the forces without the words of edges, and with them [N]
+        self._forces: Any = self._plots[0].getPlotItem().getViewBox()
+        self._forces.sigResized.connect(self._make_room)
         self.show_stroke(None)
 
     def show_stroke(self, stroke: StrokeFinding | None) -> None:
@@ -167,6 +170,24 @@ class StrokeView(QWidget):
             self._plots[0].setXRange(self._time[0], self._time[-1], padding=0.09)
             known = self._columns[2][np.isfinite(self._columns[2])]
             self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
+        low, high = self._forces.viewRange()[1]
+        self._bare = self._fitted = low, high
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """Place the words of edges in rows above the curves, unless somebody has zoomed."""
+        height, metrics = max(self._forces.height(), 1.0), QFontMetricsF(font(SMALL))
+        row, (low, high) = 1.25 * metrics.height() / height, self._bare
+        begin, end = (self._lines[edge][0] for edge in ("steady begin", "steady end"))
+        long = sum(metrics.horizontalAdvance(line.label.format) for line in (begin, end)) + 2 * GRID
+        apart = (end.value() - begin.value()) / max(self._forces.viewPixelSize()[0], 1e-12)
+        rows = {**ROWS, "steady end": 1 if apart > long else 2}
+        for edge, number in rows.items():
+            self._lines[edge][0].label.setPosition(1.0 - (number + 0.5) * row)
+        if np.allclose(self._forces.viewRange()[1], self._fitted):
+            head = min((max(rows.values()) + 1) * row, 0.6)
+            self._fitted = low, low + (high - low) / (1.0 - head)
+            self._plots[0].setYRange(*self._fitted, padding=0.0)
 
     def _read(self, time: float) -> str:
         names = (("N", "N"), ("T", "N"), ("µ", ""))
@@ -231,10 +252,10 @@ class StrokeView(QWidget):
         line: Any = pg.InfiniteLine(angle=90, movable=True, hoverPen=pg.mkPen(self._tokens.text, width=3))
         if plot is self._plots[0]:
             side = 1.05 if edge in ("lift", "steady end") else -0.05  # where there is room, beside the line
-            place, anchors = WORDS[edge], [(side, 0.5)] * 2
+            anchors = [(side, 0.5)] * 2
             ground = self._tokens.surface if edge == "lift" else None  # hides the end of a window close before it
             look = {"color": self._tokens.act, "fill": ground}
-            line.label = pg.InfLineLabel(line, tr(edge), position=place, anchors=anchors, **look)
+            line.label = pg.InfLineLabel(line, tr(edge), anchors=anchors, **look)
             line.label.setFont(font(SMALL))
         line.sigDragged.connect(lambda: self._try(edge, float(line.value()) + self._origin))
         line.sigPositionChangeFinished.connect(lambda: self.moved.emit(edge, float(line.value()) + self._origin))

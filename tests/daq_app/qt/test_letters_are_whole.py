@@ -1,8 +1,9 @@
 """Letters that Qt's own style writes are whole, and words have as many lines as they need."""
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import pytest
+from pyqtgraph import InfLineLabel, LegendItem, PlotCurveItem
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFontMetricsF
 from PySide6.QtWidgets import QMainWindow, QStyleFactory, QTabWidget, QWidget
@@ -14,6 +15,7 @@ from daq_app.qt.plots import ZoomedPlot
 from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import TextTable
 from tests.daq_app.qt.painted_text import contrast
+from tests.sessions.report_example import stroke
 
 pytestmark = pytest.mark.qt
 
@@ -112,4 +114,23 @@ def test_the_name_of_a_vertical_axis_is_whole_in_the_lowest_plot_of_a_stroke(app
             application.processEvents()
         name = plot.getPlotItem().getAxis("left").label.sceneBoundingRect()
         assert plot.sceneRect().top() <= name.top() < name.bottom() <= plot.sceneRect().bottom()
+    view.hide()
+
+
+@pytest.mark.parametrize("size", [(560, 320), (560, 700), (1400, 500)])
+def test_words_of_edges_and_the_names_of_curves_lie_above_the_forces_and_not_on_each_other(application, size):
+    view = StrokeView(tokens.LIGHT)
+    view.show_stroke(stroke(1, "stickiness", 50))
+    view.resize(*size)
+    view.show()
+    for _ in range(5):
+        application.processEvents()
+    items = view.findChildren(ZoomedPlot)[0].scene().items()
+    curves = [item for item in items if isinstance(item, PlotCurveItem) and item.name() in ("N", "T")]
+    highest = min(curve.mapRectToScene(curve.boundingRect()).top() for curve in curves)
+    words = [item for item in items if isinstance(item, InfLineLabel | LegendItem) and item.isVisible()]
+    rooms = [item.mapRectToScene(item.boundingRect()).adjusted(4, 4, -4, -4) for item in words]  # less empty margins
+    assert len(rooms) == 5
+    assert max(room.bottom() for room in rooms) < highest
+    assert not any(one.intersects(other) for one, other in combinations(rooms, 2))
     view.hide()
