@@ -68,8 +68,7 @@ def _work(folder: Path) -> None:
         start = time.process_time()
         work.do(request)
         print(f"{words:36s} {time.process_time() - start:4.2f} s")
-    film = next(one.film for one in said if isinstance(one, m.Filmed))
-    _painting(film)
+    _painting(next(one.film for one in said if isinstance(one, m.Filmed)))
 
 
 def _painting(film) -> None:  # noqa: ANN001

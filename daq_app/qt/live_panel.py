@@ -132,8 +132,7 @@ class LiveBar(QWidget):
         return captions + sum(self._widest(channel, size) for channel in self.values)
 
     def _widest(self, channel: str, size: int) -> int:
-        metrics = QFontMetrics(font(size, bold=size == TITLE))
-        return metrics.horizontalAdvance(WIDEST[channel]) + 4
+        return QFontMetrics(font(size, bold=size == TITLE)).horizontalAdvance(WIDEST[channel]) + 4
 
     def _numbers(self) -> QHBoxLayout:
         for channel in PICTURE:

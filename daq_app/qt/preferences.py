@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize, Qt
+from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize
 from PySide6.QtGui import QFontInfo, QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
@@ -39,12 +39,6 @@ def theme() -> str:
     return said if said in THEMES else "system"
 
 
-@cache
-def type_scale() -> float:
-    """Return how much larger than usual the type of this run is [-]: a choice holds from the next start on."""
-    return chosen_scale()
-
-
 def chosen_scale() -> float:
     """Return how much larger than usual type is to be [-]: as it was chosen, or as the system asks for."""
     try:
@@ -52,6 +46,9 @@ def chosen_scale() -> float:
     except ValueError:
         return font_scale()
     return chosen if chosen in SCALES else font_scale()
+
+
+type_scale = cache(chosen_scale)  # of the type of this run: a choice holds from the next start on
 
 
 def font_scale() -> float:
@@ -106,11 +103,6 @@ def settings() -> QSettings:
     """Return what the window remembers on this computer: its looks, the screens' sizes, and folders of sessions."""
     # A file on every system: the format that follows the system cannot be led elsewhere by a test.
     return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "daq-app", "window")
-
-
-def direction(language: str) -> Qt.LayoutDirection:
-    """Return which way a language is read."""
-    return QLocale(language).textDirection()
 
 
 def name_of(language: str) -> str:

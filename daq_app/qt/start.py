@@ -189,13 +189,12 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
 
 def _speak(application: "QApplication") -> None:
     """Give this process, those that it starts and Qt's own dialogs the experimenter's language."""
-    from PySide6.QtCore import QLibraryInfo, QTranslator
+    from PySide6.QtCore import QLibraryInfo, QLocale, QTranslator
 
     from daq_app.qt import preferences
-    from daq_app.qt.preferences import direction
 
     language = os.environ[VARIABLE] = preferences.language()
-    application.setLayoutDirection(direction(language))
+    application.setLayoutDirection(QLocale(language).textDirection())
     own = QTranslator(application)
     if own.load(f"qtbase_{language}", QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)):
         application.installTranslator(own)

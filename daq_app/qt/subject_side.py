@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QLocale, QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
@@ -13,7 +13,7 @@ from daq_app.qt.answer_fields import FULL, newest_force
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.keys import Keyboard
-from daq_app.qt.preferences import USUAL_DPI, Millimetres, direction, line_settings, millimetres
+from daq_app.qt.preferences import USUAL_DPI, Millimetres, line_settings, millimetres
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.tablet.dialogue import AnswerGiven, Dialogue, Force, FromTablet, Hello, Ruler
 from daq_app.tablet.server import TabletServer, own_address
@@ -74,7 +74,7 @@ class TabletScreen(QObject):
         return "" if self.server.connected else self.words
 
     def show_view(self, view: SubjectView, session: SessionState | None) -> None:
-        mirrored = direction(view.language) == Qt.LayoutDirection.RightToLeft
+        mirrored = QLocale(view.language).textDirection() == Qt.LayoutDirection.RightToLeft
         self._dialogue.show(view, session, translator(view.language), mirrored=mirrored)
 
     def show_force(self, trace: LiveTrace) -> None:

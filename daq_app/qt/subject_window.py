@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QVBox
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
 from daq_app.qt.parts import button, hbox, label, say, stack_pages, vbox
-from daq_app.qt.preferences import LEAST, MOST, direction, millimetres, store_ruler_length
+from daq_app.qt.preferences import LEAST, MOST, millimetres, store_ruler_length
 from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
@@ -124,7 +124,7 @@ class SubjectWindow(QWidget):
     def _speak(self, language: str) -> None:
         self._language = language
         words = translator(language)
-        self.setLayoutDirection(direction(language))
+        self.setLayoutDirection(QLocale(language).textDirection())
         self.next.setText(words(Text.NEXT))
         self.next.setAccessibleName(words(Text.NEXT))
         self.line.speak(words)

@@ -100,18 +100,12 @@ class Force(Struct, frozen=True, tag="force"):
 
 ToTablet = Welcome | Refused | Page | Stored | Force
 
-_read = msgspec.json.Decoder(FromTablet)
-_write = msgspec.json.Encoder()
-
-
-def read(text: str | bytes) -> FromTablet:
-    """Return what a tablet said. Raises msgspec.DecodeError for anything else."""
-    return _read.decode(text)
+read = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError for what no tablet says
 
 
 def written(message: ToTablet) -> str:
     """Return a message as it is sent."""
-    return _write.encode(message).decode()
+    return msgspec.json.encode(message).decode()
 
 
 class Dialogue:
@@ -144,8 +138,7 @@ class Dialogue:
     def take(self, answer: AnswerGiven, clock: Callable[[float], float]) -> Event | None:
         """Return the recorder's command for an answer; None where it knows already, or no session runs.
 
-        `clock` makes of the tablet's clock [ms] that of the session [s]. An answer that nobody asks for any more is
-        returned as a note, so that it is not lost.
+        `clock` makes of the tablet's clock [ms] the session's [s]. An answer no longer asked for is kept as a note.
         """
         session, page, key = self._session, self._page, answer.key
         if session is None or session.over or page is None or key in self._waiting or self._acknowledge(key):

@@ -26,7 +26,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     session_tables = [*tables(source), Table("events", EACH_EVENT, event_columns(recording.events))]
     mark = (SIMULATED,) if recording.simulated_sentence else ()
     for table in session_tables:
-        with _open(folder / f"{table.name}.csv") as file:
+        with (folder / f"{table.name}.csv").open("w", encoding="utf-8", newline="") as file:
             _write_rows(file, mark, [[column.heading for column in table.columns]], table.rows)
     contents = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in session_tables]
     if recording.info is not None:
@@ -55,10 +55,6 @@ def read(path: Path) -> ExportedSession:
     return ExportedSession("csv", path, head, events, lambda: _read_readings(path / READINGS), side_files(path))
 
 
-def _open(path: Path) -> TextIO:
-    return path.open("w", encoding="utf-8", newline="")
-
-
 def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:
     """Write a header and rows; where they are marked, a column that says so comes first."""
     write_rows(file, [[*(column.heading for column in mark), *names] for names in header])
@@ -70,7 +66,7 @@ def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, pr
     calibration = recording.info.calibration
     expected = recording.expected_readings or 1
     written = 0
-    with _open(path) as file:
+    with path.open("w", encoding="utf-8", newline="") as file:
         _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())
         for block in recording.blocks():
             _write_rows(file, mark, [], rows(block, calibration))
@@ -82,8 +78,7 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
     if not path.is_file():  # a visit that only scored
         return
     with path.open(encoding="utf-8", newline="") as file:
-        header = next(file, "")
-        yield from read_rows(file, header.strip().split(","), ",")
+        yield from read_rows(file, next(file, "").strip().split(","), ",")
 
 
 def _readme(recording: Recording, contents: Sequence[tuple[str, str, Sequence[Column]]]) -> str:

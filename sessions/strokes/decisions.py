@@ -271,8 +271,7 @@ def _decision(line: bytes) -> Decision | str | None:
         decision = as_type(document, Decision)
     except (ValueError, KeyError):
         return "it holds no decision"
-    known = document.keys() <= asdict(decision).keys()
-    return decision if known else "it holds no decision"
+    return decision if document.keys() <= asdict(decision).keys() else "it holds no decision"
 
 
 def _check(decision: Decision, before: Decisions) -> None:

@@ -193,5 +193,4 @@ def saturated_readings(block: ReadingBlock, info: TransducerInfo) -> Mask:
     """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
     calibration = info.calibration
     wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
-    beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
-    return info.status.doubtful(block.status) | beyond
+    return info.status.doubtful(block.status) | (np.abs(wrench) > calibration.rated).any(axis=1)

@@ -53,8 +53,7 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     repeated = invalid.repeated_readings(block, settings.signal)
     stuck = invalid.constant_runs(block.time, block.raw, wild | beyond, settings.signal)
     frozen = repeated | invalid.at_the_same_value(block.raw, stuck, clipped=False)
-    clipped = invalid.at_the_same_value(block.raw, stuck, clipped=True)
-    saturated = beyond | clipped
+    saturated = beyond | invalid.at_the_same_value(block.raw, stuck, clipped=True)
     stalled = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalled)
     long = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)

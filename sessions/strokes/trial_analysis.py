@@ -293,8 +293,7 @@ def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None
         return None
     from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
 
-    leans = np.array([press.lean for press in presses])
-    mean = leans.mean(axis=0)
+    mean = np.array([press.lean for press in presses]).mean(axis=0)
     per_cent = f"{100 * settings.confidence:g} %"
     if len(presses) >= settings.press.press_fewest:
         half = stdtrit(len(presses) - 1, 0.5 + settings.confidence / 2) * np.array(_mean_error(presses))

@@ -203,5 +203,4 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
     label_right(drawn, sliding, labels, kind)
     title = f"Predicted response in time, {name or 'all strokes'}"
     name = f"response-{name}" if name else "response"
-    header = ("trial", "index", "time [s]", "SED [MPa]")
-    return drawn.panel(name, title, header, rows)
+    return drawn.panel(name, title, ("trial", "index", "time [s]", "SED [MPa]"), rows)

@@ -142,8 +142,7 @@ def sheet(
     """Return an empty picture of that size [CSS px, 96 an inch] with axes in rows and columns; call inside `look`."""
     figure = Figure(figsize=(width / 96, height / 96), dpi=POINTS, layout="constrained")
     grid = figure.add_gridspec(len(heights), len(widths), height_ratios=heights, width_ratios=widths)
-    axes = grid.subplots(sharex=share_x, squeeze=False)
-    return Sheet(figure, tuple(axes.flat))
+    return Sheet(figure, tuple(grid.subplots(sharex=share_x, squeeze=False).flat))
 
 
 def shades(colour: str, n: int) -> tuple[str, ...]:
