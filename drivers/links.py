@@ -134,8 +134,7 @@ class HttpAnswer:
 def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
     """Return the answer to one GET; the whole exchange ends by the deadline.
 
-    Redirects are not followed. Raises LinkLost when nothing answers at the IP address in time, or what answers is not
-    HTTP or is longer than MOST_BODY.
+    Redirects are not followed. Raises LinkLost where no HTTP of at most MOST_BODY answers at the address in time.
     """
     where = f"http://{address}:{port}{path}"
     with (

@@ -28,8 +28,7 @@ _TAKEN = (b"SA", b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", 
 class SerialFtBox(LineBox):
     """A controller with a simulated bench behind it. Its time, and the bench's, begins when it is started.
 
-    A pseudo-terminal carries bytes at any speed; here they leave no faster than the line would carry them, and come
-    as garbage where the reader has set another speed.
+    Bytes leave the pseudo-terminal no faster than the line's speed, and as garbage where the reader set another.
     """
 
     def __init__(self, bench: Bench, clock: Clock, *, baud: int = 38400, faults: Faults | None = None) -> None:

@@ -228,8 +228,7 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
 
-    The law of the contact area, the calibration's error and the seed of the intervals are all that can be asked for;
-    the rest is the program's. Raises SettingsError.
+    Only the area's law, the calibration's error and the intervals' seed can be asked for. Raises SettingsError.
     """
     settings: Mapping[str, Any] = stored.get("settings") or stored
     area = from_table(settings.get("area") or {}, AreaLaw, "area")

@@ -253,8 +253,7 @@ def visits(
 ) -> tuple[list[Visit], list[tuple[str, str]]]:
     """Return what each session brings, and the name of and the reason for each that brings nothing.
 
-    What is on the shelf already is not computed again; what is done stays there whatever comes. Raises SchedulerError,
-    RecordingError where the shelf cannot be written.
+    What is on the shelf is not computed again. Raises SchedulerError, RecordingError for a shelf that takes nothing.
     """
     keys, failed = _keys(folders, shelf)
     console.note(*(f"{name}: {why}" for name, why in failed))

@@ -165,8 +165,7 @@ def answers_of(
 ) -> list[Answer | str]:
     """Return the answer of each finger, from processes of this computer or a Dask cluster.
 
-    With `keep` what is done is written there, and not computed again by the next run. Raises SchedulerError, OSError,
-    and TooFewAnswers where a finger was not computed.
+    What is done is written to `keep`, for the next run. Raises SchedulerError, OSError, TooFewAnswers.
     """
     versions = software_versions()
     keys = [trial.key(versions) for trial in trials]

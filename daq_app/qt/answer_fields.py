@@ -47,8 +47,7 @@ OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does no
 class ScoreLine(QAbstractSlider):
     """Takes mouse, touch, pen and keyboard alike; every position is kept with its time.
 
-    Where the subject reads from right to left, 0 is at the right end, and the arrows move the mark as they point. To
-    assistive technology it is a slider from 0 to 100.
+    Read from right to left, 0 is at the right end; arrows move as they point. A slider to assistive technology.
     """
 
     changed = Signal()

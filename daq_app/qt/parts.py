@@ -57,8 +57,7 @@ class Panel(QFrame):
 class WrappedLabel(QLabel):
     """A label of as many lines as its text needs at the width it has, a long path too.
 
-    What it stands in is not asked for a height by its width: where that is scrolled it would be made as high as it
-    would like to be, not as there is room.
+    Its surroundings get no height for a width: scrolled, they would be as high as they like, not as there is room.
     """
 
     def __init__(self, role: str, grade: str = "", *, keeps_room: bool = False) -> None:
@@ -298,8 +297,7 @@ def entry(name: str, empty: str = "") -> QLineEdit:
 class Openness:
     """Whether a part is open, remembered under a `key` where there is room for the part and its neighbour.
 
-    Where there is none it begins closed, and can be opened all the same, which is not remembered. `place` is called
-    when it has changed.
+    Where there is none it begins closed, and opening it is not remembered. `place` is called when it has changed.
     """
 
     def __init__(self, key: str, place: Callable[[], object]) -> None:

@@ -115,8 +115,7 @@ class Recorder:
     def close(self, patience: float = PATIENCE) -> None:
         """End session and recorder, and wait for that; after `patience` [s] it is left to end by itself.
 
-        A session that runs is stopped and sealed: it is over. To have it cut short so that it can be resumed, `leave`.
-        Harmless when repeated.
+        A session that runs is stopped, sealed and over; `leave` cuts it short to be resumed. Harmless when repeated.
         """
         if self._process.poll() is None:
             self.send(Shutdown())

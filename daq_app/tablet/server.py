@@ -50,8 +50,7 @@ class TabletServer:
         """Listen at an address of this machine. Raises NoTabletServer.
 
         `received` takes each message of the tablet that was let in and the machine's monotonic clock [s] at its
-        arrival; `changed` is called when a tablet has come or gone, or the code is another one. A port that is taken is
-        replaced by a free one.
+        arrival; `changed` is called when a tablet comes or goes, or the code changes. A taken port becomes a free one.
         """
         try:
             import segno  # noqa: F401  # pyright: ignore[reportUnusedImport]  the window draws the link with it

@@ -92,8 +92,7 @@ def bench_of(bench: BenchState) -> Bench:
 def pilot_form(form: SessionForm, bench: Bench) -> SessionForm:
     """Return the form that pilots the protocol of a form, or of its study: nobody is named and nobody is needed.
 
-    The simulated bench is stroked where it is connected. Otherwise the pilot is of scores alone, as no simulated hand
-    strokes a real transducer.
+    A connected simulated bench is stroked; else scores alone are piloted, for no simulated hand strokes a real one.
     """
     forces = form.forces and bench.simulated
     return replace(form, subject=PILOT, forces=forces, height="", normal="", area="", simulated=True, pilot=True)

@@ -219,8 +219,7 @@ class PreviewPage:
 def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage, ...] | Refusal:
     """Return every page of the form's protocol in the form's language, each once, or what is wrong with the form.
 
-    The session's own machine is led through every trial, and each page is what the window would show the subject then.
-    Codes and orders are those of one example.
+    The session's own machine goes through every trial, and each page is the window's; codes and orders are an example.
     """
     folder = form.folder if form.study.strip() else "."  # nothing is written
     plain = replace(

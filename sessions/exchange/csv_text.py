@@ -157,8 +157,7 @@ def rows(block: ReadingBlock, calibration: Calibration) -> Iterator[tuple[Any, .
 def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Iterator[ReadingBlock]:
     """Yield the readings in rows whose columns are called `names` (units at their end are no part of them).
 
-    Rows without a sequence number are places of readings that never arrived, and left out; n/a elsewhere is a NaN.
-    Raises ValueError.
+    Rows without a sequence number, of readings that never arrived, are left out; n/a is a NaN. Raises ValueError.
     """
     places = [_place(name, names) for name in STORED]
     arrived = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))

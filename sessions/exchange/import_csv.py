@@ -194,8 +194,7 @@ class ImportResult:
 def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -> ImportResult:
     """Make a session folder of a CSV file; nothing is written before all of the file was understood.
 
-    Raises ImportRefused for a file that cannot be taken, SettingsError for an option that is wrong or contradicts the
-    file, RecordingError for a folder that cannot be written.
+    Raises ImportRefused for the file, SettingsError for an option against it, RecordingError for an unwritable folder.
     """
     stated = options or ImportOptions()
     content = content_of(path)
@@ -211,8 +210,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
             f"{path}: its readings span {time[-1]:.3g} s, more than a session can ({LONGEST:g} s); name the time's "
             f"unit in the header ({', '.join(TIME_UNITS)}), or give a higher --rate"
         )
-    raw = rows[:, list(layout.axes)]
-    block = _block(time, raw)
+    block = _block(time, rows[:, list(layout.axes)])
     digest = hashlib.sha256(content).hexdigest()
     clock = StillClock(int(block.received_ns[-1]))
     source = {

@@ -43,8 +43,7 @@ def draw(
 ) -> tuple[Item, ...] | None:
     """Return the first order that `meets` a constraint; None where none of many draws does.
 
-    The rule: the order `shuffle` gives for `name`, or else for "name~1", "name~2", and so on. Every order that meets
-    the constraint is equally likely over seeds.
+    The rule: the order `shuffle` gives for `name`, else "name~1" and so on; all that meet it are equally likely.
     """
     orders = (shuffle(items, seed, f"{name}~{draw}" if draw else name) for draw in range(DRAWS))
     return next(filter(meets, orders), None)

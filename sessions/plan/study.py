@@ -157,8 +157,7 @@ class Study:
     def row(self, slot: int) -> int:
         """Return the row of the design, from 1, that a slot stands for.
 
-        Slots are filled one after the other. Each round of the design has its rows in an order by chance; where there
-        is no design the slot itself is the row.
+        Slots fill in turn. Each round of the design has its rows in a random order; without one the slot is the row.
         """
         if self.rows is None:
             return slot + 1

@@ -218,8 +218,7 @@ class Likelihood:
 def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 0.0, seed: int = 0) -> FingerFit:
     """Return the posterior of the stiffnesses of a finger, given presses.
 
-    `gain_error` is the standard uncertainty of the force's calibration [-], `seed` that of the draws. Raises FitError
-    where points are too few.
+    `gain_error` is the force's standard uncertainty [-], `seed` that of draws. Raises FitError for too few points.
     """
     likelihood = Likelihood(model, presses)
     start = np.array([one.touch for one in presses])

@@ -91,8 +91,7 @@ def press_model(
 ) -> PressModel:
     """Return the model of presses up to a depth [mm] of the finger of a scene, on a surface of friction `mu`.
 
-    `spread` is the standard deviation of each log stiffness in the prior. Raises FitError where a press has no state,
-    Cancelled where `progress` returns False.
+    `spread` is the prior's standard deviation of each log stiffness. Raises FitError without a state, and Cancelled.
     """
     depth = np.geomspace(SHALLOWEST * deepest, deepest, DEPTHS)
     contrast = _design(RINGS)

@@ -223,8 +223,7 @@ def slides(predictions: Sequence[Prediction], progress: Progress | None = None) 
 def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, float]]:
     """Return the derivatives, by each load that `with_loads` knows, at the slide of a scene.
 
-    They are those of "sed" [MPa], of the whole finger's "normal_force" and "tangential_force" [N], and of the
-    "indentation" [mm].
+    They are of "sed" [MPa], the finger's "normal_force" and "tangential_force" [N], and the "indentation" [mm].
     """
     derivatives, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
     per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # of a force as it is given

@@ -23,8 +23,7 @@ SAME = 1e-12  # numbers made on another machine may differ by so much [-]
 def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
     """Seal what `SessionPrediction.to_dict` returned, in the session's folder; return the SHA-256 of its numbers.
 
-    Raises RecordingError where a prediction was sealed before, for no seal replaces another, or where nothing can be
-    written.
+    Raises RecordingError where a seal is there, for none replaces another, or where nothing can be written.
     """
     before = load_derived(recording.folder, SEAL)
     if before is not None:

@@ -131,8 +131,7 @@ class StudyDesign:
 def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generator) -> Mapping[str, Array]:
     """Return every quantity of each simulated stroke (people, surfaces within depths); nan where there is none.
 
-    Friction, its bound and the normal force vary from stroke to stroke. The quantities of the model are those of the
-    published finger in settled sliding at that friction.
+    Friction, its bound and the normal force vary by stroke; the model's quantities are of the published finger there.
     """
     shape = (people, len(design.mu) * len(design.depths))
     moist = PERSON * draw.standard_normal((people, 1)) + STROKE * draw.standard_normal(shape)

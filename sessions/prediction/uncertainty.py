@@ -56,8 +56,7 @@ def with_intervals(
 ) -> SessionPrediction:
     """Return a prediction with an interval of each SED it holds, where its options ask for them.
 
-    They are of each trial, and of the same slid the other way (where asked for by `both_ways`). Raises Cancelled where
-    `progress`, called with the part done, returns False.
+    They are of each trial, and with `both_ways` of it slid back. Raises Cancelled where `progress` returns False.
     """
     if not prediction.options.intervals:
         return prediction

@@ -30,8 +30,7 @@ class Digest:
 def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> Digest:
     """Return the digest of readings and events.
 
-    A column is digested as little-endian numbers, reading after reading; an event as the compact JSON of
-    [time_ns, kind, trial, data] and a line feed.
+    Of a column: little-endian numbers in order; of an event: compact JSON of [time_ns, kind, trial, data], line feed.
     """
     sums = {name: sha256() for name in COLUMNS}
     count = 0

@@ -179,8 +179,7 @@ class SessionWriter:
     ) -> LoggedEvent:
         """Write an event down after all readings handed over before it; on return both are safe.
 
-        With `commit` False both wait for the next commit. `time_ns` is now on the session clock unless given.
-        Raises RecordingError when it cannot be written.
+        Without `commit` both wait for the next one. `time_ns` is now on the session clock. Raises RecordingError.
         """
         self._check()
         instant_ns = self.instant_ns(kind, trial) if time_ns is None else time_ns

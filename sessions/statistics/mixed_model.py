@@ -252,8 +252,7 @@ def mixed_model(
     the level, as subjects in whom the covariate varies less one for the slope, and for the others as many as a fit to
     each subject alone would leave. The first covariate counts from its mean, so that an offset of it changes nothing.
 
-    Carry-over and drift enter as covariates: the index scored before, and the trial's place in its block. Where
-    nothing can be said a sentence says why.
+    Carry-over and drift are covariates: index before, place in the block. A sentence says why where there is no model.
     """
     names = [INTERCEPT, *covariates]
     columns = np.column_stack([np.ones(len(score)), *covariates.values()])

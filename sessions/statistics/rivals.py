@@ -79,8 +79,7 @@ def rivals_of_means(
 ) -> tuple[Rival, ...]:
     """Return how each quantity of the surfaces goes with their mean scores; () where there is no `model`.
 
-    `scores` and each of `series` go by a surface's index; the quantities' names are those of `NAMES`. All are compared
-    to `model`, which comes first.
+    `scores` and each of `series` (its name is one of `NAMES`) go by index. All are compared to `model`, which is first.
     """
     if model not in series:
         return ()

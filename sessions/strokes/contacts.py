@@ -47,8 +47,7 @@ class ContactDetector:
     """Tell contact onset and lift from normal force and time, however the readings were cut into blocks.
 
     Zero and noise are measured in the unloaded stretch before contact and follow a slow drift until the finger
-    touches. Without an unloaded stretch nothing is detected. A force that falls well below its zero shows that the zero
-    was taken in contact: it is then measured anew.
+    touches; without such a stretch nothing is detected. A force well below its zero shows that this must be renewed.
     """
 
     def __init__(self, settings: DetectorSettings | None = None, baseline: Baseline | None = None) -> None:
@@ -191,8 +190,7 @@ def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: Anal
     """Return the contacts in readings, time (n,) [s] and normal force (n,) [N, not zeroed], for a known zero."""
     if not len(time):
         return ()
-    detector = ContactDetector(settings.detector, baseline)
-    events = detector.feed(time, normal)
+    events = ContactDetector(settings.detector, baseline).feed(time, normal)
     onsets = [event.time for event in events if isinstance(event, Onset)]
     lifts: list[float | None] = [event.time for event in events if isinstance(event, Lift)]
     pieces: list[Contact] = []

@@ -65,8 +65,7 @@ def break_away_draws(
 
     `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
     of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
-    [N]. `peaked` where a static peak was found. Each repeat moves the break-away as its deviations move the fit, to
-    first order.
+    [N]. `peaked` where a static peak was found. A repeat's deviations move the break-away as the fit, to first order.
     """
     last = float(columns[0][-1])
     finite = np.isfinite(columns[1])

@@ -62,8 +62,7 @@ def _compiled_filter() -> Any:  # noqa: ANN401 - compiled, without types
 def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:
     """Return where values (n,) are greatest among their neighbours (p,), and how far each stands out of them (p,).
 
-    A flat top counts once, in its middle. It stands out of the higher of the least values between it and what exceeds
-    it on each side, or the end.
+    A flat top counts once, in its middle; it stands out of the higher of both least values before a higher top or end.
     """
     firsts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     lasts = np.append(firsts[1:], len(values)) - 1

@@ -140,8 +140,7 @@ def slide(
 ) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 
-    A window that a person `decided` [s, device clock] is taken; what speaks against it is named. `uncut` is the contact
-    that turns cut the stroke out of.
+    A window that a person `decided` [s, device clock] is taken, with its flaws. Turns cut the stroke out of `uncut`.
     """
     window, settings = None, track.settings
     if decided is not None:
@@ -215,8 +214,7 @@ def _rest(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple
 def _roll_flaw(track: Track, uncut: Track, level: float) -> tuple[FlawName, str] | None:
     """Return the flaw of a centre of pressure that moves no further than a finger rolls; None where it moves further.
 
-    It counts over the `uncut` contact, turns included, and only where T/N lies about its `level` in the steady window:
-    a contact slips nowhere below that.
+    It counts over the `uncut` contact where T/N lies about its `level` while steady: nothing slips below that.
     """
     settings = track.settings
     at_level = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level

@@ -57,8 +57,7 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     """Return the instant [s] at which T/N (n,) [-] stops climbing; None where it does not climb first.
 
     `time` (n,) [s] reaches from the contact to the end of the steady window; nan of the ratio is left out. `peaked`
-    where a static peak was found. A climb counts where it explains most of what a level alone leaves, and rises by a
-    share of the level (`stick_rise`).
+    where a static peak was found. A climb explains most of what a level alone leaves, and rises by `stick_rise` of it.
     """
     finite = np.isfinite(ratio)
     most = settings.climb.climb_most
@@ -87,8 +86,7 @@ class ClimbReadings:
     def fit(self, block: float, *, peaked: bool) -> Climb | None:
         """Return the climb that the readings have had; None of too few readings.
 
-        A straight one, unless it surely leaves more than one that bends; readings are alike over `block` [s]. `peaked`
-        lets what is above the level fall.
+        A straight one, unless one that bends is surely nearer; readings are alike over `block` [s]. `peaked` ones fall.
         """
         if len(self.time) < 2 * self.settings.climb_fewest + 1:
             return None

@@ -294,8 +294,7 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
 
     What follows is both the level just after it and the highest crest of the steady window, for a contact that sticks
     and slips peaks again and again. Both count as they would be under the peak's own normal force, as far as T/N may
-    follow that. The filter overshoots a sudden change by 3.5 % of it, which is twice the level where the finger
-    `turned`.
+    follow that. The filter overshoots a sudden change, of twice the level where the finger `turned`, by 3.5 %.
     """
     settings, began = track.settings, findings.numbers.get("slide_onset", track.time[window.start])
     last = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))

@@ -271,8 +271,7 @@ class _QuotaWriter(SessionWriter):
 def _try_quota(folder: Path) -> dict[str, Any]:
     """Record until there is no more room; all must be there, and the end written. Raises SelfTestFailed.
 
-    Return the room [bytes], the readings that were acknowledged, and the median time in which a second of them was made
-    safe [ms].
+    Return the room [bytes], the readings acknowledged, and the median time to make a second of them safe [ms].
     """
     clock = RealClock()
     calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
