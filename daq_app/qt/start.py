@@ -81,15 +81,10 @@ def command_line() -> Parser:
     """Return what `daq-app window` understands."""
     parser = Parser("daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07")
     parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
-    parser.add_argument(
-        "--subject-screen",
-        choices=("window", "web"),
-        default="window",
-        help="where the subject's page is: a window here, or a tablet's browser on the lab's network (window)",
-    )
-    parser.add_argument(
-        "--subject-address", metavar="IP", help="this machine's address for the tablet (that of its own network)"
-    )
+    meaning = "where the subject's page is: a window here, or a tablet's browser on the lab's network (window)"
+    parser.add_argument("--subject-screen", choices=("window", "web"), default="window", help=meaning)
+    meaning = "this machine's address for the tablet (that of its own network)"
+    parser.add_argument("--subject-address", metavar="IP", help=meaning)
     return parser
 
 

@@ -24,9 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="half a minute instead of three, and coarser truths")
     parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="the folder (accuracy)")
     parser.add_argument("--docs", type=Path, metavar="DIR", help="also write the tables into the pages of these docs")
-    parser.add_argument(
-        "--data", type=Path, metavar="accuracy.json", help="page and tables of an earlier run; nothing is measured"
-    )
+    meaning = "page and tables of an earlier run; nothing is measured"
+    parser.add_argument("--data", type=Path, metavar="accuracy.json", help=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -28,9 +28,8 @@ PROBED = 3.0  # how long a probe listens [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "words", nargs="*", metavar="URI", help="further addresses to ask; or 'probe URI' to open that one and listen"
-    )
+    meaning = "further addresses to ask; or 'probe URI' to open that one and listen"
+    parser.add_argument("words", nargs="*", metavar="URI", help=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -31,9 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--subject", metavar="CODE", help="a code, never a name")
     add_body_arguments(parser)
     parser.add_argument("--withdraw", metavar="REASON", help="take the subject out; its row is given back")
-    parser.add_argument(
-        "--labels", type=Path, metavar="FILE", help="write the code of each stimulus, for whoever puts the labels on"
-    )
+    meaning = "write the code of each stimulus, for whoever puts the labels on"
+    parser.add_argument("--labels", type=Path, metavar="FILE", help=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -27,9 +27,8 @@ EXAMPLE = "daq-app run sensotact-friction --device sim:?seed=7 --subject P07 --h
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "protocol", nargs="?", metavar="PROTOCOL", help="a built-in one such as sensotact-friction, or a TOML file"
-    )
+    meaning = "a built-in one such as sensotact-friction, or a TOML file"
+    parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help=meaning)
     parser.add_argument("--study", type=Path, metavar="STUDY", help="protocol, order and finger are the study's")
     device = parser.add_mutually_exclusive_group(required=True)
     device.add_argument("--device", metavar="URI", help="the transducer, e.g. sim: or net-ft://192.168.1.1")
@@ -40,17 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_body_arguments(parser)
     height = "of the stimulus's face above the sensor's origin"
     add_shared(parser, "headless", simulate_subject="simulated people", height=height)
-    parser.add_argument(
-        "--pace", type=float, default=1.0, help="simulated seconds a real second, simulated people only (1)"
-    )
+    meaning = "simulated seconds a real second, simulated people only (1)"
+    parser.add_argument("--pace", type=float, default=1.0, help=meaning)
     parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
     words = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
     add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", words)
     parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
-    parser.add_argument(
-        "--language", metavar="XX", help="that the subject reads, such as de; the protocol must have it (its own)"
-    )
+    meaning = "that the subject reads, such as de; the protocol must have it (its own)"
+    parser.add_argument("--language", metavar="XX", help=meaning)
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
     add_flag(parser, "--any-folder", "also on a network drive or in a synchronised folder: at your own risk")
 

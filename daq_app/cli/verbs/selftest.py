@@ -46,9 +46,8 @@ AReport = TypeVar("AReport", bound=m.Report)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", default=Path("recordings"), help="where sessions will be (recordings/)"
-    )
+    meaning = "where sessions will be (recordings/)"
+    parser.add_argument("--out", type=Path, metavar="DIR", default=Path("recordings"), help=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -49,17 +49,12 @@ _OF_FINGERS = {"quantity": "sed", "kinematics": "small", "keep": None, "workers"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="without it: many fingers")
     parser.add_argument("--design", type=Path, metavar="FILE", help="which numbers are varied, and how far")
-    parser.add_argument(
-        "--samples",
-        type=int,
-        metavar="N",
-        help=f"a power of two; N (numbers + 2) solves ({SAMPLES}), or {len(sign_map.DESIGN) + 2} N fingers "
-        f"({OF_FINGERS})",
-    )
+    fingers = f"{len(sign_map.DESIGN) + 2} N fingers ({OF_FINGERS})"
+    meaning = f"a power of two; N (numbers + 2) solves ({SAMPLES}), or {fingers}"
+    parser.add_argument("--samples", type=int, metavar="N", help=meaning)
     add_seed(parser, "of the samples (0)", largest=math.inf)
-    parser.add_argument(
-        "--keep", type=Path, metavar="FILE", help="answers of many fingers, written as they come: another run goes on"
-    )
+    meaning = "answers of many fingers, written as they come: another run goes on"
+    parser.add_argument("--keep", type=Path, metavar="FILE", help=meaning)
     meaning = "strain of every finger but the one change that takes the other"
     add_shared(parser, "workers", "scheduler", quantity="whose signs are shown", kinematics=meaning)
 

@@ -48,21 +48,13 @@ RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
 
 def add_power(parser: argparse.ArgumentParser) -> None:
     """Declare --power and what goes with it."""
-    parser.add_argument(
-        "--power",
-        nargs="*",
-        metavar="NAME=VALUE",
-        help="how many subjects and surfaces a study needs, by simulation; what it assumes may be set: "
-        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(AssumedEffects))}",
-    )
-    parser.add_argument(
-        "--depths",
-        nargs="+",
-        type=within("--depths", float, 0.5, 3.0),
-        metavar="MM",
-        help="with --power: how often a study whose subjects press each surface to these depths tells --quantity from "
-        "its rivals; some minutes",
-    )
+    assumed = ", ".join(f"{one.name}={one.default:g}" for one in fields(AssumedEffects))
+    meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {assumed}"
+    parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
+    meaning = "with --power: how often a study whose subjects press each surface to these depths tells --quantity from"
+    meaning += " its rivals; some minutes"
+    read = within("--depths", float, 0.5, 3.0)
+    parser.add_argument("--depths", nargs="+", type=read, metavar="MM", help=meaning)
     add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated per design (400)", 400, "N")
     add_seed(parser, "with --power: of the simulated studies (0)")
 
@@ -165,12 +157,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         tau="as for 'daq-app predict'",
         quantity="to hold against scores and rivals",
     )
-    parser.add_argument(
-        "--intervals",
-        action=argparse.BooleanOptionalAction,
-        help="what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where "
-        "it takes longer)",
-    )
+    meaning = "what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where"
+    parser.add_argument("--intervals", action=argparse.BooleanOptionalAction, help=f"{meaning} it takes longer)")
     add_power(parser)
     add_analysis(parser, "fixed for all sessions, however each was analysed before")
 

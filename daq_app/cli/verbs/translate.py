@@ -32,9 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="a built-in one, or a TOML file")
     parser.add_argument("--program", action="store_true", help="the texts of the subject's page instead")
     parser.add_argument("--window", action="store_true", help="the texts of the experimenter's windows instead")
-    parser.add_argument(
-        "--language", required=True, metavar="XX", help="two or three small letters, as ISO 639 has them"
-    )
+    meaning = "two or three small letters, as ISO 639 has them"
+    parser.add_argument("--language", required=True, metavar="XX", help=meaning)
     parser.add_argument("--out", type=Path, metavar="FILE", help="a new file (the terminal)")
 
 
