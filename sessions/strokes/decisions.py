@@ -169,10 +169,7 @@ class Decisions:
     @property
     def in_force(self) -> tuple[Decision, ...]:
         """Return the decisions that act, by number: not undone (undoing can be undone too), nor set anew since."""
-        acting: dict[tuple[int | None, int | None, str], Decision] = {}
-        for decision in self.standing:
-            if decision.undoes is None:
-                acting[decision.place] = decision
+        acting = {decision.place: decision for decision in self.standing if decision.undoes is None}
         return tuple(sorted(acting.values(), key=lambda decision: decision.number))
 
     @property
