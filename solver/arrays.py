@@ -179,7 +179,7 @@ class Skin(NamedTuple):
 class ContactControl(NamedTuple):
     """Which of depth and travel follow from prescribed forces in one linear system, and how often states may change."""
 
-    kind: int  # DEPTH_GIVEN, PUSH_GIVEN or DRAG_GIVEN
+    kind: int  # DEPTH_CONTROL, PUSH_CONTROL or DRAG_CONTROL
     drag: float  # of the surface along +x [N/mm]
     push: float  # and along +y
     stride: float  # largest change of depth or travel [mm]

@@ -284,10 +284,10 @@ def tangent(law: Law, F: Array) -> Array:
     pressure = law.lame * np.log(J)[wide]
     excess = F - inverse
     unit = np.einsum("ab,AB->aAbB", np.eye(2), np.eye(2))
-    crossed = np.einsum("...aB,...bA->...aAbB", inverse, inverse)  # minus the derivative of F^-T
-    stretched = np.einsum("...aA,...bB->...aAbB", excess, excess)
-    squeezed = np.einsum("...aA,...bB->...aAbB", inverse, inverse)
-    return shear * (unit + crossed) + shear_slope * stretched - pressure * crossed + law.lame * squeezed
+    inverse_slope = np.einsum("...aB,...bA->...aAbB", inverse, inverse)  # minus the derivative of F^-T
+    excess_dyad = np.einsum("...aA,...bB->...aAbB", excess, excess)
+    dyad = np.einsum("...aA,...bB->...aAbB", inverse, inverse)
+    return shear * (unit + inverse_slope) + shear_slope * excess_dyad - pressure * inverse_slope + law.lame * dyad
 
 
 def inverse_metric(F: Array) -> Array:
@@ -306,8 +306,8 @@ def inverse_metric(F: Array) -> Array:
 
 def stress_parts(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
     """Return J (...), F^-T (..., 2, 2), F T (..., 2, 2) and T:C (...)."""
-    pulled = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    return determinant(F), inverse(np.swapaxes(F, -2, -1)), pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
+    product = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
+    return determinant(F), inverse(np.swapaxes(F, -2, -1)), product, np.sum(product * F, axis=(-2, -1)) + T[..., 3]
 
 
 def overstress(T: Array, F: Array) -> Array:
@@ -319,8 +319,8 @@ def overstress(T: Array, F: Array) -> Array:
     >>> (overstress(np.array([1.0, 1.0, 0.0, 1.0]), F) @ F.T).round(6)[0, 1].item()
     0.5
     """
-    J, inverse, pulled, whole = stress_parts(F, T)
-    return (J ** (-2.0 / 3.0))[..., None, None] * (pulled - (whole / 3.0)[..., None, None] * inverse)
+    J, inverse, product, whole = stress_parts(F, T)
+    return (J ** (-2.0 / 3.0))[..., None, None] * (product - (whole / 3.0)[..., None, None] * inverse)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -349,8 +349,8 @@ class Past:
     @staticmethod
     def at_rest(shear: Array, tau: Array) -> "Past":
         """Return the history of points that were never strained."""
-        one = np.array([1.0, 1.0, 0.0, 1.0])
-        return Past(shear, tau, np.broadcast_to(one, (*shear.shape, 4)), np.broadcast_to(one, (len(shear), 4)))
+        unit = np.array([1.0, 1.0, 0.0, 1.0])
+        return Past(shear, tau, np.broadcast_to(unit, (*shear.shape, 4)), np.broadcast_to(unit, (len(shear), 4)))
 
     def _decay(self, step: float) -> Array:
         """Return A' (p, m, 4) at the end of a `step` [s]."""
@@ -364,9 +364,9 @@ class Past:
 
     def after(self, F: Array, step: float) -> "Past":
         """Return the history after a `step` [s] that ends at the deformation gradients F (p, 2, 2)."""
-        now = inverse_metric(F)
-        metric = self._decay(step) + (1.0 - mean_decay(step / self.tau))[..., None] * now[:, None]
-        return replace(self, metric=metric, before=now)
+        B = inverse_metric(F)
+        metric = self._decay(step) + (1.0 - mean_decay(step / self.tau))[..., None] * B[:, None]
+        return replace(self, metric=metric, before=B)
 
     def energy(self) -> Array:
         """Return the energy density (p,) [MPa] stored in the terms."""

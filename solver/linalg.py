@@ -34,14 +34,14 @@ class Tree:
 
     order: Indices  # (e,) elements, leaf after leaf
     parts: tuple[Part, ...]  # children before parents; the last one is the whole body
-    kept: Indices  # (m,) unknowns never eliminated, in the order given
+    interface: Indices  # (m,) unknowns never eliminated, in the order given
     size: int  # number of unknowns, fixed ones included
 
     @staticmethod
-    def of(elements: Indices, centres: Array, fixed: Indices, kept: Indices, leaf: int) -> "Tree":
+    def of(elements: Indices, centres: Array, fixed: Indices, interface: Indices, leaf: int) -> "Tree":
         """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2), at most `leaf` elements a leaf.
 
-        Unknowns in `fixed` have zero displacement and take no part. Those in `kept` are passed on to the end.
+        Unknowns in `fixed` have zero displacement and take no part. Those in `interface` are passed on to the end.
         """
         order, ranges, children = _bisect(centres, leaf)
         position = np.empty(len(order), np.int64)
@@ -52,7 +52,7 @@ class Tree:
         spread = np.repeat(position, elements.shape[1])
         np.minimum.at(first, elements.ravel(), spread)
         np.maximum.at(last, elements.ravel(), spread)
-        last[kept] = len(order)  # never complete
+        last[interface] = len(order)  # never complete
         free = np.ones(size, bool)
         free[fixed] = False
         parts: list[Part] = []
@@ -64,9 +64,9 @@ class Tree:
             complete = (first[unknowns] >= low) & (last[unknowns] < high)
             inner, border = unknowns[complete], unknowns[~complete]
             if high - low == len(order):
-                border = kept
+                border = interface
             parts.append(Part(inner, border, below, slice(low, high)))
-        return Tree(order, tuple(parts), kept, size)
+        return Tree(order, tuple(parts), interface, size)
 
 
 def _bisect(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], list[tuple[int, ...]]]:

@@ -30,7 +30,7 @@ from solver.arrays import (
 )
 
 SLACK = 1e-12  # a contradiction smaller than this, relative to the largest force or height, is round-off
-DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # prescribed: the depth; the normal force; normal force and drag
+DEPTH_CONTROL, PUSH_CONTROL, DRAG_CONTROL = 0, 1, 2  # prescribed: the depth; the normal force; normal force and drag
 UNSETTLED, SINGULAR = 0, -1  # results of `solve_active_set` other than the number of solved systems
 
 
@@ -46,7 +46,7 @@ def contradictions(
     """
     state, sense, reaction = states
     next_state, next_sense, violations = changes
-    changed = 0
+    count = 0
     force = height = 0.0
     for i in range(state.shape[0]):
         force = max(force, abs(reaction[i, 1]))
@@ -66,11 +66,11 @@ def contradictions(
                 new_state, new_sense, reaction[i], slip[i], bound, load, slack
             )
         if new_state != state[i] or (new_state >= SLIP and new_sense != sense[i]):
-            changed += 1
+            count += 1
         else:
             violation = -1.0
         next_state[i], next_sense[i], violations[i] = new_state, new_sense, violation
-    return changed
+    return count
 
 
 @subroutine
@@ -138,7 +138,7 @@ def solve_active_set(
     history = np.empty((control.rounds + 1, 2, size), np.int32)
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
     may_hold = load.mu > 0.0 and load.tau > 0.0
-    one_by_one, recorded = size < 0, min(size, 0)  # False and 0, whose literals would compile subroutines twice
+    one_by_one, records = size < 0, min(size, 0)  # False and 0, whose literals would compile subroutines twice
     for turn in range(control.rounds + 1):
         bounded_length(position.x, skin, system.length)
         if by_forces:
@@ -148,25 +148,25 @@ def solve_active_set(
         if not solve(system.matrix, system.right, count):
             return SINGULAR
         scatter_answer(system, count, by_forces, states, load.mu, answer)
-        stuck, dragged = count_in(states.state, STICK) > 0, control.kind == DRAG_GIVEN
-        if dragged and not stuck and may_hold and turn < control.rounds:
+        sticks, by_drag = count_in(states.state, STICK) > 0, control.kind == DRAG_CONTROL
+        if by_drag and not sticks and may_hold and turn < control.rounds:
             hold(states.state)  # free along x, the body needs sticking nodes: all stick, then change one by one
             may_hold, one_by_one = False, True
             continue
-        regular = control_forces(states.state, sums, loads, answer, control, stuck, motion)
+        regular = control_forces(states.state, sums, loads, answer, control, sticks, motion)
         if by_forces:
             regular &= recover_steps(compliance, answer, unloaded_step, steps, states.reaction)
         else:
             regular &= recover_reaction(body, steps, states.reaction)
         if not regular or turn == control.rounds:
             return UNSETTLED if regular else SINGULAR
-        look_ahead(position, steps, motion, dragged and not stuck, ahead, above, slip)
+        look_ahead(position, steps, motion, by_drag and not sticks, ahead, above, slip)
         bounded_length(ahead, skin, system.length)
         if contradictions(states, above, slip, system.length, load, changes) == 0:
             return turn + 1
         change_states(states, changes, slip, entries, one_by_one)
-        repeated = record_states(states, history, recorded)
-        one_by_one, recorded = one_by_one or repeated, 1 if repeated else recorded + 1
+        cycle = record_states(states, history, records)
+        one_by_one, records = one_by_one or cycle, 1 if cycle else records + 1
     return UNSETTLED
 
 
@@ -176,7 +176,7 @@ def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -
 
     Nothing is filled where the depth is prescribed.
     """
-    if kind != DEPTH_GIVEN:
+    if kind != DEPTH_CONTROL:
         for i in range(body.force.shape[0]):
             loads[i % 2] += body.force[i]
             for c in range(body.force.shape[0]):
@@ -296,31 +296,31 @@ def record_states(states: ContactStates, history: Narrow, count: int) -> bool:
     If they are, the history starts again from them.
     """
     state, sense, _ = states
-    repeated = False
+    cycle = False
     for n in range(count):
         same = True
         for i in range(state.shape[0]):
             same &= history[n, 0, i] == state[i] and history[n, 1, i] == sense[i]
-        repeated |= same
-    place = 0 if repeated else count
+        cycle |= same
+    place = 0 if cycle else count
     for i in range(state.shape[0]):
         history[place, 0, i], history[place, 1, i] = state[i], sense[i]
-    return repeated
+    return cycle
 
 
 @subroutine
 def control_forces(
-    state: Narrow, sums: Array, loads: Array, answer: Array, control: ContactControl, stuck: bool, motion: Array
+    state: Narrow, sums: Array, loads: Array, answer: Array, control: ContactControl, sticks: bool, motion: Array
 ) -> bool:
-    """Add the changes of depth, and of travel where `stuck`, that balance the prescribed forces.
+    """Add the changes of depth, and of travel where `sticks`, that balance the prescribed forces.
 
     They change the first column of `answer` (2 k, 4). The surface's resultant along x and y is `loads` (2,) plus `sums`
     (2, 2 k) times the answer. Fills `motion` (2,) with both changes, limited to the control's stride. Returns False
     where nothing touches, or no change balances the forces.
     """
     motion[0] = motion[1] = 0.0
-    if control.kind == DEPTH_GIVEN or count_in(state, OPEN) == state.shape[0]:
-        return control.kind == DEPTH_GIVEN
+    if control.kind == DEPTH_CONTROL or count_in(state, OPEN) == state.shape[0]:
+        return control.kind == DEPTH_CONTROL
     drag, push = np.zeros(COLUMNS), np.zeros(COLUMNS)
     for c in range(sums.shape[1]):
         for s in range(COLUMNS):
@@ -328,7 +328,7 @@ def control_forces(
             push[s] += sums[1, c] * answer[c, s]
     drag_residual, push_residual = control.drag - loads[0] - drag[0], control.push - loads[1] - push[0]
     depth_change = travel_change = 0.0
-    if stuck and control.kind == DRAG_GIVEN:
+    if sticks and control.kind == DRAG_CONTROL:
         det = push[1] * drag[3] - push[3] * drag[1]
         if det == 0.0:
             return False
@@ -360,7 +360,7 @@ def update_contact_states(
     for i in range(size):
         slip[i] = position.x[i] - position.anchor[i]
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
-    changed = contradictions(states, position.above, slip, length, load, changes)
+    count = contradictions(states, position.above, slip, length, load, changes)
     for i in range(size):
         states.state[i], states.sense[i] = changes.state[i], changes.sense[i]
-    return changed
+    return count

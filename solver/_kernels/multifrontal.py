@@ -28,17 +28,17 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
         k, b = inner[p], border[p]
         wide = k + b
         top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
-        rest = waiting[wait_at[p] : wait_at[p] + b * b].reshape(b, b)
+        complement = waiting[wait_at[p] : wait_at[p] + b * b].reshape(b, b)
         top[:, :] = 0.0
-        rest[:, :] = 0.0
+        complement[:, :] = 0.0
         for n in range(plan.leaf[p, 0], plan.leaf[p, 1]):
-            _add_element(tangent[plan.order[n]], plan.at[n], top, rest)
+            _add_element(tangent[plan.order[n]], plan.at[n], top, complement)
         for child in plan.children[p]:
             if child >= 0:
                 size, first = border[child], plan.border_at[child]
                 below = waiting[wait_at[child] : wait_at[child] + size * size].reshape(size, size)
-                _add_child(below, plan.place[first : first + size], plan.run[first : first + size], top, rest)
-        if not _factorise(top, rest):
+                _add_child(below, plan.place[first : first + size], plan.run[first : first + size], top, complement)
+        if not _factorise(top, complement):
             return UNSOLVABLE
         for i in range(k):
             if not top[i, i] > 0.0:
@@ -52,7 +52,7 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
 
 
 @compile_loop
-def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
+def _add_element(own: Array, at: Narrow, top: Array, complement: Array) -> None:
     """Add an element's tangent `own` (16, 16), lower half, to a front; `at` (16,) are its unknowns' positions there."""
     k = top.shape[0]
     for i in range(16):
@@ -61,11 +61,11 @@ def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
             if 0 <= low < k:
                 top[low, high] += own[i, j]
             elif low >= k:
-                rest[low - k, high - k] += own[i, j]
+                complement[low - k, high - k] += own[i, j]
 
 
 @compile_loop
-def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Array) -> None:
+def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, complement: Array) -> None:
     """Add a child's Schur complement `below` (b, b) to the front in which its border has positions `where` (b,).
 
     Positions are consecutive over long runs; `ends` (b,) are the ends of these runs.
@@ -76,7 +76,7 @@ def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Arra
         if r < k:
             target, offset = top[r], 0
         else:
-            target, offset = rest[r - k], k
+            target, offset = complement[r - k], k
         j = i
         while j < size:
             first, count = where[j] - offset, ends[j] - j
@@ -87,14 +87,14 @@ def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Arra
 
 
 @compile_loop
-def _factorise(top: Array, rest: Array) -> bool:
+def _factorise(top: Array, complement: Array) -> bool:
     """Factorise a front in place, upper halves only; return False where a pivot is zero.
 
-    The inner rows `top` (k, k + b) become their factor, and `rest` (b, b) the Schur complement. Rows are finished two
-    at a time; those of `rest` are updated four at a time, by four finished rows at a time. That keeps most numbers in
-    registers and the nearest cache. In rows updated together, entries before the diagonal have no meaning.
+    The inner rows `top` (k, k + b) become their factor, and `complement` (b, b) the Schur complement. Rows are finished
+    two at a time; those of `complement` are updated four at a time, by four finished rows at a time. That keeps most
+    numbers in registers and the nearest cache. In rows updated together, entries before the diagonal have no meaning.
     """
-    k, b = top.shape[0], rest.shape[0]
+    k, b = top.shape[0], complement.shape[0]
     over = np.empty(k)  # reciprocal pivots
     for r in range(0, k - 1, 2):
         one, two = top[r, r:], top[r + 1, r:]
@@ -114,9 +114,9 @@ def _factorise(top: Array, rest: Array) -> bool:
             return False
         over[k - 1] = 1.0 / top[k - 1, k - 1]
     for r in range(0, b - 1, 2):
-        _update_two(top, over, k, k + r, rest[r, r:], rest[r + 1, r:])
+        _update_two(top, over, k, k + r, complement[r, r:], complement[r + 1, r:])
     if b % 2 == 1:
-        _update_one(top, over, k, k + b - 1, rest[b - 1, b - 1 :])
+        _update_one(top, over, k, k + b - 1, complement[b - 1, b - 1 :])
     return True
 
 
@@ -206,16 +206,16 @@ def back_substitute_part(p: int, condensed_force: Array, factors: Factors, out: 
 
 
 @compile_loop
-def back_substitute(condensed_force: Array, skin: Array, needed: Flags, out: Array, factors: Factors) -> None:
+def back_substitute(condensed_force: Array, skin: Array, parts: Flags, out: Array, factors: Factors) -> None:
     """Fill `out` (n,) with all displacements for the skin's, `skin` (m,), under the loads of -`condensed_force` (n,).
 
-    `condensed_force` is the result of `condense`. Parts of the body that are not `needed` (p,) are skipped.
+    `condensed_force` is the result of `condense`. Only those `parts` (p,) of the body that are true are done.
     """
     first = out.shape[0] - skin.shape[0]
     for i in range(skin.shape[0]):
         out[first + i] = skin[i]
-    for p in range(needed.shape[0] - 1, -1, -1):
-        if needed[p]:
+    for p in range(parts.shape[0] - 1, -1, -1):
+        if parts[p]:
             back_substitute_part(p, condensed_force, factors, out)
 
 
@@ -223,7 +223,7 @@ def back_substitute(condensed_force: Array, skin: Array, needed: Flags, out: Arr
 def displace(
     condensed_force: Array,
     skin: Array,
-    needed: Flags,
+    parts: Flags,
     nodes: Narrow,
     unknown: Narrow,
     recovery_matrix: Array,
@@ -237,7 +237,7 @@ def displace(
     """
     inside = np.zeros(condensed_force.shape[0])
     for c in range(skin.shape[0]):
-        back_substitute(condensed_force, skin[c], needed, inside, factors)
+        back_substitute(condensed_force, skin[c], parts, inside, factors)
         for e in range(nodes.shape[0]):
             x = y = 0.0
             for i in range(16):

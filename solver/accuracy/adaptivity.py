@@ -66,8 +66,8 @@ class NestedGrid:
         shear = Elastic.of(mesh, moduli).stiffness.reshape(columns, 2, rows, 2, 18, 18)
         place = mesh.nodes.take(nodes, axis=0).reshape(columns, rows, 25, 2)
         affine = np.concatenate([np.ones((*place.shape[:3], 1)), place - place.mean(axis=2, keepdims=True)], axis=3)
-        turned = np.swapaxes(affine, 2, 3)
-        fit = np.asarray(np.linalg.solve(turned @ affine, turned), np.float64)
+        transpose = np.swapaxes(affine, 2, 3)
+        fit = np.asarray(np.linalg.solve(transpose @ affine, transpose), np.float64)
         return NestedGrid(finger, nodes, shear, affine, fit)
 
     def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array]:
@@ -110,16 +110,16 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     """
     goal = finger.ending.gradient(displacement)
     goal[finger.geometry.mesh.driven] = 0.0
-    loaded, recover = finger.body.under(goal)
-    compliance, free = loaded.compliance, loaded.free_displacement().ravel()
+    body, recover = finger.body.under(goal)
+    compliance, free = body.compliance, body.free_displacement().ravel()
     movable = compliance.diagonal().reshape(-1, 2).all(axis=1)
-    touching, stuck = (np.flatnonzero(movable & which) for which in (state.state != OPEN, state.state == STICK))
+    touching, sticking = (np.flatnonzero(movable & which) for which in (state.state != OPEN, state.state == STICK))
     lever = np.where(state.state == SLIP, state.load.mu * state.sense, 0.0)[touching, None]
-    forces = np.concatenate([2 * touching + 1, 2 * stuck])
+    forces = np.concatenate([2 * touching + 1, 2 * sticking])
     rows = np.column_stack([compliance, free])
-    system = np.concatenate([rows[2 * touching + 1] + lever * rows[2 * touching], rows[2 * stuck]])
-    missing = np.linalg.lstsq(system[:, forces], -system[:, -1], rcond=None)[0]
-    return recover((free + compliance[:, forces] @ missing).reshape(-1, 2))
+    system = np.concatenate([rows[2 * touching + 1] + lever * rows[2 * touching], rows[2 * sticking]])
+    reactions = np.linalg.lstsq(system[:, forces], -system[:, -1], rcond=None)[0]
+    return recover((free + compliance[:, forces] @ reactions).reshape(-1, 2))
 
 
 def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Steps | None) -> NestedNumbers:
@@ -129,8 +129,8 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
     """
     nested, finger, state = on_nested
     target = scene.solve.target
-    missed = target is not None and errors(scene, numbers, nested, steps).sed > target
-    if not missed and scene.solve.contrast_tolerance is None:
+    misses_tolerance = target is not None and errors(scene, numbers, nested, steps).sed > target
+    if not misses_tolerance and scene.solve.contrast_tolerance is None:
         return nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
     change = abs(float(nested.numbers[0] - numbers[0]))
@@ -165,18 +165,18 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
         return None
     per_line = parts * np.repeat(counts, counts)
     least = GROWTH * _unknowns(np.ones(len(parts)), counts)
-    chosen = None
+    best = None
     for scale in per_line.max() * np.geomspace(1.0, 1e-9, SCALES):
-        wanted = np.maximum(np.rint((per_line / scale) ** (1.0 / (SHARE_ORDER + 1.0))), 1.0)
-        divided = np.minimum(wanted, most)
-        if (unknowns := _unknowns(divided, counts)) > MOST_UNKNOWNS:
+        optimum = np.maximum(np.rint((per_line / scale) ** (1.0 / (SHARE_ORDER + 1.0))), 1.0)
+        division = np.minimum(optimum, most)
+        if (unknowns := _unknowns(division, counts)) > MOST_UNKNOWNS:
             break
-        chosen = divided
-        if np.sum(parts / wanted**SHARE_ORDER) <= ERROR_AIM and unknowns >= least:
+        best = division
+        if np.sum(parts / optimum**SHARE_ORDER) <= ERROR_AIM and unknowns >= least:
             break
-    if chosen is None or chosen.max() == 1.0:
+    if best is None or best.max() == 1.0:
         return None
-    return lines.divide(*np.split(chosen.astype(np.int64), counts[:1]))
+    return lines.divide(*np.split(best.astype(np.int64), counts[:1]))
 
 
 def _unknowns(parts: Array, counts: Indices) -> float:

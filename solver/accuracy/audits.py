@@ -15,7 +15,7 @@ from solver.equilibrium.finger import Finger
 from solver.failures import MIXED, NoSteadyState, NotConverged
 from solver.scene import Scene
 
-MISSED = 1e-5  # largest relative difference from given forces
+FORCE_RESIDUAL = 1e-5  # largest relative difference from given forces
 UNSOUND = 1e-4  # relative residual from which a state is refused
 DOUBTED = 1e-8  # relative residual from which a warning is given
 PIERCED = 1e-7  # penetration by the indentation from which a warning is given
@@ -39,15 +39,15 @@ def audits(
     force.
     """
     mesh, condensed = finger.geometry.mesh, finger.newton.condensed
-    inner, grown = finger.body.forces(displacement), finger.body.energy_growth(displacement)
+    inner, growth = finger.body.forces(displacement), finger.body.energy_growth(displacement)
     if overstress is not None:
         inner = inner + overstress
-        grown += float(np.sum(overstress * displacement))
+        growth += float(np.sum(overstress * displacement))
     total = max(float(state.force[1]), np.finfo(float).tiny)
     bone = inner[mesh.held].sum(axis=0) + state.force
-    left = inner.copy()
-    left[mesh.skin] -= state.reaction
-    left[mesh.held] = 0.0
+    residual = inner.copy()
+    residual[mesh.skin] -= state.reaction
+    residual[mesh.held] = 0.0
     work = float(np.sum(state.reaction * displacement[mesh.skin]))
     whole = finger.geometry.whole
     height = mesh.nodes[whole, 1] + displacement[whole, 1] - state.load.depth
@@ -60,8 +60,8 @@ def audits(
     return {
         "equilibrium_x": abs(float(bone[0])) / total,
         "equilibrium_y": abs(float(bone[1])) / total,
-        "inner_forces": float(np.abs(left).max()) / total,
-        "work_balance": abs(work - grown) / max(abs(grown), np.finfo(float).tiny),
+        "inner_forces": float(np.abs(residual).max()) / total,
+        "work_balance": abs(work - growth) / max(abs(growth), np.finfo(float).tiny),
         "penetration": max(-float(height.min()), 0.0) / state.load.depth,
         "tension": max(-float(state.normal.min(initial=0.0)), 0.0) / push,
         "cone_violation": max(float((np.abs(state.tangential) - limit).max(initial=0.0)), 0.0) / push,
@@ -78,12 +78,12 @@ def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str,
     force, drag = scene.normal_force, scene.tangential_force
     if force is None:
         return {}
-    missed = {"normal_force_missed": abs(normal / force - 1.0)}
+    residuals = {"normal_force_missed": abs(normal / force - 1.0)}
     if drag is not None and scene.friction.mu > 0.0:
-        missed["drag_missed"] = abs(tangential + scene.loading.direction * drag) / (float(scene.friction.mu) * force)
-    if max(missed.values()) > MISSED:
+        residuals["drag_missed"] = abs(tangential + scene.loading.direction * drag) / (float(scene.friction.mu) * force)
+    if max(residuals.values()) > FORCE_RESIDUAL:
         raise NotConverged("No state was found that has the forces given: give others, or a depth.")
-    return missed
+    return residuals
 
 
 def imbalance(checks: Mapping[str, float]) -> float:
@@ -112,9 +112,9 @@ def balance(
 
 def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
     """Raise NotConverged where residuals at `depth` [mm] are too large, because of round-off."""
-    if (left := imbalance(checks)) > UNSOUND:
+    if (residual := imbalance(checks)) > UNSOUND:
         raise NotConverged(
-            f"Forces balance to {left:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
+            f"Forces balance to {residual:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
             f"contacts far smaller than the mesh, {MIXED} do that."
         )
 
@@ -135,8 +135,8 @@ def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displ
 def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
     """Return a warning for each of `checks` with unusual round-off."""
     warnings: list[str] = []
-    if (left := imbalance(checks)) > DOUBTED:
-        warnings.append(f"Forces balance to {left:.1g} only: {MIXED} magnify round-off.")
+    if (residual := imbalance(checks)) > DOUBTED:
+        warnings.append(f"Forces balance to {residual:.1g} only: {MIXED} magnify round-off.")
     if (low := checks["penetration"]) > PIERCED:
         warnings.append(f"The skin lies {low:.1g} of the indentation too low: stiff layers magnify round-off.")
     return tuple(warnings)
@@ -172,18 +172,18 @@ def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxin
     reaction = np.array([state.reaction for state in states])  # (m, k, 2)
     skin = np.array([state.place(newton.condensed) for state in states])
     load = np.array([[state.load.travel, state.load.depth] for state in states])
-    mean, moved = (reaction[1:] + reaction[:-1]) / 2.0, np.diff(skin, axis=0)
-    slip = moved - np.diff(load, axis=0)[:, None]  # relative to the surface; along y towards it, negative
+    mean, motion = (reaction[1:] + reaction[:-1]) / 2.0, np.diff(skin, axis=0)
+    slip = motion - np.diff(load, axis=0)[:, None]  # relative to the surface; along y towards it, negative
     bone = float(np.sum(mean.sum(axis=1) * np.diff(load, axis=0)))
-    lost = -float(np.sum(mean[..., 0] * slip[..., 0]))
+    dissipation = -float(np.sum(mean[..., 0] * slip[..., 0]))
     friction = -np.sum(reaction[1:, :, 0] * slip[..., 0], axis=1)
     scale = max(abs(bone), np.finfo(float).tiny)
-    stored = newton.condensed.stored_energy(states[-1].u, states[-1].reaction)
+    energy = newton.condensed.stored_energy(states[-1].u, states[-1].reaction)
     least = {"course_least_dissipation": float(friction.min()) / scale}
     if relaxing:
-        return {"course_viscous_work": (bone - lost - stored) / scale} | least
-    elastic = newton.condensed.work([state.u for state in states], float(np.sum(mean * moved)))
+        return {"course_viscous_work": (bone - dissipation - energy) / scale} | least
+    elastic = newton.condensed.work([state.u for state in states], float(np.sum(mean * motion)))
     return {
-        "course_work_balance": abs(elastic - stored) / scale,
-        "course_step_work": abs(bone - stored - lost) / scale,
+        "course_work_balance": abs(elastic - energy) / scale,
+        "course_step_work": abs(bone - energy - dissipation) / scale,
     } | least

@@ -140,19 +140,19 @@ def edge_changes(
     their forces, or None for a given depth. `numbers` returns (c, n) for c states. A change is infinite where no
     equilibrium exists with the edge moved.
     """
-    moved = [_move_edges(newton, state, forces) for state, forces in states]
-    solutions = [one for edges in moved for sides in edges for one in sides if one is not None]
+    variants = [_move_edges(newton, state, forces) for state, forces in states]
+    solutions = [one for edges in variants for sides in edges for one in sides if one is not None]
     values = numbers([*(state for state, _ in states), *solutions])
-    here, moved_values = values[: len(states)], iter(values[len(states) :])
-    size = here.shape[1]
+    base, variant_values = values[: len(states)], iter(values[len(states) :])
+    size = base.shape[1]
 
     def change(sides: list[EquilibriumState | None], before: Array) -> Array:
-        changes = [np.full(size, np.inf) if one is None else np.abs(next(moved_values) - before) for one in sides]
+        changes = [np.full(size, np.inf) if one is None else np.abs(next(variant_values) - before) for one in sides]
         return np.max(changes, axis=0)
 
-    return here, [
+    return base, [
         np.array([change(sides, before) for sides in edges]).reshape(-1, size)
-        for edges, before in zip(moved, here, strict=True)
+        for edges, before in zip(variants, base, strict=True)
     ]
 
 
@@ -187,8 +187,8 @@ def _move_edges(
     """
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
-    kept = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
-    solvable = newton.linearise(state, state.load, x, 0, forces, kept=kept)
+    reuse = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
+    solvable = newton.linearise(state, state.load, x, 0, forces, reuse=reuse)
     alone = np.count_nonzero(state.touching) == 1
     return [
         [
@@ -214,8 +214,8 @@ def _move_edge(
         return None
     deeper, along = newton.system.motion.tolist() if forces is not None else (0.0, 0.0)
     load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
-    moved = newton.apply_step(start, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
-    return replace(moved, state=states, sense=senses)  # the prescribed states, not those that would follow
+    after = newton.apply_step(start, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    return replace(after, state=states, sense=senses)  # the prescribed states, not those that would follow
 
 
 def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: Steps | None) -> Errors:
@@ -255,13 +255,13 @@ def row_errors(scene: Scene, row: Array, nested: NestedNumbers | None) -> Array:
 
 def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
     """Return the errors without those of prescribed numbers, and of the drag where there is no friction."""
-    by_force, dragged = scene.normal_force is not None, scene.loading.dragged
+    by_force, by_drag = scene.normal_force is not None, scene.loading.dragged
     rubs = not scene.friction.frictionless
     return estimates._replace(
         normal=None if by_force else estimates.normal,
-        tangential=None if dragged else estimates.tangential if rubs else 0.0,
+        tangential=None if by_drag else estimates.tangential if rubs else 0.0,
         indentation=estimates.indentation if by_force else None,
-        shift=estimates.shift if dragged else None,
+        shift=estimates.shift if by_drag else None,
     )
 
 
@@ -324,27 +324,27 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     For forces and depth, only errors above the resolution of sensors give a warning. A surface without a state on the
     nested mesh is left out, since its error is unknown.
     """
-    known = [(one, one.nested) for one in predictions if one.nested is not None]
-    if len(known) < 2:
+    with_estimate = [(one, one.nested) for one in predictions if one.nested is not None]
+    if len(with_estimate) < 2:
         return ContrastError(0.0)
     count = len(COMPARED)
-    numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in known])
-    change = np.abs([nested.numbers[:count] for _, nested in known]) - numbers
-    edges = np.array([np.linalg.norm(nested.of_edges[:, :count], axis=0) for _, nested in known])
-    pairs = np.array(list(combinations(range(len(known)), 2))).T
+    numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in with_estimate])
+    change = np.abs([nested.numbers[:count] for _, nested in with_estimate]) - numbers
+    edges = np.array([np.linalg.norm(nested.of_edges[:, :count], axis=0) for _, nested in with_estimate])
+    pairs = np.array(list(combinations(range(len(with_estimate)), 2))).T
     apart = change[pairs[0]] - change[pairs[1]]
-    order = order_of(known[0][0].scene)  # all have the same tissues
+    order = order_of(with_estimate[0][0].scene)  # all have the same tissues
     worst = half_width(apart, np.hypot(edges[pairs[0]], edges[pairs[1]])[None], order)
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(
         np.maximum(np.ptp(numbers, axis=0), LEAST_RANGE * mean / WARNING_SHARE), np.finfo(float).tiny
     )
-    minded = off_by > SENSOR_RESOLUTION * mean
-    minded[0] = True
-    warned = np.where((shares > WARNING_SHARE) & minded, shares, 0.0)
-    first = int(warned.argmax())
+    noticeable = off_by > SENSOR_RESOLUTION * mean
+    noticeable[0] = True
+    excess = np.where((shares > WARNING_SHARE) & noticeable, shares, 0.0)
+    first = int(excess.argmax())
     return ContrastError(
-        float(shares[0]), _in_a_sentence(COMPARED[first], float(warned[first])) if warned.any() else ""
+        float(shares[0]), _in_a_sentence(COMPARED[first], float(excess[first])) if excess.any() else ""
     )
 
 

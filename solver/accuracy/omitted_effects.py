@@ -33,12 +33,12 @@ STRAIN_LIMIT = 0.1  # strain from which there is a warning at small strain [-]
 def _describe_laws(scene: Scene) -> str:
     """Return the law of every tissue as text."""
     usual = "Hooke" if scene.solve.kinematics == "small" else "compressible neo-Hookean"
-    said: list[str] = []
+    laws: list[str] = []
     for name in ("epidermis", "dermis", "fat"):
         tissue = scene.materials.of(name)
         law = _ogden(tissue) if tissue.law == "ogden" else usual
-        said.append(f"{name} {law}" + (f", relaxing in {len(tissue.prony)} terms" if tissue.prony else ""))
-    return "; ".join(said)
+        laws.append(f"{name} {law}" + (f", relaxing in {len(tissue.prony)} terms" if tissue.prony else ""))
+    return "; ".join(laws)
 
 
 def _ogden(tissue: Material) -> str:
@@ -50,9 +50,9 @@ def _ogden(tissue: Material) -> str:
 def _describe_support(scene: Scene) -> str:
     """Return the model of the bone, the cut and the nail as text."""
     finger = scene.finger
-    said = "driven as a whole" if finger.bone == "rigid" else "meshed, driven at its core of a third of its radius"
-    said += "; the cut is free" if finger.cut == "free" else "; the cut is driven with it"
-    return said + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
+    text = "driven as a whole" if finger.bone == "rigid" else "meshed, driven at its core of a third of its radius"
+    text += "; the cut is free" if finger.cut == "free" else "; the cut is driven with it"
+    return text + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
 
 
 def model(
@@ -188,7 +188,7 @@ def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
 
 
 def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
-    lasting = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
+    duration = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
     if scene.materials.relax and scene.solve.course == "history":
         longest = scene.materials.longest_relaxation
         how = "tissues relaxed as the scene says, until nothing changed"
@@ -203,25 +203,25 @@ def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
             "it would scale all surfaces alike"
         )
     return {
-        "estimate": max(_overstress_after(lasting, terms) for terms in series),
-        "from": {"slide_s": lasting, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
+        "estimate": max(_overstress_after(duration, terms) for terms in series),
+        "from": {"slide_s": duration, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
         "how": f"stress above its relaxed value when sliding has settled, {whose}",
     }
 
 
-def _overstress_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
-    """Return the relative overstress after a press of 1 s and a slide of duration `lasting` [s]."""
-    after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in terms)
+def _overstress_after(duration: float, terms: Sequence[tuple[float, float]]) -> float:
+    """Return the relative overstress after a press of 1 s and a slide that lasts `duration` [s]."""
+    after = sum(g * tau * (np.exp(-duration / tau) - np.exp(-(duration + 1.0) / tau)) for tau, g in terms)
     return float(after) / (1.0 - sum(g for _, g in terms))
 
 
 def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
-    marched = scene.solve.course == "history" or scene.loading.direction == 0
+    stepwise = scene.solve.course == "history" or scene.loading.direction == 0
     return {
-        "estimate": 0.0 if marched else sticking,
+        "estimate": 0.0 if stepwise else sticking,
         "from": {"sticking_part": sticking, "elastic_slide_mm": slide},
         "how": "the history was marched"
-        if marched
+        if stepwise
         else "part of the touching points that stick: those alone depend on the way, which is forgotten once the bone "
         "has slid a few times the skin's own sideways displacement",
     }
@@ -254,19 +254,19 @@ def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
     if isinstance(base, Prediction):
         for name, entry in _differences(plain, base, answers).items():
             if name in left_out:
-                estimated = left_out[name]["estimate"]
-                left_out[name] |= {"estimated": estimated, **entry}
+                estimate = left_out[name]["estimate"]
+                left_out[name] |= {"estimated": estimate, **entry}
     return with_left_out(prediction, left_out, start)
 
 
 def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], start: float) -> Prediction:
     """Return `prediction` with new entries `left_out` and their warnings; `start` is when the work on them began."""
     usual = warnings(prediction.scene, prediction.model["left_out"])
-    kept = tuple(one for one in prediction.warnings if one not in usual)
+    own = tuple(one for one in prediction.warnings if one not in usual)
     return replace(
         prediction,
         model={**prediction.model, "left_out": left_out},
-        warnings=(*kept, *warnings(prediction.scene, left_out)),
+        warnings=(*own, *warnings(prediction.scene, left_out)),
         evidence_s=perf_counter() - start + (prediction.evidence_s or 0.0),
     )
 
@@ -279,8 +279,8 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
     if scene.solve.kinematics == "small" and not scene.materials.relax:
         out["finite strain"] = _beyond_errors(base, answers((_at_finite_strain(scene),))[0], "at finite strain")
     if scene.loading.directions and not scene.loading.dragged and not scene.materials.relax:
-        marched = replace(scene, solve=replace(scene.solve, course="history"))
-        out["history"] = _difference(base, answers((marched,))[0], "when the whole course is marched")
+        history = replace(scene, solve=replace(scene.solve, course="history"))
+        out["history"] = _difference(base, answers((history,))[0], "when the whole course is marched")
     return out
 
 
@@ -288,8 +288,8 @@ def _with_meshed_bone(scene: Scene, answers: Answers) -> Answer | SceneError:
     """Return the answer of a scene with its bone meshed, whose stiffness may be out of proportion to the tissues'."""
     try:
         return answers((replace(scene, finger=replace(scene.finger, bone="meshed")),))[0]
-    except SceneError as refused:
-        return refused
+    except SceneError as error:
+        return error
 
 
 def _difference(base: Prediction, other: Answer | SceneError, how: str) -> dict[str, Any]:

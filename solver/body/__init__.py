@@ -261,7 +261,7 @@ class Places(NamedTuple):
     """Probes with the data of their elements, which no displacement changes."""
 
     probes: "Probes"
-    held: Indices  # (m,) elements that hold probes
+    hosts: Indices  # (m,) elements that hold probes
     number: Indices  # (p,) which of these elements holds each probe
     gradients: Array  # (2, m, q, 9) gradients of their shape functions at the quadrature points
     modes: Array  # (p, 3) orthonormal volume modes at the probes
@@ -295,20 +295,20 @@ class MeshElements:
 
     def places(self, probes: "Probes", tangent: Array | None = None) -> "Places":
         """Return `Places` of probes; `tangent` (p, 2) is the skin's direction, by default along x."""
-        of, element, held = self.elements, probes.element, distinct(probes.element)
+        of, element, hosts = self.elements, probes.element, distinct(probes.element)
         along = np.tile([1.0, 0.0], (len(element), 1)) if tangent is None else tangent
         constants = np.stack([of.shear[element], of.lame[element], of.stiffening[element], *along.T])
-        gradients = np.stack([of.grad_x[held], of.grad_y[held]])
-        return Places(probes, held, np.searchsorted(held, element), gradients, self.modes_at(probes), constants)
+        gradients = np.stack([of.grad_x[hosts], of.grad_y[hosts]])
+        return Places(probes, hosts, np.searchsorted(hosts, element), gradients, self.modes_at(probes), constants)
 
     def state(self, places: "Places", displacement: Array) -> LocalState:
         """Return strains and moduli at places, arrays (p, ...), for displacements (nodes, 2, ...)."""
-        held, wide = places.held, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
-        local = self.mesh.about_centre(displacement, held)
+        hosts, wide = places.hosts, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
+        local = self.mesh.about_centre(displacement, hosts)
         gradient = places.probes.gradient_of(local.take(places.number, axis=0))
-        by = places.gradients @ local.reshape(len(held), 9, -1)
-        by = np.moveaxis(by.reshape(2, len(held), 9, *displacement.shape[1:]), 3, 1)
-        fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), held)[places.number]
+        by = places.gradients @ local.reshape(len(hosts), 9, -1)
+        by = np.moveaxis(by.reshape(2, len(hosts), 9, *displacement.shape[1:]), 3, 1)
+        fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), hosts)[places.number]
         shear, lame, stiffening, x, y = places.constants[wide]
         return LocalState(
             gradient[:, 0, 0], gradient[:, 0, 1], gradient[:, 1, 0], gradient[:, 1, 1],
@@ -318,8 +318,8 @@ class MeshElements:
     @cached_property
     def divergence(self) -> Array:
         """Matrices (e, 3, 18) from nodal displacements x, y, x, y, ... to the volume modes of the small strain."""
-        weighted = np.swapaxes(self.elements.weight[:, :, None] * self.elements.modes, 1, 2)
-        by_axis = np.stack([weighted @ self.elements.grad_x, weighted @ self.elements.grad_y], axis=-1)
+        weighted_modes = np.swapaxes(self.elements.weight[:, :, None] * self.elements.modes, 1, 2)
+        by_axis = np.stack([weighted_modes @ self.elements.grad_x, weighted_modes @ self.elements.grad_y], axis=-1)
         return by_axis.reshape(-1, 3, 18)
 
     def modes_at(self, probes: "Probes") -> Array:

@@ -131,17 +131,17 @@ class FiniteBody(MeshElements):
 
     def _energy(self, H: Array) -> complex:
         log, volume = self._logarithm(H)
-        grown = shape(self.elements.stiffening[:, None], _excess(H, log))
-        shear = np.sum(self.elements.weight * self.elements.shear[:, None] / 2.0 * grown)
+        growth = shape(self.elements.stiffening[:, None], _excess(H, log))
+        shear = np.sum(self.elements.weight * self.elements.shear[:, None] / 2.0 * growth)
         return complex(shear + np.sum(self.elements.lame / 2.0 * (volume**2).T))
 
 
 def _inverse_and_excess(H: Array) -> tuple[Array, Array]:
     """Return F^-T and F - F^-T (e, 9, 2, 2) for F = 1 + H, the difference without cancellation."""
-    grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
+    growth = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
     across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
     F = np.eye(2) + H
-    return (np.eye(2) + across) / (1.0 + grown), (H - across + grown * F) / (1.0 + grown)
+    return (np.eye(2) + across) / (1.0 + growth), (H - across + growth * F) / (1.0 + growth)
 
 
 def _excess(H: Array, log: Array) -> Array:
@@ -214,8 +214,8 @@ class CondensedFinite:
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
         after = BodyState(np.empty_like(u), np.empty_like(pressure))
-        moved = self.inside.back_substitute(self.all_forces, step)
-        largest = self._advance(BodyState(u, pressure), moved, scale, after)
+        inner = self.inside.back_substitute(self.all_forces, step)
+        largest = self._advance(BodyState(u, pressure), inner, scale, after)
         return after.u, after.pressure, largest
 
     def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - as every body is asked

@@ -19,7 +19,7 @@ from solver.linalg import ElementSubset, Elimination, symbolic_factorization
 from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
 from solver.quantities import QUANTITIES, SED
 
-Carried = tuple[Array, Array]  # a load after forward elimination (n,), and the displacements (e, 2) of centres by it
+CondensedLoad = tuple[Array, Array]  # a load after forward elimination (n,), and centres' displacements (e, 2) by it
 
 
 class Elastic(MeshElements):
@@ -81,36 +81,36 @@ class LinearElimination:
             raise LinAlgError("the stiffness inside the body is not positive definite")
         self._recovery_matrix = self._recovery_matrix[:, :, :16].copy()
         self.stiffness = self._inside.stiffness
-        self.unloaded: Carried = np.zeros(plan.size), np.zeros((count, 2))
+        self.no_load: CondensedLoad = np.zeros(plan.size), np.zeros((count, 2))
         self._subsets: dict[bytes | None, tuple[Indices, ElementSubset]] = {}
 
-    def condense(self, loads: Array) -> Carried:
+    def condense(self, loads: Array) -> CondensedLoad:
         """Return dead `loads` (nodes, 2) after forward elimination."""
         mesh, plan = self.elastic.mesh, self._inside.plan
         centre = loads[mesh.elements[:, 8], :, None]
         own = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
-        passed = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
+        from_centre = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
         free = plan.unknown >= 0
         force = np.zeros(plan.size)
         force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
-        np.add.at(force, plan.unknown[free], passed[free])
+        np.add.at(force, plan.unknown[free], from_centre[free])
         self._inside.condense(force)
         return force, own
 
-    def skin_load(self, carried: Carried) -> Array:
+    def skin_load(self, load: CondensedLoad) -> Array:
         """Return a load condensed to the skin (2 k,), 0 where that is held."""
         mesh = self.elastic.mesh
-        return np.where(mesh.driven[mesh.skin].ravel(), 0.0, -carried[0][len(carried[0]) - len(self.stiffness) :])
+        return np.where(mesh.driven[mesh.skin].ravel(), 0.0, -load[0][len(load[0]) - len(self.stiffness) :])
 
-    def displacement(self, skin: Array, carried: Carried, only: Indices | None = None) -> Array:
+    def displacement(self, skin: Array, load: CondensedLoad, only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, c) by back substitution of the skin's (2 k, c) under a load.
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-        mesh, (used, subset) = self.elastic.mesh, self._elements_of(only)
+        mesh, (elements, subset) = self.elastic.mesh, self._elements_of(only)
         out = np.zeros((*mesh.nodes.shape, skin.shape[1]))
-        self._inside.displace(carried[0], skin.T, subset, out)
-        out[subset.nodes[:, 8]] += carried[1][used, :, None]
+        self._inside.displace(load[0], skin.T, subset, out)
+        out[subset.nodes[:, 8]] += load[1][elements, :, None]
         return out
 
     def _elements_of(self, only: Indices | None) -> tuple[Indices, ElementSubset]:
@@ -118,13 +118,13 @@ class LinearElimination:
         key = None if only is None else only.tobytes()
         if key not in self._subsets:
             of = self.elastic.elements
-            wanted = np.full(len(self.elastic.mesh.nodes), only is None)
-            wanted[only] = True
-            used = np.flatnonzero(wanted[of.nodes].any(axis=1))
-            parts = self._inside.parts_holding(of.unknown[used])
+            flags = np.full(len(self.elastic.mesh.nodes), only is None)
+            flags[only] = True
+            elements = np.flatnonzero(flags[of.nodes].any(axis=1))
+            parts = self._inside.parts_holding(of.unknown[elements])
             self._subsets[key] = (
-                used,
-                ElementSubset(parts, of.nodes[used], of.unknown[used], self._recovery_matrix[used]),
+                elements,
+                ElementSubset(parts, of.nodes[elements], of.unknown[elements], self._recovery_matrix[elements]),
             )
         return self._subsets[key]
 
@@ -141,7 +141,7 @@ class LinearBody:
     mesh: Mesh
     elastic: Elastic
     elimination: LinearElimination
-    carried: Carried  # its dead loads after forward elimination
+    load: CondensedLoad  # its dead loads after forward elimination
     condensed: CondensedLinear
     prescribed: Array  # (nodes, 2) displacement of held nodes relative to the drive, 0 elsewhere [mm]
 
@@ -166,15 +166,15 @@ class LinearBody:
             check_loads(mesh, loads, prescribed)
             check_held(mesh, free)
         whole = LinearElimination(mesh, materials)
-        moved = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
+        displacement = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
         force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
         if prescribed is not None:
-            force -= mesh.assemble(whole.elastic.forces(mesh.local(moved)))
-        carried = whole.condense(force) if force.any() else whole.unloaded
-        condensed = _condense_skin(mesh, whole.stiffness, whole.skin_load(carried), free)
+            force -= mesh.assemble(whole.elastic.forces(mesh.local(displacement)))
+        load = whole.condense(force) if force.any() else whole.no_load
+        condensed = _condense_skin(mesh, whole.stiffness, whole.skin_load(load), free)
         if not checked and len(mesh.skin):
             _ = condensed.compliance  # raises where the body can move
-        return LinearBody(mesh, whole.elastic, whole, carried, condensed, moved)
+        return LinearBody(mesh, whole.elastic, whole, load, condensed, displacement)
 
     def displacement(self, u: Array, only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, ...) of all nodes for those of the skin `u` (k, 2, ...).
@@ -182,7 +182,7 @@ class LinearBody:
         With `only` (node numbers), other nodes may be left at 0.
         """
         skin = u.reshape(2 * len(self.mesh.skin), prod(u.shape[2:]))
-        out = self.elimination.displacement(skin, self.carried, only) + self.prescribed[:, :, None]
+        out = self.elimination.displacement(skin, self.load, only) + self.prescribed[:, :, None]
         return out.reshape(*self.mesh.nodes.shape, *u.shape[2:])
 
     @property
@@ -212,12 +212,12 @@ class LinearBody:
 
         It maps those of the skin (k, 2) to those of all nodes (nodes, 2) [mm]; held nodes stay.
         """
-        carried = self.elimination.condense(loads)
+        load = self.elimination.condense(loads)
 
         def recover(u: Array) -> Array:
-            return self.elimination.displacement(u.reshape(-1, 1), carried)[:, :, 0]
+            return self.elimination.displacement(u.reshape(-1, 1), load)[:, :, 0]
 
-        return self.condensed.with_load(self.elimination.skin_load(carried)), recover
+        return self.condensed.with_load(self.elimination.skin_load(load)), recover
 
     def following(self, skin: Array) -> Array:
         """Do as `Body` says."""

@@ -32,7 +32,7 @@ class SkinCompression(NamedTuple):
             return SkinCompression(np.inf, 0, np.inf, 0.0)
         steps = np.diff(np.stack([before, after]), axis=1).reshape(2, -1, 2, 2)[:, loose]  # (2, l, halves, 2)
         lengths = _length(steps)
-        squeezed = lengths[1] / lengths[0]
+        ratio = lengths[1] / lengths[0]
         tangents = 3.0 * steps - steps[:, :, ::-1]  # at both ends
         tangent = tangents[1] / _length(tangents[0])[..., None]
         stretch = _length(tangent)
@@ -40,8 +40,8 @@ class SkinCompression(NamedTuple):
         joints = (np.diff(elements) == 1) & ~touching[2 * elements[1:]]
         joints &= np.minimum(stretch[1:, 0], stretch[:-1, 1]) < SQUEEZED
         jumps = _length(tangent[1:, 0] - tangent[:-1, 1])[joints]
-        worst = int(squeezed.min(axis=1).argmin())
-        least = float(squeezed[worst].min())
+        worst = int(ratio.min(axis=1).argmin())
+        least = float(ratio[worst].min())
         lowest = min(float(stretch.min()), least)
         return SkinCompression(least, int(elements[worst]), lowest, float(jumps.max(initial=0.0)))
 

@@ -128,20 +128,20 @@ def _check_skin(mesh: Mesh) -> None:
     """
     if not mesh.skin.size:
         return
-    named = "name one chain of them from left to right, from corner by middle to corner, and so on"
+    advice = "name one chain of them from left to right, from corner by middle to corner, and so on"
     if len(mesh.skin) < 3 or len(mesh.skin) % 2 == 0:
-        raise BodyError(f"mesh.skin has {len(mesh.skin)} nodes, which make no whole sides of elements; {named}")
+        raise BodyError(f"mesh.skin has {len(mesh.skin)} nodes, which make no whole sides of elements; {advice}")
     sides = np.stack([mesh.skin[:-2:2], mesh.skin[1::2], mesh.skin[2::2]], axis=1)
     corner = np.arange(4)
     around = mesh.elements[:, np.stack([corner, corner + 4, (corner + 1) % 4], axis=1)].reshape(-1, 3)
-    middles, first, shared = np.unique(around[:, 1], return_index=True, return_counts=True)
+    middles, first, counts = np.unique(around[:, 1], return_index=True, return_counts=True)
     at = np.minimum(np.searchsorted(middles, sides[:, 1]), len(middles) - 1)
-    wrong = (around[first[at]] != sides).any(axis=1) | (shared[at] > 1)
+    wrong = (around[first[at]] != sides).any(axis=1) | (counts[at] > 1)
     if wrong.any():
         nodes = ", ".join(str(node) for node in sides[int(np.argmax(wrong))])
-        raise BodyError(f"nodes {nodes} of mesh.skin are no free side of an element with the body above it; {named}")
+        raise BodyError(f"nodes {nodes} of mesh.skin are no free side of an element with the body above it; {advice}")
     if len(np.unique(mesh.skin)) < len(mesh.skin):
-        raise BodyError(f"mesh.skin names a node twice; {named}")
+        raise BodyError(f"mesh.skin names a node twice; {advice}")
 
 
 def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:
@@ -158,9 +158,9 @@ def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> No
         if not np.isfinite(array).all():
             row = int(np.argmin(np.isfinite(array).all(axis=1)))
             raise BodyError(f"row {row} of {name} is not finite; give 0 where there is none")
-    pulled = _stray(mesh) & np.asarray(0.0 if loads is None else loads).any(axis=-1)
-    if pulled.any():
-        raise BodyError(f"loads pull at node {np.argmax(pulled)}, which belongs to no element; give 0 there")
+    stray = _stray(mesh) & np.asarray(0.0 if loads is None else loads).any(axis=-1)
+    if stray.any():
+        raise BodyError(f"loads pull at node {np.argmax(stray)}, which belongs to no element; give 0 there")
     if prescribed is not None and np.asarray(prescribed)[~mesh.driven].any():
         row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))
         raise BodyError(
@@ -210,9 +210,9 @@ def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
             "nothing holds the body; name the nodes that are driven in mesh.held, or the motions along which the "
             'surface alone balances the loads, as free = ("y", "turn")'
         )
-    left = loose(mesh)
-    left[[MOTIONS.index(name) for name in free]] = 0.0
-    if len(mesh.fixed) and np.abs(left).max(initial=0.0) > CUT:
+    motions = loose(mesh)
+    motions[[MOTIONS.index(name) for name in free]] = 0.0
+    if len(mesh.fixed) and np.abs(motions).max(initial=0.0) > CUT:
         raise BodyError(
             "what is held leaves the body a motion as a whole; hold more of it, or name the motion in free, for the "
             "surface to balance"

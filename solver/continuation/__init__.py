@@ -105,8 +105,8 @@ def trace(
         beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
         if beyond is None:
             break
-        more = follow(finger, beyond, by, target, folds)
-        branch = replace(more, states=(*branch.states, *more.states))
+        hop = follow(finger, beyond, by, target, folds)
+        branch = replace(hop, states=(*branch.states, *hop.states))
     return branch
 
 
@@ -260,25 +260,25 @@ def _next(
     root = np.sqrt(len(newton.steps))
     value = value_of(start.load, by)
     state, load = start, start.load
-    gone = np.zeros(len(newton.steps))
+    total = np.zeros(len(newton.steps))
     for _ in range(BRANCH.corrections):
         if not newton.linearise(state, load, newton.skin_x):
             return None
         to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
-        now = value_of(load, by)
+        current = value_of(load, by)
         ahead = direction @ along + rate
         if ahead == 0.0:
             return None
-        change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
+        change = (length - direction @ (total + to) - rate * (current - value)) / ahead
         step = to + change * along
-        load = with_value(load, by, now + change)
-        state, largest, changed = newton.apply_step(state, load, step * root, newton.skin_x)
-        gone = gone + step
+        load = with_value(load, by, current + change)
+        state, largest, changes = newton.apply_step(state, load, step * root, newton.skin_x)
+        total = total + step
         if not largest < 10.0:
             return None
-        if largest < BRANCH.tolerance and not changed:
-            way = np.sqrt(gone @ gone + (value_of(load, by) - value) ** 2)
-            straight = direction @ gone + rate * (value_of(load, by) - value)
+        if largest < BRANCH.tolerance and not changes:
+            way = np.sqrt(total @ total + (value_of(load, by) - value) ** 2)
+            straight = direction @ total + rate * (value_of(load, by) - value)
             return state if straight > BRANCH.turn * way else None
     return None
 

@@ -84,7 +84,7 @@ def sound(finger: FiniteFinger, state: EquilibriumState, least: float = PROOF.so
     return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(state)
 
 
-def folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
+def is_folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether the skin has a crease or crosses itself."""
     return finger.skin_compression(state).kink > BRANCH.crease or finger.crosses(state)
 
@@ -182,8 +182,8 @@ def _coarse_branch(search: _Search) -> Branch:
     before = _coarse_branch(search.to(search.target / 2.0))
     if before.limited:
         return before
-    more = search.trace(finger, before.last, before.length)
-    return replace(more, states=(*before.states, *more.states[1:]))
+    after = search.trace(finger, before.last, before.length)
+    return replace(after, states=(*before.states, *after.states[1:]))
 
 
 @lru_cache(maxsize=32)
@@ -374,7 +374,7 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
 
 def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:
     """Return whether a state agrees with the end of the branch on another mesh, and is not folded."""
-    if folded(finger, state):
+    if is_folded(finger, state):
         return False
     return bool(np.all(np.abs(finger.numbers([state])[0] - proof.numbers) <= PROOF.alike * np.abs(proof.numbers)))
 

@@ -26,13 +26,13 @@ from solver.scene import Scene
 class ForceSearch:
     """Control of the search for a nearby state, and for the depth at which the normal force is the given one."""
 
-    few: int = 10  # iterations for a nearby state, at most: 4 to 7 are usual
+    iterations: int = 10  # iterations for a nearby state, at most: 4 to 7 are usual
     leading: float = 1e-3  # tolerance of intermediate states [mm]
     beyond: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
-    met: float = 1e-9  # relative tolerance of the normal force
+    tolerance: float = 1e-9  # relative tolerance of the normal force
     searches: int = 20  # steps of the search for the depth, at most
     furthest: float = 0.25  # largest relative change of the depth in a step
-    crushed: float = 0.3  # det F below which the mesh, and not the body, ends a branch
+    least_det: float = 0.3  # det F below which the mesh, and not the body, ends a branch
 
 
 FORCE_SEARCH = ForceSearch()
@@ -58,11 +58,11 @@ def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> Equil
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
-            state = newton.settle(start, sliding_load(scene), limit=FORCE_SEARCH.few)
+            state = newton.settle(start, sliding_load(scene), limit=FORCE_SEARCH.iterations)
         else:
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
-            state = solve_under_forces(newton, near, ForceLoad(force, None), limit=FORCE_SEARCH.few)
-            state = newton.settle(state, state.load, limit=FORCE_SEARCH.few)
+            state = solve_under_forces(newton, near, ForceLoad(force, None), limit=FORCE_SEARCH.iterations)
+            state = newton.settle(state, state.load, limit=FORCE_SEARCH.iterations)
         return state if stands(finger, state) else None
     except NotConverged:
         return None
@@ -123,15 +123,15 @@ def _sliding_under(
     """Return the settled slide under the normal force of a scene, from `start` or as the force grows."""
     newton = finger.newton
     load = sliding_load(scene)
-    capped = steep(load)
+    at_bound = steep(load)
     if start is not None:
         near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
             state = (
-                _at_force(newton, near, force) if capped else solve_under_forces(newton, near, ForceLoad(force, None))
+                _at_force(newton, near, force) if at_bound else solve_under_forces(newton, near, ForceLoad(force, None))
             )
             return steady(finger, state.load, start=state)
-    if capped:
+    if at_bound:
         with suppress(NotConverged):
             *_, bare = _increase_force(newton, load._replace(mu=0.0), force)
             begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
@@ -139,8 +139,8 @@ def _sliding_under(
             return steady(finger, state.load, start=state)
     last: EquilibriumState | None = None
     try:
-        for reached in _increase_force(newton, load, force):
-            last = reached
+        for state in _increase_force(newton, load, force):
+            last = state
     except NotConverged:
         if last is None:
             raise
@@ -161,7 +161,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
         state = load_stepping.solve_full_slip(newton, state.load._replace(depth=depth), state)
-        if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.met:
+        if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.tolerance:
             return state
         if not newton.linearise(state, state.load, newton.skin_x):
             break
@@ -230,18 +230,18 @@ def solve_dead_load(
     vector = np.zeros(body.size) if loads is None else _on_unknowns(body, loads)
     driven = body.mesh.driven
     held_at = state.u[driven]
-    moved = 0.0 if prescribed is None else prescribed[driven] - held_at
+    motion = 0.0 if prescribed is None else prescribed[driven] - held_at
     before = condensed.load.copy()
 
     def step(part: float) -> None:
         nonlocal state
         condensed.load[:] = before + part * (vector - before)
         u = state.u.copy()
-        u[driven] = held_at + part * moved
+        u[driven] = held_at + part * motion
         state = newton.settle(replace(state, u=u), load)
 
-    def refusal(done: float, _part: float, reason: NotConverged) -> NotConverged:
-        return NotConverged(f"no equilibrium was found beyond {done:.3g} of the loads: {reason}")
+    def refusal(fraction: float, _part: float, reason: NotConverged) -> NotConverged:
+        return NotConverged(f"no equilibrium was found beyond {fraction:.3g} of the loads: {reason}")
 
     load_stepping.advance(step, refusal, load_stepping.StepControl(first=1.0 / steps))
     return state
@@ -271,7 +271,7 @@ def steady_body(
     bare = load_stepping.solve_full_slip(newton, load._replace(mu=0.0), start)
     branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
-    if branch.limited and (branch.lost or body.spoilt(branch.last)):
+    if branch.limited and (branch.lost or body.is_unusable(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
@@ -303,6 +303,6 @@ class _OwnBody:
         before = self.body.mesh.nodes[skin]
         return before, before + state.u[skin]
 
-    def spoilt(self, state: EquilibriumState) -> bool:
+    def is_unusable(self, state: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        return state.reaches_end or self.body.smallest_det(state.u) < FORCE_SEARCH.crushed
+        return state.reaches_end or self.body.smallest_det(state.u) < FORCE_SEARCH.least_det

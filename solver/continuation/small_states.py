@@ -56,13 +56,13 @@ def continue_in_friction(
     The state is None where that is less than the mu of `load`. Under a normal `force`, `first` is the state at mu = 0,
     and the mu returned is 0 (unknown) where contact grew beyond the skin that may touch.
     """
-    reached, step, unknown = 0.0, load.mu, False
+    mu, step, unknown = 0.0, load.mu, False
     try:
         state = full_slip(newton, load._replace(mu=0.0)) if first is None else first
     except ContactLost:
         return None, 0.0
-    while reached < load.mu and step > LIMIT_SEARCH.close * max(reached, min(0.01, load.mu)):
-        aim = min(reached + step, load.mu)
+    while mu < load.mu and step > LIMIT_SEARCH.close * max(mu, min(0.01, load.mu)):
+        aim = min(mu + step, load.mu)
         try:
             further = slide_from_guess(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
         except ContactLost:
@@ -74,10 +74,10 @@ def continue_in_friction(
         elif under_force and not further.load.depth > 0.0:  # the surface would pull
             step /= 2.0
         else:
-            state, reached, step = further, aim, 2.0 * step
-    if reached == load.mu:
-        return state, reached
-    return None, 0.0 if unknown else reached
+            state, mu, step = further, aim, 2.0 * step
+    if mu == load.mu:
+        return state, mu
+    return None, 0.0 if unknown else mu
 
 
 class Bodies:
@@ -142,7 +142,7 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
     depths, bone = [0.0], scene.finger.pulp_thickness()
     bare = load._replace(mu=0.0)
 
-    def reached(newton: Newton, force: float) -> EquilibriumState | None:
+    def slide_at(newton: Newton, force: float) -> EquilibriumState | None:
         return continue_in_friction(newton, load, force, slide_under(newton, bare, force, bone))[0]
 
     def rubless(force: float) -> float:
@@ -150,7 +150,7 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
-            state = reached(bodies.at(rubless(force)), force)
+            state = slide_at(bodies.at(rubless(force)), force)
             if state is not None:
                 depths.append(state.load.depth)
             return state is not None
@@ -160,7 +160,7 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
         return None
     most = _largest(slides, LIMIT_SEARCH.least * force, force)
     finer = bodies.build_for(rubless(most), LIMIT_SEARCH.finer * FINENESS)
-    ends = [reached(finer, part * most) is None for part in (0.97, 1.03)]
+    ends = [slide_at(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
 
@@ -201,10 +201,10 @@ def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumStat
         first = slide_under(finger.newton, load._replace(mu=0.0), force, deepest)
     except ContactLost:
         return None, 0.0
-    reached, limit = continue_in_friction(finger.newton, load, force, first)
+    state, limit = continue_in_friction(finger.newton, load, force, first)
     if limit == 0.0:
         in_tissue(scene, finger, first.load.depth)
-    return reached, limit
+    return state, limit
 
 
 def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
@@ -239,12 +239,12 @@ def remove_round_off(
     about, recover = finger.body.linearise_about(displacement)
     newton = Newton(about)
     try:
-        again = newton.solve_linear(
+        correction = newton.solve_linear(
             replace(state, u=np.zeros_like(state.u)), state.load, newton.skin_x, forces_of(scene, state.load)
         )
     except ContactLost:
         return state, displacement
-    return replace(again, u=state.u + again.u, iterations=state.iterations), recover(again.u)
+    return replace(correction, u=state.u + correction.u, iterations=state.iterations), recover(correction.u)
 
 
 def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
@@ -262,10 +262,10 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise
-        reached, _ = follow_friction(scene, finger)
-        if reached is None:
+        state, _ = follow_friction(scene, finger)
+        if state is None:
             raise
-        return reached
+        return state
 
 
 def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
@@ -285,10 +285,10 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
         why = str(lost)
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
-    reached, limit = follow_friction(scene, finger)
-    if reached is None:
+    state, limit = follow_friction(scene, finger)
+    if state is None:
         raise _no_answer(scene, why, limit)
-    return reached
+    return state
 
 
 def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
@@ -305,8 +305,8 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
     limit_force = limit_depth = None
     with suppress(NotConverged):  # stiffnesses that a mesh for less depth does not stand
         limit_force, limit_depth = limits(scene, sliding_load(scene))
-    known = ((limit_force, "N/mm"), (limit_depth, "mm"))
-    elsewhere = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
+    pairs = ((limit_force, "N/mm"), (limit_depth, "mm"))
+    elsewhere = " and ".join(f"{limit:.3g} {unit}" for limit, unit in pairs if limit is not None)
     along = "+x" if scene.loading.direction > 0 else "-x"
     where = "at this depth" if force is None else "under this force"
     message = (
@@ -330,8 +330,8 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
     finger = _finger(scenes[0].frictionless_press(deepest), get_ident())
-    pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
-    return tuple(None if state is None else state.load.depth for state in pressed)
+    states = [_rough_slide(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
+    return tuple(None if state is None else state.load.depth for state in states)
 
 
 def expected_depth(scene: Scene) -> float:
@@ -344,13 +344,13 @@ def expected_depth(scene: Scene) -> float:
         finger = _finger(scene.frictionless_press(deepest), get_ident())
     except (SceneError, NotConverged):  # the solve itself will report it
         return deepest
-    state = _pressed(finger, scene, force, deepest)
+    state = _rough_slide(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
-    held = scene.loading.direction == 0 or scene.loading.dragged
-    if held and (state is None or drag < NEARLY * abs(state.force[0])):
+    is_static = scene.loading.direction == 0 or scene.loading.dragged
+    if is_static and (state is None or drag < NEARLY * abs(state.force[0])):
         # Then it is about as deep as one that slides under the same drag.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
-        state = _pressed(finger, replace(scene, friction=friction), force, deepest)
+        state = _rough_slide(finger, replace(scene, friction=friction), force, deepest)
     if state is None:
         return deepest
     # A strong drag lifts the bone, and yet more skin comes into contact, which the mesh must cover.
@@ -376,9 +376,9 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
             f"A normal force of {force:.3g} N/mm presses the finger {depth:.1g} mm deep only: below {SHALLOW:g} mm "
             "round-off is as large as what there is to find; ask for more."
         )
-    carried = "" if most is None else f": with this friction the {room:.3g} mm of tissue carry up to {most:.3g} N/mm"
+    capacity = "" if most is None else f": with this friction the {room:.3g} mm of tissue carry up to {most:.3g} N/mm"
     raise NoSteadyState(
-        f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{carried}; "
+        f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{capacity}; "
         "ask for less."
     )
 
@@ -389,7 +389,7 @@ def _finger(bare: Scene, _thread: int) -> LinearFinger:
     return LinearFinger.of(bare, Sizing(ROUGH, bare.loading.depth))
 
 
-def _pressed(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
+def _rough_slide(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
     """Return the settled slide under a normal force [N/mm]; None where it is deeper than `deepest` [mm]."""
     try:
         state = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import active_set
-from solver._kernels.active_set import DEPTH_GIVEN, DRAG_GIVEN, PUSH_GIVEN, SINGULAR, UNSETTLED
+from solver._kernels.active_set import DEPTH_CONTROL, DRAG_CONTROL, PUSH_CONTROL, SINGULAR, UNSETTLED
 from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
 from solver.arrays import (
     Array,
@@ -48,11 +48,11 @@ class NewtonControl:
     near: float = 0.1  # first step below which the tangent of the state before is kept [mm]
     fast: float = 0.02  # ratio of consecutive steps below which a new tangent is kept
     slow: float = 0.5  # the same ratio, above which a kept tangent is renewed
-    turned: float = 0.01  # step times bulk over shear stiffness, above which no tangent is kept [mm]
+    turn: float = 0.01  # step times bulk over shear stiffness, above which no tangent is kept [mm]
     patience: int = 20  # most systems for the contact states of a linear body, beside four for each node
     margin: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
     same: float = 1e-3  # relative difference below which two steps count as equal
-    again: int = 4  # equal steps in a row that count as a cycle
+    repeats: int = 4  # equal steps in a row that count as a cycle
     unbounded: float = 1e3  # displacement from which the body counts as loose [mm]
 
 
@@ -210,17 +210,17 @@ class Newton:
         rounds: int = 0,
         forces: ForceLoad | None = None,
         *,
-        kept: bool = False,
+        reuse: bool = False,
     ) -> bool:
         """Linearise the body at `state` and solve its contact for the `steps` (2 k, 4); return False where that fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. Contact states change up to `rounds` times,
-        until none contradicts the linearised body. Under `forces`, the first step meets them too. With `kept`, the last
-        tangent and its factors serve again.
+        until none contradicts the linearised body. Under `forces`, the first step meets them too. With `reuse`, the
+        last tangent and its factors serve again.
         """
-        self.systems += 0 if kept else 1
+        self.systems += 0 if reuse else 1
         body = self.condensed
-        if not (body.relinearise(state.u) if kept else body.linearise(state.u, state.pressure)):
+        if not (body.relinearise(state.u) if reuse else body.linearise(state.u, state.pressure)):
             return False
         return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
 
@@ -230,9 +230,9 @@ class Newton:
         """Solve the contact of the linearised body at `state`; return the result of `solve_active_set`."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = state.state, state.sense
-        kind, drag, push = DEPTH_GIVEN, 0.0, 0.0
+        kind, drag, push = DEPTH_CONTROL, 0.0, 0.0
         if forces is not None:
-            kind = PUSH_GIVEN if forces.tangential is None else DRAG_GIVEN
+            kind = PUSH_CONTROL if forces.tangential is None else DRAG_CONTROL
             drag, push = forces.tangential or 0.0, forces.normal
         return self._active_set(
             self.arrays(), body.compliance, self.skin, self._states, load_arguments(load),
@@ -262,8 +262,8 @@ class Newton:
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
         u, pressure, largest = body.recover(state.u, state.pressure, skin, scale)
         states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
-        changed = self._meet(states, self._position(u, load, anchor), load_arguments(load))
-        return EquilibriumState(u, pressure, *states, load, state.iterations + 1), largest, changed
+        changes = self._meet(states, self._position(u, load, anchor), load_arguments(load))
+        return EquilibriumState(u, pressure, *states, load, state.iterations + 1), largest, changes
 
     def settle(
         self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
@@ -288,12 +288,12 @@ class Newton:
     ) -> EquilibriumState:
         """Return the equilibrium as `settle` does, from the contact states of `start`, with known `anchor` (k,)."""
         state = before = start
-        kept = self.condensed.equilibrium is start.u
+        reuse = self.condensed.equilibrium is start.u
         scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
-            if kept:
-                if not self.linearise(state, load, anchor, CONTROL.rounds, kept=True):
-                    kept = False
+            if reuse:
+                if not self.linearise(state, load, anchor, CONTROL.rounds, reuse=True):
+                    reuse = False
                     continue
                 before = state
             elif not self.linearise(state, load, anchor, CONTROL.rounds):
@@ -307,21 +307,21 @@ class Newton:
                 state = before
             elif state is not before:
                 before, scale = state, min(1.0, 2.0 * scale)
-            state, largest, changed = self.apply_step(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+            state, largest, changes = self.apply_step(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < CONTROL.unbounded:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
-            alike = alike + 1 if changed and abs(largest - last) <= CONTROL.same * last else 0
-            if alike == CONTROL.again:
+            alike = alike + 1 if changes and abs(largest - last) <= CONTROL.same * last else 0
+            if alike == CONTROL.repeats:
                 raise NotConverged("states of contact come again and again")
-            left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
-            if largest * left < CONTROL.margin * tolerance and not changed and scale == 1.0:
+            remainder = min((2.0 * fall) ** 2 if not reuse else 4.0 * fall if new else 2.0 * fall, 1.0)
+            if largest * remainder < CONTROL.margin * tolerance and not changes and scale == 1.0:
                 self.condensed.equilibrium = state.u
                 return state
-            new = not kept
+            new = not reuse
             still = largest < CONTROL.near if last == 0.0 else fall < CONTROL.slow
             # A kept tangent has turned by then. Its step changes volume to second order, which a stiff body resists.
-            kept = (still if kept else fall < CONTROL.fast and scale == 1.0) and self.bulk * largest < CONTROL.turned
+            reuse = (still if reuse else fall < CONTROL.fast and scale == 1.0) and self.bulk * largest < CONTROL.turn
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
@@ -340,15 +340,15 @@ class Newton:
         self.systems += 1
         self.condensed.relinearise(self._rest)  # any state is one step away
         rounds = CONTROL.patience + 4 * len(self.skin_x) if rounds is None else rounds
-        used = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
-        if used == SINGULAR:
+        count = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
+        if count == SINGULAR:
             raise ContactLost("the touching points have no unique forces")
-        if used == UNSETTLED:
+        if count == UNSETTLED:
             raise ContactLost(f"the states of the touching points still contradicted each other after {rounds} systems")
         u = self.steps[:, EQUILIBRIUM].reshape(-1, 2).copy()
         deeper, along = self.system.motion.tolist()
         load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-        iterations = state.iterations + used
+        iterations = state.iterations + count
         contact = self._states
         return EquilibriumState(
             u, state.pressure, contact.state.copy(), contact.sense.copy(), contact.reaction.copy(), load, iterations

@@ -34,11 +34,11 @@ from solver.scene.tables import Material, Materials, SceneError
 
 NO_ENERGY = 1e-14  # relative eigenvalue of an energy form below which it is left out [-]
 
-Placed = TypeVar("Placed", bound=Patches, covariant=True)  # averages over endings at one kinematics
+PatchKind = TypeVar("PatchKind", bound=Patches, covariant=True)  # averages over endings at one kinematics
 
 
 @dataclass(frozen=True, eq=False)  # without slots, for cached properties
-class Finger(ABC, Generic[Placed]):
+class Finger(ABC, Generic[PatchKind]):
     """A finger on one mesh. In its frame the bone rests and the surface rises by the indentation."""
 
     scene: Scene  # finger, materials and receptor; friction and load may be those of another surface
@@ -66,26 +66,26 @@ class Finger(ABC, Generic[Placed]):
         """Return the finger of `scene` on an existing mesh."""
 
     @abstractmethod
-    def patches(self, placed: Endings) -> Placed:
-        """Return averages over the endings `placed` on the mesh."""
+    def patches(self, endings: Endings) -> PatchKind:
+        """Return averages over `endings` on the mesh."""
 
-    def endings(self, arcs: Array) -> Placed:
+    def endings(self, arcs: Array) -> PatchKind:
         """Return averages over endings of the scene's size at arc positions `arcs` (r,) [mm]."""
         return self.patches(endings(self.geometry, self.body.centre, self.scene.receptor, arcs))
 
     @cached_property
-    def ending(self) -> Placed:
+    def ending(self) -> PatchKind:
         """The reference ending."""
         return self.endings(np.zeros(1))
 
     @cached_property
-    def ending_and_midpoint(self) -> Placed:
+    def ending_and_midpoint(self) -> PatchKind:
         """The reference ending, then its midpoint."""
         midpoint = middle(self.geometry, self.body.centre, self.scene.receptor)
         return self.patches(join(self.ending.endings, midpoint))
 
     @cached_property
-    def row(self) -> Placed:
+    def row(self) -> PatchKind:
         """The row of receptors."""
         return self.endings(ROW)
 
@@ -128,8 +128,8 @@ class Finger(ABC, Generic[Placed]):
 
     def _numbers(self, states: Sequence[EquilibriumState], displacement: Array) -> Array:
         responses = self.ending_and_midpoint.responses(displacement)  # (q, 2, c)
-        rest = [(*s.force[::-1], s.load.depth, 0.0 - s.load.travel, self.contact_width(s)) for s in states]
-        return np.column_stack([responses[0, 0], rest, responses[0, 1], responses[:, 0].T])
+        columns = [(*s.force[::-1], s.load.depth, 0.0 - s.load.travel, self.contact_width(s)) for s in states]
+        return np.column_stack([responses[0, 0], columns, responses[0, 1], responses[:, 0].T])
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
         """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
@@ -169,9 +169,9 @@ class LinearFinger(Finger[LinearPatches]):
         body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
         return cls(scene, geometry, Newton(body.condensed), body, perf_counter() - start)
 
-    def patches(self, placed: Endings) -> LinearPatches:
+    def patches(self, endings: Endings) -> LinearPatches:
         """Do as `Finger` says."""
-        return LinearPatches(self.body.elastic, placed)
+        return LinearPatches(self.body.elastic, endings)
 
     @cached_property
     def ending_by_skin(self) -> Array:
@@ -208,9 +208,9 @@ class FiniteFinger(Finger[FinitePatches]):
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
         return cls(scene, geometry, Newton(body.condensed), body)
 
-    def patches(self, placed: Endings) -> FinitePatches:
+    def patches(self, endings: Endings) -> FinitePatches:
         """Do as `Finger` says."""
-        return FinitePatches(self.body, placed)
+        return FinitePatches(self.body, endings)
 
     def transfer(self, state: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `state` of the mesh of `other`, interpolated to this mesh as a start."""

@@ -62,7 +62,7 @@ LONG = 25.0  # slide by the indentation within which states settle, except near 
 class Waiting:
     """The steps of the wait for relaxation at the end of a load path."""
 
-    relaxed: float = 14.0  # shortest wait by the largest relaxation time: e^-14 is 8e-7
+    shortest: float = 14.0  # shortest wait by the largest relaxation time: e^-14 is 8e-7
     equal: int = 6  # steps of equal length before it doubles
     still: float = 1e-6  # relative change of the SED over equal steps below which it is relaxed
     doublings: int = 60  # of the step, at most
@@ -124,8 +124,8 @@ class Way:
         self.by_force = loading.normal_force is not None
         # a drag needs friction
         self.by_drag = loading.dragged and not self.frictionless
-        rest = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, friction.mu, friction.tau))
-        self.instants = [Instant(0.0, rest)]
+        start = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, friction.mu, friction.tau))
+        self.instants = [Instant(0.0, start)]
         self.aim = Aim(0.0, 0.0, 0.0)
 
     @property
@@ -144,7 +144,7 @@ class Way:
 
         advance(step, self._refusal, CONTROL)
 
-    def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
+    def _refusal(self, _fraction: float, _part: float, reason: NotConverged) -> NotConverged:
         return at_end_of_path(self.last.load.depth, self.last.load.travel, reason)
 
     def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
@@ -235,7 +235,7 @@ def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
         return FiniteTissue(finger.body, relaxing_laws(scene.materials), finger.ending_and_midpoint)
     assert isinstance(finger, LinearFinger)
     body = copy(_relaxing_body(finger.geometry.mesh, scene.materials))
-    body.rest()
+    body.reset()
     return LinearTissue(body, finger.ending_and_midpoint.endings)
 
 
@@ -328,13 +328,13 @@ def _wait(way: Way, loading: Loading, slowest: float, times: float, report: Repo
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
     if not isinstance(way.tissue, LinearTissue):
         way.sense = -int(np.sign(speed))  # by now all skin in contact slips
-    step, waited, longest = way.instants[-1].time - way.instants[-2].time, 0.0, WAITING.relaxed * slowest
+    step, elapsed, longest = way.instants[-1].time - way.instants[-2].time, 0.0, WAITING.shortest * slowest
     for _ in range(WAITING.doublings):
         before = way.energies[-1][0]
         for _ in range(ceil(WAITING.equal * times)):
-            report("waiting step by step until the tissues have relaxed", min(waited / longest, 1.0))
+            report("waiting step by step until the tissues have relaxed", min(elapsed / longest, 1.0))
             way.go(Aim(way.aim.time + step, way.aim.press, way.aim.along + speed * step))
-            waited += step
-        if waited >= longest and abs(way.energies[-1][0] - before) <= WAITING.still * abs(way.energies[-1][0]):
+            elapsed += step
+        if elapsed >= longest and abs(way.energies[-1][0] - before) <= WAITING.still * abs(way.energies[-1][0]):
             return
         step *= 2.0

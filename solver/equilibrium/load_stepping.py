@@ -47,18 +47,18 @@ def advance(
     work is `exhausted`, this raises the exception that `refusal` returns for the fraction reached, that step and the
     reason. Raises Cancelled.
     """
-    done, part = 0.0, control.first
-    while done < 1.0:
+    fraction, part = 0.0, control.first
+    while fraction < 1.0:
         check_stop()
-        aim = min(done + part, 1.0)
+        aim = min(fraction + part, 1.0)
         try:
             step(aim)
         except NotConverged as reason:
             part /= 2.0
             if part < control.smallest or exhausted():
-                raise refusal(done, part, reason) from reason
+                raise refusal(fraction, part, reason) from reason
         else:
-            done, part = aim, control.growth * part
+            fraction, part = aim, control.growth * part
 
 
 def load_of(scene: Scene) -> LoadState:
@@ -78,8 +78,8 @@ def forces_of(scene: Scene, load: LoadState) -> ForceLoad | None:
     force, drag = scene.normal_force, scene.tangential_force
     if force is None:
         return None
-    held = None if drag is None or not load.path_dependent else -scene.loading.direction * drag
-    return ForceLoad(force, held, load.travel)
+    tangential = None if drag is None or not load.path_dependent else -scene.loading.direction * drag
+    return ForceLoad(force, tangential, load.travel)
 
 
 def march(
@@ -108,7 +108,7 @@ def march(
             else:
                 state = newton.settle(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), tolerance)
 
-        advance(step, lambda _done, _part, why: at_end_of_path(state.load.depth, state.load.travel, why))
+        advance(step, lambda _fraction, _part, why: at_end_of_path(state.load.depth, state.load.travel, why))
         yield state
 
 
@@ -149,24 +149,24 @@ def find_root(at: Callable[[float], tuple[float, State]], start: float, close: f
 
 
 def correct(
-    newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, before: float, *, kept: bool = False
+    newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, before: float, *, reuse: bool = False
 ) -> tuple[EquilibriumState, float, int] | None:
     """Return the state after one iteration towards the forces, its largest displacement, and its changed states.
 
-    `origin` (k,) are the positions of the skin's nodes along x when the surface's travel was `before`. With `kept` the
+    `origin` (k,) are the positions of the skin's nodes along x when the surface's travel was `before`. With `reuse` the
     last tangent serves again. None where the linear system fails.
     """
     load = state.load
     if forces.tangential is None:
         load = load._replace(travel=forces.travel)
-    if not newton.linearise(state, load, origin + load.travel - before, 0, forces, kept=kept):
+    if not newton.linearise(state, load, origin + load.travel - before, 0, forces, reuse=reuse):
         return None
     deeper, along = newton.system.motion.tolist()
     load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-    after, largest, changed = newton.apply_step(
+    after, largest, changes = newton.apply_step(
         state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before
     )
-    return after, max(largest, abs(deeper), abs(along)), changed
+    return after, max(largest, abs(deeper), abs(along)), changes
 
 
 def solve_under_forces(
@@ -196,13 +196,13 @@ def _iterate(
             state = replace(state, load=state.load._replace(travel=forces.travel))
         return newton.solve_linear(state, state.load, origin + state.load.travel - before, forces)
     for _ in range(limit):
-        done = correct(newton, state, forces, origin, before)
-        if done is None:
+        correction = correct(newton, state, forces, origin, before)
+        if correction is None:
             raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
-        state, largest, changed = done
+        state, largest, changes = correction
         if not largest < CONTROL.unbounded:
             raise NotConverged("the displacements grow without bound")
-        if largest < tolerance and not changed:
+        if largest < tolerance and not changes:
             return state
     raise NotConverged(f"no equilibrium within {limit} iterations")
 
@@ -273,8 +273,8 @@ def solve_full_slip(
             report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
         state = newton.settle(state, begin.towards(load, part), tolerance if part == 1.0 else SLIP_CONTROL.leading)
 
-    def refusal(done: float, part: float, reason: NotConverged) -> NotConverged:
-        last = begin.towards(load, done)
+    def refusal(fraction: float, part: float, reason: NotConverged) -> NotConverged:
+        last = begin.towards(load, fraction)
         return NotConverged(
             f"no sliding state was found beyond {last.depth:.3g} mm of indentation at mu = {last.mu:.3g}: {reason}, in "
             f"steps of 1/{1 / part:.0f} of the way"
@@ -315,9 +315,9 @@ def slide_from_guess(
 
     Under a normal `force` [N/mm] the depth is unknown. Raises ContactLost, at the latest after `rounds` systems.
     """
-    rest = EquilibriumState.undeformed(newton.condensed)
+    start = EquilibriumState.undeformed(newton.condensed)
     states = guess.astype(np.int32)
-    begin = replace(rest, state=states, sense=np.full(len(states), load.sense, np.int32))
+    begin = replace(start, state=states, sense=np.full(len(states), load.sense, np.int32))
     forces = None if force is None else ForceLoad(force, None)
     return newton.solve_linear(begin, load, newton.skin_x, forces, rounds)
 

@@ -32,7 +32,7 @@ from solver.constitutive import Moduli, Past, Prony, mean_decay, overstress
 from solver.equilibrium import EquilibriumState, Newton
 from solver.mesh import Mesh
 
-KEPT = 4  # step lengths for which factors are kept
+STEP_LENGTHS = 4  # step lengths for which factors are kept
 
 
 class Tissue(Protocol):
@@ -63,20 +63,20 @@ class RelaxingBody:
         self.elastic = Elastic.of(mesh, shear)  # of the instantaneous shear moduli alone
         self._bulk = np.array([law.bulk for law in laws])[mesh.region]
         self.displacement = np.zeros(mesh.nodes.shape)
-        self._left = np.zeros(
+        self._internal = np.zeros(
             (len(mesh.elements), 18, self._g.shape[1])
         )  # h of each term, as displacements of the elements' nodes
         self._next: tuple[Callable[[Array], Array], float] | None = None
 
-        @lru_cache(maxsize=KEPT)
+        @lru_cache(maxsize=STEP_LENGTHS)
         def elastic_body(step: float) -> LinearBody:
             return LinearBody.of(mesh, [law.within(step) for law in laws], checked=True)
 
         self._elastic_body = elastic_body
 
-    def rest(self) -> None:
+    def reset(self) -> None:
         """Return to rest for another load path; a copy of the body shares the factors of its step lengths."""
-        self.displacement, self._left = np.zeros_like(self.displacement), np.zeros_like(self._left)
+        self.displacement, self._internal = np.zeros_like(self.displacement), np.zeros_like(self._internal)
         self._next = None
 
     def ready(self, step: float, prescribed: Array | None = None) -> CondensedLinear:
@@ -87,14 +87,14 @@ class RelaxingBody:
         form = self._elastic_body(float(f"{step:.9e}"))  # steps that differ by round-off share factors
         past = self._past(step)
         load = -self.elastic.forces(past.reshape(-1, 9, 2))
-        moved = np.zeros(self.mesh.nodes.shape)
+        motion = np.zeros(self.mesh.nodes.shape)
         if prescribed is not None:
-            moved[self.mesh.driven] = prescribed[self.mesh.driven]
-            load -= form.elastic.forces(self.mesh.local(moved))
+            motion[self.mesh.driven] = prescribed[self.mesh.driven]
+            load -= form.elastic.forces(self.mesh.local(motion))
         nodes = self.mesh.assemble(load)
         nodes[self.mesh.driven] = 0.0
         body, recover = form.under(nodes)
-        self._next = lambda u: recover(u) + moved, step
+        self._next = lambda u: recover(u) + motion, step
         return body
 
     def advance(self, u: Array) -> None:
@@ -102,10 +102,10 @@ class RelaxingBody:
         assert self._next is not None
         recover, step = self._next
         after = recover(u)
-        grown = self.mesh.local(after - self.displacement).reshape(len(self._left), 18)
+        growth = self.mesh.local(after - self.displacement).reshape(len(self._internal), 18)
         ages = step / self._tau
-        self._left *= np.exp(-ages)[:, None, :]
-        self._left += mean_decay(ages)[:, None, :] * grown[:, :, None]
+        self._internal *= np.exp(-ages)[:, None, :]
+        self._internal += mean_decay(ages)[:, None, :] * growth[:, :, None]
         self.displacement = after
 
     def energy(self, probes: Probes) -> Array:
@@ -116,8 +116,8 @@ class RelaxingBody:
         rows = self.elastic.modes_at(probes)[:, None] @ self.elastic.divergence[element]
         deviator, theta = self._strain(probes, rows, local)
         out = shear * long_term * deviator + self._bulk[element] / 2.0 * theta**2
-        for term in range(self._left.shape[2]):
-            deviator, _ = self._strain(probes, rows, self._left[element, :, term])
+        for term in range(self._internal.shape[2]):
+            deviator, _ = self._strain(probes, rows, self._internal[element, :, term])
             out += shear * self._g[element, term] * deviator
         return out
 
@@ -139,8 +139,8 @@ class RelaxingBody:
         """Return the element displacements (e, 18) whose instantaneous shear stress is that of the past."""
         local = self.mesh.local(self.displacement).reshape(-1, 18)
         ages = step / self._tau
-        left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
-        return left - local * np.sum(self._g * mean_decay(ages), axis=1)[:, None]
+        internal = np.einsum("eim,em->ei", self._internal, self._g * np.exp(-ages))
+        return internal - local * np.sum(self._g * mean_decay(ages), axis=1)[:, None]
 
 
 class CondensedRelaxing(CondensedFinite):

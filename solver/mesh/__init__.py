@@ -103,9 +103,9 @@ class Mesh:
         """
         for f in fields(self):
             array = np.array(getattr(self, f.name))
-            kinds, taken = ("fiu", np.float64) if f.name == "nodes" else ("iu", np.int64)
+            kinds, dtype = ("fiu", np.float64) if f.name == "nodes" else ("iu", np.int64)
             if array.dtype.kind in kinds or not array.size:
-                array = np.ascontiguousarray(array, taken)
+                array = np.ascontiguousarray(array, dtype)
             array.flags.writeable = False
             object.__setattr__(self, f.name, array)
 

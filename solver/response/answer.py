@@ -48,7 +48,7 @@ class SceneSolution:
 
 
 def prediction(
-    solved: SceneSolution,
+    solution: SceneSolution,
     finger: Finger[Patches],
     numbers: Array,
     row: Array,
@@ -56,13 +56,13 @@ def prediction(
     estimate_s: float,
 ) -> Prediction:
     """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
-    scene, state = solved.scene, solved.state
+    scene, state = solution.scene, solution.state
     sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
     driven = scene.driven(depth)
-    left = model(driven, finger, state, solved.displacement, width)
-    held = scene.loading.dragged and state.load.path_dependent  # the shift of a sliding finger is arbitrary
-    numbers[4] = shift if held else 0.0
-    off = errors(scene, numbers, nested, solved.steps)
+    entry = model(driven, finger, state, solution.displacement, width)
+    has_shift = scene.loading.dragged and state.load.path_dependent  # the shift of a sliding finger is arbitrary
+    numbers[4] = shift if has_shift else 0.0
+    off = errors(scene, numbers, nested, solution.steps)
     return Prediction(
         scene=scene,
         sed_ending=sed,
@@ -71,30 +71,30 @@ def prediction(
         tangential_force=drag(scene, tangential),
         contact_width=width,
         indentation=depth,
-        shift=shift if held else None,
+        shift=shift if has_shift else None,
         error_estimate=off.sed,
         corrected_error=off.corrected,
         normal_force_error=off.normal,
         tangential_force_error=off.tangential,
         indentation_error=off.indentation,
-        shift_error=off.shift if held else None,
+        shift_error=off.shift if has_shift else None,
         contact_width_error=off.width,
         nested=nested,
         sed_point_error=off.point,
         dofs=finger.body.mesh.dofs,
         newton_iterations=state.iterations,
-        wall_s=solved.wall_s,
-        setup_s=solved.setup_s,
+        wall_s=solution.wall_s,
+        setup_s=solution.setup_s,
         estimate_s=estimate_s,
         row=Row(ROW, row, row_errors(scene, row, nested)),
         responses=responses(numbers, off),
-        model=left,
-        audits=solved.audits,
+        model=entry,
+        audits=solution.audits,
         skin=skin_of(finger, state),
         geometry=finger.geometry,
-        displacement=solved.displacement,
-        history=None if solved.way is None else history(scene, finger, solved.way),
-        warnings=(*warnings(driven, left["left_out"]), *solved.warnings, *audits.rounding(solved.audits)),
+        displacement=solution.displacement,
+        history=None if solution.way is None else history(scene, finger, solution.way),
+        warnings=(*warnings(driven, entry["left_out"]), *solution.warnings, *audits.rounding(solution.audits)),
     )
 
 

@@ -58,7 +58,7 @@ class Sketch:
     skin: SkinLine
     probes: Probes  # at the nodes of every element, one element after the other
     elastic: Elastic
-    _kept: Indices  # (n,) node of the mesh behind each node that is drawn
+    _nodes: Indices  # (n,) node of the mesh behind each node that is drawn
     _place: Indices  # (e, 9) node that is drawn for each of an element
     _lines: Mapping[str, tuple[Indices, Array]]  # element (m,) and shape functions (m, 9) of the lines that move
     _bone: Array  # (m, 2) undeformed [mm]
@@ -69,7 +69,7 @@ class Sketch:
         count = len(mesh.elements)
         # one node for each pair of node and layer
         pairs = mesh.elements + len(mesh.nodes) * mesh.region[:, None]
-        kept, place = np.unique(pairs, return_inverse=True)
+        nodes, place = np.unique(pairs, return_inverse=True)
         place = place.reshape(count, 9)
         elastic = Elastic.of(mesh, settled_moduli(scene.materials))
         outline = Outline.of(scene.finger)
@@ -78,8 +78,8 @@ class Sketch:
         depths = {"skin": 0.0, "epidermis": skin, "dermis": skin + scene.finger.dermis}
         lines = {name: outline.tissue(arcs, np.asarray(depth)) for name, depth in depths.items()}
         lines["patch"] = _patch(outline, scene)
-        followed = {name: _locate(mesh, line) for name, line in lines.items()}
-        element, shape = followed["skin"]
+        places = {name: _locate(mesh, line) for name, line in lines.items()}
+        element, shape = places["skin"]
         return Sketch(
             mesh=mesh,
             triangles=place[:, _SPLIT].reshape(-1, 3),
@@ -88,9 +88,9 @@ class Sketch:
             skin=SkinLine(arcs, place[element], shape),
             probes=Probes.at(mesh, elastic.centre, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
             elastic=elastic,
-            _kept=kept % len(mesh.nodes),
+            _nodes=nodes % len(mesh.nodes),
             _place=place,
-            _lines=followed,
+            _lines=places,
             _bone=outline.bone(arcs),
         )
 
@@ -101,18 +101,18 @@ class Sketch:
 
     def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:
         """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with their `values` (f, 9 e)."""
-        lowered = self.mesh.nodes + displacement - [0.0, indentation]
+        position = self.mesh.nodes + displacement - [0.0, indentation]
         place = self._place.ravel()
         count = np.bincount(place)
         means = {field.name: np.bincount(place, one) / count for field, one in zip(FIELDS, values, strict=True)}
-        means[DISPLACEMENT] = np.hypot(*displacement[self._kept].T)
-        drawn = {
-            name: (shape[:, None] @ self.mesh.local(lowered, element))[:, 0]
+        means[DISPLACEMENT] = np.hypot(*displacement[self._nodes].T)
+        curves = {
+            name: (shape[:, None] @ self.mesh.local(position, element))[:, 0]
             for name, (element, shape) in self._lines.items()
         }
-        patch = drawn.pop("patch")
+        patch = curves.pop("patch")
         bone = self._bone - [0.0, indentation]
-        return Fields(lowered[self._kept], self.triangles, means, drawn | {"bone": bone}, patch)
+        return Fields(position[self._nodes], self.triangles, means, curves | {"bone": bone}, patch)
 
 
 def fields_of(prediction: Prediction, sketch: Sketch | None = None) -> Fields:
@@ -156,18 +156,18 @@ def _patch(outline: Outline, scene: Scene) -> Array:
 
 def _locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     """Return the element (m,) that holds each undeformed point (m, 2), and its shape functions there (m, 9)."""
-    element = _holding(mesh, points)
+    element = _elements_at(mesh, points)
     local = local_coordinates(mesh.local(mesh.nodes, element), points, np.zeros(points.shape))
     return element, Q2P1.shape(local)[0]
 
 
-def _holding(mesh: Mesh, points: Array) -> Indices:
+def _elements_at(mesh: Mesh, points: Array) -> Indices:
     """Return the element (m,) that holds each point, or the one nearest to holding it."""
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :12]
-    tried = near.ravel()
-    corners = mesh.local(mesh.nodes, tried)
-    local = local_coordinates(corners, np.repeat(points, near.shape[1], axis=0), np.zeros((len(tried), 2)))
+    candidates = near.ravel()
+    corners = mesh.local(mesh.nodes, candidates)
+    local = local_coordinates(corners, np.repeat(points, near.shape[1], axis=0), np.zeros((len(candidates), 2)))
     outside = np.abs(local).max(axis=1).reshape(near.shape)
     return near[np.arange(len(points)), np.argmin(np.where(np.isfinite(outside), outside, np.inf), axis=1)]
 

@@ -12,7 +12,7 @@ from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation import folds_at
-from solver.continuation.existence import PROOF, doubts, folded, refuse_far_beyond, sound
+from solver.continuation.existence import PROOF, doubts, is_folded, refuse_far_beyond, sound
 from solver.continuation.finite_states import nearby, roughly, settled_state
 from solver.continuation.small_states import within_reach
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
@@ -104,14 +104,14 @@ class Meshes:
         return solution if is_new else replace(solution, setup_s=0.0)
 
 
-def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:
+def coarse_solution(scene: Scene, guess: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:
     """Return the settled state on a coarse mesh, from which solutions on finer meshes start.
 
-    `expected` is the depth [mm], an estimate where forces are given. The friction limit differs a little between
+    `guess` is the depth [mm], an estimate where forces are given. The friction limit differs a little between
     meshes, so that for a drag near it the solution is full slip. Where the coarse state is unsound, as near a limit, a
     mesh of `fineness` is solved directly. Raises NoSteadyState, NotConverged, Cancelled.
     """
-    depth = expected if scene.normal_force is not None else scene.loading.depth
+    depth = guess if scene.normal_force is not None else scene.loading.depth
     sizing = Sizing(
         FIRST_FINENESS if isinstance(fineness, Lines) else min(FIRST_FINENESS, fineness), depth, margin=MARGIN
     )
@@ -123,7 +123,7 @@ def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, mesh
             coarse = meshes.coarse(scene, sizing)
         if sound(coarse.finger, coarse.state):
             return coarse
-        beyond_limit = folded(coarse.finger, coarse.state)
+        beyond_limit = is_folded(coarse.finger, coarse.state)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
             raise  # decided on a mesh of its own, whatever this one is
@@ -206,8 +206,8 @@ def solve_nested(
     try:
         if top.state.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
-                judged = choose_steps(scene, top.finger, top.state)
-                steps = None if judged is None else replace(judged, times=1)
+                choice = choose_steps(scene, top.finger, top.state)
+                steps = None if choice is None else replace(choice, times=1)
             state = end(scene, finger)
         else:
             steps = None
@@ -238,8 +238,8 @@ def _doubts_at_cut(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, 
     folds = folds_at(finite_laws(scene.materials)[mesh.region[ends[place]]]) if least[place] < PROOF.plain else 0.0
     if least[place] >= folds:
         return ()
-    squeezed = f"is squeezed to {100 * least[place]:.0f} % of its length, and a free face folds at {100 * folds:.0f} %"
-    return (f'{CUT_FOLDS} {squeezed}: ask for finger.cut = "driven", a longer shaft, or less depth or friction.',)
+    clause = f"is squeezed to {100 * least[place]:.0f} % of its length, and a free face folds at {100 * folds:.0f} %"
+    return (f'{CUT_FOLDS} {clause}: ask for finger.cut = "driven", a longer shaft, or less depth or friction.',)
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
@@ -298,8 +298,8 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     checks = _audits(finger, newton, state)
     correct = partial(_correct, finger, newton)
     state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
-    solved = SceneSolution(scene, state, state.u, checks, steps, way)
-    complete_audits(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
+    solution = SceneSolution(scene, state, state.u, checks, steps, way)
+    complete_audits(scene, finger, solution, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
     solved_at = perf_counter()
     report_progress("estimating errors, on the nested mesh")
@@ -308,8 +308,8 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     row = finger.row.average(state.u)
     estimate_s = perf_counter() - solved_at
     warnings, wall = doubts(finger, state) + _doubts_at_cut(finger, state), solved_at - start - setup
-    solved = replace(solved, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
-    return prediction(solved, finger, numbers, row, nested_numbers, estimate_s)
+    solution = replace(solution, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
+    return prediction(solution, finger, numbers, row, nested_numbers, estimate_s)
 
 
 def _correct(

@@ -97,8 +97,8 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     free, by = system.free[:count], np.zeros((count, 3))
     by[:, MU], by[:, DEPTH] = system.right[:count, BY_FRICTION], system.right[:count, BY_DEPTH]
     at, along = np.divmod(free, 2)
-    capped = (state.state[at] == SHEAR_LIMITED) & (along == 0)
-    by[:, TAU_MAX] = np.where(capped, state.sense[at] * system.length[at], 0.0)
+    at_bound = (state.state[at] == SHEAR_LIMITED) & (along == 0)
+    by[:, TAU_MAX] = np.where(at_bound, state.sense[at] * system.length[at], 0.0)
     out = np.zeros((2 * size, 3))
     out[:, DEPTH] = newton.steps[:, BY_DEPTH]
     out[free] = np.linalg.solve(system.matrix[: count * count].reshape(count, count), by)

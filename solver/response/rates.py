@@ -49,8 +49,8 @@ def instants(history: History) -> tuple[int, int, int]:
     """
     count = len(history.time)
     # A press without drag, before it is dragged, lets the bone move along the surface too.
-    moved = np.flatnonzero((history.time > PRESSING_TIME) & (np.abs(history.bone_x) > 0.0))
-    first = int(moved[0]) if len(moved) else count
+    moving = np.flatnonzero((history.time > PRESSING_TIME) & (np.abs(history.bone_x) > 0.0))
+    first = int(moving[0]) if len(moving) else count
     slip = np.flatnonzero((history.slipping >= ALL) & (np.arange(count) >= first))
     return first, int(slip[0]) + 1 if len(slip) else count, count
 
@@ -58,8 +58,8 @@ def instants(history: History) -> tuple[int, int, int]:
 def _mean(time: Array, values: Array, begin: int, end: int) -> Array:
     """Return the mean rates (q,) between two instants."""
     step = float(time[end] - time[begin])
-    grown: Array = values[end] - values[begin]
-    return grown / (step if step > 0.0 else np.nan)
+    growth: Array = values[end] - values[begin]
+    return growth / (step if step > 0.0 else np.nan)
 
 
 INSTANTS = ("press", "break_away", "slide")  # whose ends they are
@@ -114,9 +114,9 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         rate_edges = (of_quantities[1:] + of_quantities[:-1]) / np.diff(times)[:, None]
 
     def error(name: str, changed_by_edges: Array) -> Array:
-        value, nested_value, *few = (getattr(one, name) for one in (usual, finer, *fewer))
-        by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(few, PARTS.tolist(), strict=True))
-        return half_width(nested_value - few[0], changed_by_edges[None], order_of(scene)) + by_steps
+        value, nested_value, *by_part = (getattr(one, name) for one in (usual, finer, *fewer))
+        by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(by_part, PARTS.tolist(), strict=True))
+        return half_width(nested_value - by_part[0], changed_by_edges[None], order_of(scene)) + by_steps
 
     return CourseNumbers(error("at", edges), error("rate", rate_edges))
 

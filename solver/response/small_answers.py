@@ -57,13 +57,13 @@ class SmallMeshing(Meshing):
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
         """Do as `Meshing` says; where contact leaves the skin considered, solve all on a mesh with more of it."""
-        self._fingers = {sizing: kept for sizing, kept in self._fingers.items() if sizing.fineness == fineness}
+        self._fingers = {sizing: entry for sizing, entry in self._fingers.items() if sizing.fineness == fineness}
         deep = max(self.deepest.values())
         most = max(deep, min(WIDE * deep, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
         narrow, wide = (Sizing(fineness, depth, margin=WIDE) for depth in (deep, most))
         try:
-            done = self._on_mesh(scenes, narrow, watch, last=False)
-            return self._on_mesh(scenes, wide, watch, last=True) if len(done) < len(scenes) else done
+            results = self._on_mesh(scenes, narrow, watch, last=False)
+            return self._on_mesh(scenes, wide, watch, last=True) if len(results) < len(scenes) else results
         except NotConverged as failure:  # a mesh does not stand for a body
             return [failure] * len(scenes)
 
@@ -78,19 +78,19 @@ class SmallMeshing(Meshing):
         # Settled slides take milliseconds and share one estimate; a load path is watched as soon as it is marched.
         every = range(len(scenes))
         steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
-        marched = any(scene.solve.course == "history" for scene in scenes)
-        for batch in [[number] for number in every] if marched else [steepest_first]:
+        stepwise = any(scene.solve.course == "history" for scene in scenes)
+        for batch in [[number] for number in every] if stepwise else [steepest_first]:
             states: dict[int, SceneSolution] = {}
             for number in batch:
                 position = len(answers) + len(states)
                 report_part(self.progress, position / len(scenes))
                 try:
-                    solved = self._solve_state(scenes[number], finger, position, len(scenes))
+                    solution = self._solve_state(scenes[number], finger, position, len(scenes))
                 except SolveFailure as failure:
                     answers[number] = failure.in_a_sentence()
                     continue
-                if solved is not None:
-                    states[number] = replace(solved, setup_s=setup_s - finger.solve_s)
+                if solution is not None:
+                    states[number] = replace(solution, setup_s=setup_s - finger.solve_s)
                 elif last:
                     answers[number] = BEYOND_THE_SKIN
                 else:
@@ -137,26 +137,26 @@ class SmallMeshing(Meshing):
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
         direct_solve = way is None and scene.normal_force is None and not state.load.path_dependent
-        solution = state, displacement
-        (state, displacement), checks = _remove_round_off(scene, finger, solution, always=direct_solve)
-        solved = SceneSolution(scene, state, displacement, checks, steps, way)
-        complete_audits(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
+        (state, displacement), checks = _remove_round_off(scene, finger, (state, displacement), always=direct_solve)
+        solution = SceneSolution(scene, state, displacement, checks, steps, way)
+        complete_audits(scene, finger, solution, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
-        return replace(solved, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
+        return replace(solution, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
 
-    def _predict(self, solved: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
+    def _predict(self, solutions: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
         """Return the prediction of each state with its error estimate; the numbers of all are computed together."""
         start = perf_counter()
-        numbers = finger.all_numbers([one.state for one in solved])
-        displacements = np.stack([one.displacement for one in solved], axis=2)
+        numbers = finger.all_numbers([one.state for one in solutions])
+        displacements = np.stack([one.displacement for one in solutions], axis=2)
         numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
-        nested = nested_numbers_of_all(self._finger(solved[0].scene, replace(sizing, halved=True))[0], solved, numbers)
-        estimate_s = (perf_counter() - start) / len(solved)
+        mesh, _ = self._finger(solutions[0].scene, replace(sizing, halved=True))
+        nested = nested_numbers_of_all(mesh, solutions, numbers)
+        estimate_s = (perf_counter() - start) / len(solutions)
         return [
             prediction(one, finger, numbers[number], rows[:, number], nested[number], estimate_s)
-            for number, one in enumerate(solved)
+            for number, one in enumerate(solutions)
         ]
 
 
@@ -172,8 +172,8 @@ def _remove_round_off(
     its own, which are no round-off.
     """
 
-    def correct(now: Solution, _: object = None) -> tuple[Solution, dict[str, float]]:
-        corrected = remove_round_off(scene, finger, *now)
+    def correct(current: Solution, _: object = None) -> tuple[Solution, dict[str, float]]:
+        corrected = remove_round_off(scene, finger, *current)
         return corrected, audits.audits(finger, *corrected)
 
     first = correct(solution) if always else (solution, audits.audits(finger, *solution))
@@ -181,24 +181,24 @@ def _remove_round_off(
 
 
 def nested_numbers_of_all(
-    mesh: LinearFinger, solved: Sequence[SceneSolution], numbers: Array
+    mesh: LinearFinger, solutions: Sequence[SceneSolution], numbers: Array
 ) -> list[NestedNumbers | None]:
     """Return the numbers of solved scenes on the nested `mesh`, None for a scene without a state there.
 
     `numbers` (c, COUNT) are those on the mesh of the answers.
     """
     states: dict[int, EquilibriumState] = {}
-    for number, one in enumerate(solved):
+    for number, one in enumerate(solutions):
         try:
             states[number] = nearest(one.scene, mesh) if one.steps is None else end(one.scene, mesh)
         except SolveFailure:
             continue
-    out: list[NestedNumbers | None] = [None] * len(solved)
+    out: list[NestedNumbers | None] = [None] * len(solutions)
     if states:
-        forced = [(state, forces_of(solved[number].scene, state.load)) for number, state in states.items()]
-        values, changes = edge_changes(mesh.newton, forced, mesh.numbers_and_row)
+        with_forces = [(state, forces_of(solutions[number].scene, state.load)) for number, state in states.items()]
+        values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
-            one = solved[number]
+            one = solutions[number]
             there = nested_state(mesh, state, value, change, one.steps)
             out[number] = None if there is None else with_shares(one.scene, numbers[number], there, one.steps)
     return out

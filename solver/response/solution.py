@@ -67,14 +67,14 @@ def solve_many(
     are refined or completed by evidence. Raises SceneError where a finger cannot be meshed, Cancelled where `progress`
     says so.
     """
-    completed: dict[int, tuple[Answer, Answer]] = {}  # by its id, an answer and the same with evidence
+    by_id: dict[int, tuple[Answer, Answer]] = {}  # by its id, an answer and the same with evidence
 
     def add_evidence(answer: Answer) -> Answer:
-        if id(answer) not in completed:
+        if id(answer) not in by_id:
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-            completed[id(answer)] = answer, _with_evidence(answer, progress)
-        return completed[id(answer)][1]
+            by_id[id(answer)] = answer, _with_evidence(answer, progress)
+        return by_id[id(answer)][1]
 
     def watch_with_evidence(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
         assert watch is not None
@@ -192,9 +192,9 @@ def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: R
     meshes: dict[int, float | Lines] = {}  # the last of each scene
     while True:
         for mesh, todo in work.items():
-            solved = meshing.answers([scenes[i] for i in todo], mesh, _within(watch, todo))
+            results = meshing.answers([scenes[i] for i in todo], mesh, _within(watch, todo))
             meshes |= dict.fromkeys(todo, mesh)
-            for i, answer in zip(todo, solved, strict=True):
+            for i, answer in zip(todo, results, strict=True):
                 failure = _loss(answer, answers.get(i))
                 if failure is not None:
                     failures[i] = failure
@@ -273,15 +273,15 @@ def _fall_back(scenes: list[Scene], answers: dict[int, Answer], meshing: Meshing
 
     Under steep friction a single mesh may have no state by chance, and a slightly finer one is tried at last.
     """
-    replaced: dict[int, SolveFailure] = {}
+    failures: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         if isinstance(failure := answers[i], SolveFailure) and _is_doubtful(scene, failure):
             answer = meshing.answers([scene], FIRST_FINENESS / FINENESS_RATIO)[0]
             if _coarser_counts(answer, failure):
-                answers[i], replaced[i] = answer, failure
+                answers[i], failures[i] = answer, failure
         if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
             answers[i] = meshing.answers([scene], FIRST_FINENESS * FINENESS_RATIO)[0]
-    return replaced
+    return failures
 
 
 def _is_doubtful(scene: Scene, failure: SolveFailure) -> bool:

@@ -125,8 +125,8 @@ class SmallStepper(Stepper):
             self.forget()
             return float("nan")
         self.state = state
-        stretched = self.finger.ending_by_skin @ state.u.ravel()
-        return float(stretched @ stretched)
+        gradient = self.finger.ending_by_skin @ state.u.ravel()
+        return float(gradient @ gradient)
 
     def _most(self, normal: float) -> float:
         """Return the friction limit [N/mm] for the last distribution of pressure."""
@@ -144,8 +144,8 @@ class SmallStepper(Stepper):
 class FollowControl:
     """Iterations for a reading at finite strain, and criteria for a valid state and for a lost one."""
 
-    met: float = 0.02  # largest error of the forces of a valid state, by the normal force
-    eased: float = 0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
+    force_error: float = 0.02  # largest error of the forces of a valid state, by the normal force
+    relief: float = 0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
     stairs: int = 12  # load steps from the undeformed finger to the forces of a reading
     leading: int = 3  # iterations for each of these
     arriving: int = 8  # iterations for the last of these, and after an invalid state, at most
@@ -153,7 +153,7 @@ class FollowControl:
     least_stretch: float = 0.65  # smallest stretch of valid skin: it folds at 0.544, later on a coarse mesh
     largest_kink: float = 0.3  # largest kink of valid skin: a coarse mesh has this where skin folds
     far: float = 0.15  # displacement in an iteration after which another follows [mm]
-    hurried: int = 3  # iterations then, at most
+    further: int = 3  # iterations then, at most
     stiff: float = 1e3  # ratio of bulk to shear stiffness from which a kept tangent diverges (nu 0.4995)
     furthest: float = 5.0  # displacement in an iteration beyond which the state is lost [mm]
 
@@ -188,7 +188,7 @@ class FiniteStepper(Stepper):
         """
         if self._lost_at is None:
             return self._follow(normal, tangential)
-        if self._hopeless and normal >= CONTROL.eased * self._lost_at:
+        if self._hopeless and normal >= CONTROL.relief * self._lost_at:
             return float("nan")
         return self._lead(normal, tangential)
 
@@ -214,17 +214,17 @@ class FiniteStepper(Stepper):
         newton = self.newton
         state = self._ready(normal, tangential)
         origin, before = state.place(newton.condensed)[:, 0], state.load.travel
-        forces, hurried = ForceLoad(normal, tangential), self._goes_far(normal)
-        far, turns = (CONTROL.near, CONTROL.arriving) if self._behind else (CONTROL.far, CONTROL.hurried)
+        forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
+        far, turns = (CONTROL.near, CONTROL.arriving) if self._behind else (CONTROL.far, CONTROL.further)
         for number in range(1, max(iterations, turns) + 1):
-            kept = hurried and number == 1
-            done = correct(newton, state, forces, origin, before, kept=kept)
-            if kept and (done is None or done[1] > CONTROL.furthest):
+            reuse = goes_far and number == 1
+            correction = correct(newton, state, forces, origin, before, reuse=reuse)
+            if reuse and (correction is None or correction[1] > CONTROL.furthest):
                 continue
-            if done is None or done[1] > CONTROL.furthest or done[0].reaches_end:
+            if correction is None or correction[1] > CONTROL.furthest or correction[0].reaches_end:
                 return self._lose(normal)
-            state = done[0]
-            if number >= iterations and not kept and done[1] < far:
+            state = correction[0]
+            if number >= iterations and not reuse and correction[1] < far:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         compression = self.finger.skin_compression(state)
@@ -233,7 +233,7 @@ class FiniteStepper(Stepper):
         self.state = state
         x, y = state.force
         behind = max(abs(y - normal), abs(x - tangential) if (state.state == STICK).any() else 0.0)
-        self._behind = behind > CONTROL.met * normal
+        self._behind = behind > CONTROL.force_error * normal
         if self._behind:
             return float("nan")
         if compression.lowest < CONTROL.least_stretch or compression.kink > CONTROL.largest_kink:

@@ -56,9 +56,9 @@ class Scene:
             raise SceneError("loading.tangential_force", drag, allowed)
 
     def _check_stiffnesses(self) -> None:
-        meshed = TISSUES if self.finger.bone == "meshed" else TISSUES[:-1]
-        softest = min(self.materials.of(name).E for name in meshed)
-        for name in meshed:
+        tissues = TISSUES if self.finger.bone == "meshed" else TISSUES[:-1]
+        softest = min(self.materials.of(name).E for name in tissues)
+        for name in tissues:
             if not STIFFNESSES * softest * (1.0 + 1e-9) >= self.materials.of(name).E:
                 allowed = f"it must be at most {STIFFNESSES:g} times that of the softest tissue, {softest:g} MPa"
                 raise SceneError(f"materials.{name}.E", self.materials.of(name).E, allowed)

@@ -83,8 +83,8 @@ def test_a_body_is_kept_ready_for_the_last_few_lengths_of_steps_and_makes_the_ot
         return body, body.energy(probes)
 
     relaxing_body, energy = take_steps()
-    assert relaxing_body._elastic_body.cache_info().currsize == relaxing.KEPT < len(set(lengths))
-    monkeypatch.setattr(relaxing, "KEPT", 100)
+    assert relaxing_body._elastic_body.cache_info().currsize == relaxing.STEP_LENGTHS < len(set(lengths))
+    monkeypatch.setattr(relaxing, "STEP_LENGTHS", 100)
     np.testing.assert_array_equal(take_steps()[1], energy)
 
 
