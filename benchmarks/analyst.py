@@ -37,22 +37,22 @@ def _work(folder: Path) -> None:
 
     print(f"loading the work                 {time.process_time() - start:6.2f} s")
     start = time.process_time()
-    known: dict[str, float] = {}
-    said: list[m.Said] = []
+    delays: dict[str, float] = {}
+    messages: list[m.Said] = []
 
     def say(message: m.Said) -> None:
-        known.setdefault(type(message).__name__, time.process_time() - start)
-        said.append(message)
+        delays.setdefault(type(message).__name__, time.process_time() - start)
+        messages.append(message)
 
     work = Work(folder, say)
     work.go_on()
     print(
-        f"trials and strokes are known after {known['ReportReady']:4.2f} s, "
-        f"the first finger after {known['Answered']:.2f} s"
+        f"trials and strokes are known after {delays['ReportReady']:4.2f} s, "
+        f"the first finger after {delays['Answered']:.2f} s"
     )
-    answers = sum(isinstance(one, m.Answered) for one in said)
+    answers = sum(isinstance(one, m.Answered) for one in messages)
     print(f"all {answers} trials are answered after {time.process_time() - start:4.2f} s")
-    report = next(one.report for one in said if isinstance(one, m.ReportReady))
+    report = next(one.report for one in messages if isinstance(one, m.ReportReady))
     stroke = next(s for s in report.strokes if s.steady is not None)
     for words, request in (
         (
@@ -68,7 +68,7 @@ def _work(folder: Path) -> None:
         start = time.process_time()
         work.do(request)
         print(f"{words:36s} {time.process_time() - start:4.2f} s")
-    _painting(next(one.film for one in said if isinstance(one, m.Filmed)))
+    _painting(next(one.film for one in messages if isinstance(one, m.Filmed)))
 
 
 def _painting(film) -> None:  # noqa: ANN001

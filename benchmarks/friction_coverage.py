@@ -124,16 +124,16 @@ class Visit:
 
     def errors_alone(self, force: Array, settings: BootstrapSettings) -> dict[str, bool]:
         """Say whether intervals of nothing but gains, cross-talk and lean hold mu and T of a true force (3,) [N]."""
-        measured = self._errors[:3, :3] @ self._turn @ force
+        reading = self._errors[:3, :3] @ self._turn @ force
         accuracy = (settings.gain_error, settings.cross_talk)
         lean = settings.tilt, settings.tilt_error
-        shared = SystematicDraws(settings.repeats, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
-        along = drag_direction(measured[None, :2])
-        drag, normal = float(np.hypot(*measured[:2])), -float(measured[2])
+        systematic = SystematicDraws(settings.repeats, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
+        along = drag_direction(reading[None, :2])
+        drag, normal = float(np.hypot(*reading[:2])), -float(reading[2])
         true = float(np.hypot(*force[:2]))
         draws = {
-            "mu_dynamic": (shared.ratio(drag / normal, along), drag / normal, true / -float(force[2])),
-            "tau_max": (drag * shared.gain_t + shared.shares(along)[0] * normal, drag, true),
+            "mu_dynamic": (systematic.ratio(drag / normal, along), drag / normal, true / -float(force[2])),
+            "tau_max": (drag * systematic.gain_t + systematic.shares(along)[0] * normal, drag, true),
         }
         ends = {
             name: (*np.quantile(draw, (0.025, 0.975)), reported, truth)
@@ -164,19 +164,19 @@ class Visit:
             saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
             factor *= np.where(time > stroke.slip, 1.0 - self._drop * (1.0 - saw), 1.0)
         if self._trouble.law:
-            pressed = np.maximum(-self._bench.true_wrench(time)[:, 2], 1e-3)
-            factor *= (pressed / stroke.peak_normal_force) ** self._trouble.law
+            push = np.maximum(-self._bench.true_wrench(time)[:, 2], 1e-3)
+            factor *= (push / stroke.peak_normal_force) ** self._trouble.law
         return factor
 
     def _true_wrench(self, time: Array, stroke: StrokeGroundTruth) -> Array:
         """Return the true wrench (n, 6) [N, N mm] in the face's frame."""
         plain = self._bench.true_wrench(time)
-        more = plain[:, :2] * (self._factor(time, stroke) - 1.0)[:, None]
-        pressed = np.minimum(plain[:, 2], -1e-12)
-        x = (HEIGHT * plain[:, 0] - plain[:, 4]) / pressed
-        y = (plain[:, 3] + HEIGHT * plain[:, 1]) / pressed
-        torques = np.column_stack([-HEIGHT * more[:, 1], HEIGHT * more[:, 0], x * more[:, 1] - y * more[:, 0]])
-        return plain + np.hstack([more, np.zeros((len(time), 1)), torques])
+        extra = plain[:, :2] * (self._factor(time, stroke) - 1.0)[:, None]
+        push = np.minimum(plain[:, 2], -1e-12)
+        x = (HEIGHT * plain[:, 0] - plain[:, 4]) / push
+        y = (plain[:, 3] + HEIGHT * plain[:, 1]) / push
+        torques = np.column_stack([-HEIGHT * extra[:, 1], HEIGHT * extra[:, 0], x * extra[:, 1] - y * extra[:, 0]])
+        return plain + np.hstack([extra, np.zeros((len(time), 1)), torques])
 
     def _press(self, time: Array) -> Array:
         """Return the true wrench (n, 6) of a press of 2 N for 1.5 s, by a hand that pushes sideways a little itself."""
@@ -186,13 +186,13 @@ class Visit:
 
     def _measured_wrench(self, time: Array, true: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the transducer tells of a true one in the face's frame."""
-        turned = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
-        measured = turned @ self._errors.T + self._bench.wrench(time) - self._bench.true_wrench(time)
+        wrench = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
+        reading = wrench @ self._errors.T + self._bench.wrench(time) - self._bench.true_wrench(time)
         if self._trouble.hum:
-            measured[:, :3] += self._trouble.hum * np.sin(2 * np.pi * 50.0 * time[:, None] + self._phases[3:6])
+            reading[:, :3] += self._trouble.hum * np.sin(2 * np.pi * 50.0 * time[:, None] + self._phases[3:6])
         if self._trouble.flicker:
-            measured[:, :3] += self._trouble.flicker * _flicker(len(time), 3, (self._seed, int(time[0] * RATE)))
-        return measured
+            reading[:, :3] += self._trouble.flicker * _flicker(len(time), 3, (self._seed, int(time[0] * RATE)))
+        return reading
 
 
 def _block(time: Array, wrench: Array) -> ReadingBlock:
@@ -232,8 +232,8 @@ def row(name: str, seeds: Sequence[int]) -> str:
                 hits[number].append(None if ends is None else ends[0] <= truth[number] <= ends[1])
     cells = [name]
     for number in NUMBERS:
-        known = [hit for hit in hits[number] if hit is not None]
-        cells.append(f"{100 * np.mean(known or [np.nan]):.1f} %")
+        decisions = [hit for hit in hits[number] if hit is not None]
+        cells.append(f"{100 * np.mean(decisions or [np.nan]):.1f} %")
         cells[-1] += f" ({100 * np.mean(alone[number]):.1f} %)" if number in alone else ""
     withheld = max(ones.count(None) / len(ones) for ones in hits.values())
     return "| " + " | ".join((*cells, *(f"{100 * share:.1f} %" for share in (withheld, np.mean(peaks))))) + " |"

@@ -69,19 +69,19 @@ def _with_readings(seconds: float) -> None:
         model.add(Live(0, *_block(0, 4), (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
         model.poll()
         time.sleep(0.05)
-    ages, done, before = [], 0, model.predictions
+    ages, sent, before = [], 0, model.predictions
     began = time.monotonic()
     while (now := time.monotonic() - began) < seconds:
         last = int(now * RATE)
-        if last > done:
-            number, at, received, wrench, status = _block(done, last)
+        if last > sent:
+            number, at, received, wrench, status = _block(sent, last)
             at = at.astype(np.float64)
             received = (1e9 * (began + at)).astype(np.int64)
             model.add(Live(1, number, at, received, wrench, status, (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
-            done = last
-        for said in model.poll():
-            if said.stream == 1:
-                ages.append(time.monotonic() - said.received_ns * 1e-9)
+            sent = last
+        for prediction in model.poll():
+            if prediction.stream == 1:
+                ages.append(time.monotonic() - prediction.received_ns * 1e-9)
         time.sleep(1.0 / FRAMES)
     model.close()
     words = f"{np.median(ages) * 1e3:.0f} ms at the median, {np.percentile(ages, 99) * 1e3:.0f} ms at 99 %"

@@ -82,7 +82,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     lags: list[float] = []
     waiting: list[ReadingBlock] = []
     due = 0.0
-    began, used, received = time.monotonic(), time.process_time(), transducer.health.received
+    began, processor, received = time.monotonic(), time.process_time(), transducer.health.received
     while (now := time.monotonic()) - began < seconds:
         block = transducer.read(0.1 * factor)
         if len(block):
@@ -97,7 +97,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
             if drawer is not None:
                 shown.send((gathered.time, wrench))
         time.sleep(every)
-    wall, used = time.monotonic() - began, time.process_time() - used
+    wall, processor = time.monotonic() - began, time.process_time() - processor
     health = transducer.health
     received = health.received - received
     transducer.close()
@@ -111,7 +111,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     lag, age = np.percentile(lags, [50, 99]) * 1e3, np.percentile(ages, [50, 99]) * 1e3
     return (
         f"{rate:8d} {received / wall:10.0f} {health.lost:8d} {health.malformed:9d} "
-        f"{lag[0]:6.2f} {lag[1]:6.2f} {age[0]:6.2f} {age[1]:6.2f} {100 * used / wall:7.1f} {frames:8.1f}"
+        f"{lag[0]:6.2f} {lag[1]:6.2f} {age[0]:6.2f} {age[1]:6.2f} {100 * processor / wall:7.1f} {frames:8.1f}"
     )
 
 

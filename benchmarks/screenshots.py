@@ -57,10 +57,10 @@ class PlayedRecorder:
 
     def stroke(self, trial: int, at: float) -> None:
         """Have the finger stroke the surface of a trial at an instant [s, device time]."""
-        chosen = PLAN.trials[trial - 1]
-        surface = paper_surfaces()[chosen.stimulus.descriptor, chosen.stimulus.index]
+        row = PLAN.trials[trial - 1]
+        surface = paper_surfaces()[row.stimulus.descriptor, row.stimulus.index]
         self._bench.mount(surface)
-        self._bench.begin_stroke(Stroke(surface.peak_normal_force, surface.speed, chosen.direction), at)
+        self._bench.begin_stroke(Stroke(surface.peak_normal_force, surface.speed, row.direction), at)
 
     def readings(self, until: float) -> None:
         """Say every reading up to an instant [s, device time], a tenth of a second a message."""
@@ -82,8 +82,8 @@ class PlayedRecorder:
 
     def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  nothing is waited for
         """Return what is to be said."""
-        said, self._waiting = tuple(self._waiting), []
-        return said
+        reports, self._waiting = tuple(self._waiting), []
+        return reports
 
     def close(self) -> None:
         """Do nothing."""

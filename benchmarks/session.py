@@ -46,10 +46,10 @@ def _print_replay(recording: Recording, room: Path) -> None:
     compared: list[float] = []
     for number in range(RUNS):
         began = time.perf_counter()
-        again = replay(recording, room / f"replay-{number}", None, lambda *_: None)
+        copy = replay(recording, room / f"replay-{number}", None, lambda *_: None)
         replayed.append(time.perf_counter() - began)
-        differences = [*different_readings(recording, again), *different_events(recording, again)]
-        analyse(again)
+        differences = [*different_readings(recording, copy), *different_events(recording, copy)]
+        analyse(copy)
         compared.append(time.perf_counter() - began)
     print(f"session of {lasted:.1f} s, {recording.events[-1].readings} readings")
     print(f"replayed in {median(replayed):.3f} s: {lasted / median(replayed):.0f} times real time (median of {RUNS})")
@@ -63,18 +63,18 @@ def _print_analysis(recording: Recording) -> None:
     strokes = analysis.strokes
     options = PredictionOptions(course="steady", intervals=True, variants="small")
     prediction = predict(analysis, recording.plan, options)
-    carried = with_intervals(analysis, prediction)
-    with_alternatives(carried)
+    with_spans = with_intervals(analysis, prediction)
+    with_alternatives(with_spans)
     alone = _median_time(lambda: analyse(Recording.open(recording.folder)))
-    drawn = _median_time(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
-    solved = _median_time(lambda: predict(analysis, recording.plan, prediction.options))
+    bootstrap = _median_time(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
+    solves = _median_time(lambda: predict(analysis, recording.plan, prediction.options))
     spans = _median_time(lambda: with_intervals(analysis, prediction))
-    alternatives = _median_time(lambda: with_alternatives(carried))
+    alternatives = _median_time(lambda: with_alternatives(with_spans))
     print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
     print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
-    print(f"bootstrap intervals   {1000 * drawn:6.0f} ms   (both together: reach 5000)")
-    ways = [one.method for row in carried.trials for one in (row.interval, row.opposite_interval) if one]
-    print(f"predicted both ways   {1000 * solved:6.0f} ms   at small strain")
+    print(f"bootstrap intervals   {1000 * bootstrap:6.0f} ms   (both together: reach 5000)")
+    ways = [one.method for row in with_spans.trials for one in (row.interval, row.opposite_interval) if one]
+    print(f"predicted both ways   {1000 * solves:6.0f} ms   at small strain")
     print(f"intervals of the SEDs {1000 * spans:6.0f} ms   {len(ways)} of them, {ways.count('sampling')} by sampling")
     print(f"side by side          {1000 * alternatives:6.0f} ms   at small strain")
 

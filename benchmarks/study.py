@@ -25,14 +25,14 @@ REPEATS = 2
 def measure(folders: list[Path], shelf: Path, options: VisitOptions, workers: int) -> tuple[float, float]:
     """Return the wall time and the workers' processor time [s] of computing all sessions."""
     before, start = _children(), time.perf_counter()
-    done, failed = visits(folders, options, Shelf(shelf, options), Console(as_json=True), workers=workers)
-    assert len(done) == len(folders), failed
+    results, failures = visits(folders, options, Shelf(shelf, options), Console(as_json=True), workers=workers)
+    assert len(results) == len(folders), failures
     return time.perf_counter() - start, _children() - before
 
 
 def _children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def main(count: int, options: VisitOptions) -> None:
@@ -45,18 +45,18 @@ def main(count: int, options: VisitOptions) -> None:
             shutil.copytree(base / "one" / "S01", folder)
         wall: dict[int, list[float]] = {1: [], 2: []}
         work: dict[int, list[float]] = {1: [], 2: []}
-        for again in range(REPEATS):
+        for repeat in range(REPEATS):
             for workers in (1, 2):
-                took = measure(folders, base / f"shelf-{workers}-{again}", options, workers)
+                took = measure(folders, base / f"shelf-{workers}-{repeat}", options, workers)
                 wall[workers].append(took[0])
                 work[workers].append(took[1] / count)
         one, two = (median(wall[workers]) for workers in (1, 2))
-        used = [median(work[workers]) for workers in (1, 2)]
+        processor = [median(work[workers]) for workers in (1, 2)]
         print(f"load average at the end: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
         print(f"{count} sessions: {one:.1f} s with one process, {two:.1f} s with two: {one / two:.2f} times as fast")
-        print(f"processor time a session: {used[0]:.2f} s with one process, {used[1]:.2f} s with two")
+        print(f"processor time a session: {processor[0]:.2f} s with one process, {processor[1]:.2f} s with two")
         print(f"1,000 sessions with two: {1000 * two / count / 60:.1f} min here, ", end="")
-        print(f"{1000 * used[1] / 2 / 60:.1f} min where nothing else runs")
+        print(f"{1000 * processor[1] / 2 / 60:.1f} min where nothing else runs")
         print(f"once computed: {measure(folders, base / 'shelf-2-0', options, 2)[0]:.2f} s")
 
 

@@ -57,9 +57,9 @@ def _first_paint(repeats: int) -> None:
     for _ in range(repeats + 1):
         began = time.time()
         out = subprocess.run([sys.executable, "-c", FIRST_PAINT], capture_output=True, text=True, check=True).stdout
-        painted, used = map(float, out.split())
+        painted, cpu = map(float, out.split())
         wall.append(painted - began)
-        processor.append(used)
+        processor.append(cpu)
     print(
         f"first paint (warm, median of {repeats}): {statistics.median(wall[1:]):.2f} s from start, "
         f"{statistics.median(processor[1:]):.2f} s of the processor"
@@ -95,10 +95,10 @@ def _session(options: argparse.Namespace) -> None:
         heart.start()
         before = _processor()
         _for(options.seconds)
-        used = {name: taken - before.get(name, 0.0) for name, taken in _processor().items()}
+        cpu = {name: spent - before.get(name, 0.0) for name, spent in _processor().items()}
         heart.stop()
         print(f"{options.rate} readings a second, {options.shown} s shown, {options.size}, {options.seconds:g} s long:")
-        watched.report(options.seconds, used)
+        watched.report(options.seconds, cpu)
         print(f"  readings lost: {window.bridge.state.bench.health.lost}")
         window.bridge.end()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -150,8 +150,8 @@ class _Observations:
         bridge, now = self.window.bridge, time.monotonic()
         if plot is self.window.live.plots[0]:
             self.painted.append(time.perf_counter())
-            taken = bridge.feed._take
-            received = int(taken[-1].received_ns[-1]) if taken else self._shown
+            blocks = bridge.feed._take
+            received = int(blocks[-1].received_ns[-1]) if blocks else self._shown
             if received != self._shown:
                 self.age.append(now - (1e-9 * received - bridge.session_offset))
                 self._shown = received
@@ -159,17 +159,17 @@ class _Observations:
             self._said = bridge.model.said
             self.model_age.append(now - (1e-9 * self._said.received_ns - bridge.session_offset))
 
-    def report(self, seconds: float, used: dict[str, float]) -> None:
-        """Print what was noted in so many seconds; `used` is processor time by process [s]."""
-        said = self.window.bridge.model.predictions - self.predictions
+    def report(self, seconds: float, cpu: dict[str, float]) -> None:
+        """Print what was noted in so many seconds; `cpu` is processor time by process [s]."""
+        count = self.window.bridge.model.predictions - self.predictions
         print(f"  frames: {len(self.painted) / seconds:.0f} a second, {_parts(np.diff(self.painted))} ms apart")
-        print(f"  processor of the window: {1000 * used['window'] / len(self.painted):.1f} ms a frame, all it does")
-        print("  processor by process: " + ", ".join(f"{name} {taken / seconds:.2f}" for name, taken in used.items()))
+        print(f"  processor of the window: {1000 * cpu['window'] / len(self.painted):.1f} ms a frame, all it does")
+        print("  processor by process: " + ", ".join(f"{name} {spent / seconds:.2f}" for name, spent in cpu.items()))
         late, busy = (sum(x > 0.05 for x in values) for values in (self.late, self.busy))
         print(f"  between two turns of the event loop: {_parts(self.late)} ms, over 50 ms {late} times")
         print(f"  of that its own work: {_parts(self.busy)} ms, over 50 ms {busy} times")
         print(f"  from a reading's arrival to the paint that shows it: {_parts(self.age)} ms")
-        print(f"  to the paint of the SED it leads to: {_parts(self.model_age)} ms, {said / seconds:.0f} a second")
+        print(f"  to the paint of the SED it leads to: {_parts(self.model_age)} ms, {count / seconds:.0f} a second")
         print(f"  recorder: {np.median(self.behind):.1f} ms behind at the median, {max(self.behind):.1f} ms at most")
 
 

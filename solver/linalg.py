@@ -263,8 +263,8 @@ class Elimination:
         out = np.zeros(len(plan.inner) + 1, bool)
         out[part[unknowns]] = True
         out[-1] = False
-        for p, (one, other) in enumerate(plan.children.tolist()):
-            out[p] |= out[one] or out[other]
+        for p, (first, second) in enumerate(plan.children.tolist()):
+            out[p] |= out[first] or out[second]
         return out[:-1]
 
     def back_substitute(self, condensed_force: Array, skin: Array) -> Array:

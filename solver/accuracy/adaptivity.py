@@ -90,13 +90,13 @@ class NestedGrid:
         local = values[self.nodes].reshape(*self.affine.shape[:3], 2)
         return (local - self.affine @ (self.fit @ local)).reshape(*self.nodes.shape, 2)
 
-    def _energy(self, one: Array, other: Array) -> Array:
+    def _energy(self, u: Array, v: Array) -> Array:
         """Return the energy of shear (a, b) that two fields (a, b, 5, 5, 2) have together."""
         out = np.zeros(self.nodes.shape[:2])
         for right in (0, 1):
             for up in (0, 1):
                 first, second = (
-                    field[:, :, 2 * right + ALONG, 2 * up + OUT].reshape(*out.shape, 18) for field in (one, other)
+                    field[:, :, 2 * right + ALONG, 2 * up + OUT].reshape(*out.shape, 18) for field in (u, v)
                 )
                 out += np.sum(first * (self.shear[:, right, :, up] @ second[..., None])[..., 0], axis=2)
         return out

@@ -292,26 +292,26 @@ def _with_meshed_bone(scene: Scene, answers: Answers) -> Answer | SceneError:
         return error
 
 
-def _difference(base: Prediction, other: Answer | SceneError, how: str) -> dict[str, Any]:
-    if isinstance(other, NoSteadyState):
+def _difference(base: Prediction, variant: Answer | SceneError, how: str) -> dict[str, Any]:
+    if isinstance(variant, NoSteadyState):
         return {
             "estimate": None,
-            "from": {"limit_mu": other.limit_mu},
+            "from": {"limit_mu": variant.limit_mu},
             "how": f"{MEASURED}{how}: no settled state is there",
         }
-    if not isinstance(other, Prediction):
-        return {"how": f"{MEASURED}{how} was to be measured, but: {other}"}
-    change = abs(other.sed_ending / base.sed_ending - 1.0) if base.sed_ending else None
-    numbers = {"without_MPa": base.sed_ending, "with_MPa": other.sed_ending}
+    if not isinstance(variant, Prediction):
+        return {"how": f"{MEASURED}{how} was to be measured, but: {variant}"}
+    change = abs(variant.sed_ending / base.sed_ending - 1.0) if base.sed_ending else None
+    numbers = {"without_MPa": base.sed_ending, "with_MPa": variant.sed_ending}
     return {"estimate": change, "from": numbers, "how": MEASURED + how}
 
 
-def _beyond_errors(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
+def _beyond_errors(base: Prediction, variant: Answer, how: str) -> dict[str, Any]:
     """Return the entry of a solve on another mesh, without `estimate` where the mesh errors explain the change."""
-    entry = _difference(base, other, how)
-    if not isinstance(other, Prediction) or base.sed_ending == 0.0:
+    entry = _difference(base, variant, how)
+    if not isinstance(variant, Prediction) or base.sed_ending == 0.0:
         return entry
-    change, errors = entry["estimate"], base.error_estimate + other.error_estimate
+    change, errors = entry["estimate"], base.error_estimate + variant.error_estimate
     if change > errors:
         return entry
     return {"how": f"{MEASURED}{how}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"}

@@ -158,9 +158,9 @@ class CondensedLinear:
 
     def with_load(self, load: Array) -> "CondensedLinear":
         """Return the same body under another dead `load` (2 k,) [N/mm]."""
-        other = copy(self)
-        other.load, other.force, other._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
-        return other
+        body = copy(self)
+        body.load, body.force, body._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
+        return body
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return zero displacements (k, 2) of the skin, and no pressures."""

@@ -44,12 +44,12 @@ def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
     return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, np.repeat(tangent, 2, axis=0))
 
 
-def join(one: Endings, other: Endings) -> Endings:
-    """Return the endings of `one`, then those of `other`."""
-    probes = (np.concatenate([getattr(e.probes, f.name) for e in (one, other)]) for f in fields(Probes))
-    weights, tangent = (np.concatenate(pair) for pair in ((one.weights, other.weights), (one.tangent, other.tangent)))
-    patch = np.concatenate([one.patch, one.count + other.patch])
-    return Endings(Probes(*probes), weights, patch, one.count + other.count, tangent)
+def join(head: Endings, tail: Endings) -> Endings:
+    """Return the endings of `head`, then those of `tail`."""
+    probes = (np.concatenate([getattr(e.probes, f.name) for e in (head, tail)]) for f in fields(Probes))
+    weights, tangent = (np.concatenate(pair) for pair in ((head.weights, tail.weights), (head.tangent, tail.tangent)))
+    patch = np.concatenate([head.patch, head.count + tail.patch])
+    return Endings(Probes(*probes), weights, patch, head.count + tail.count, tangent)
 
 
 def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:

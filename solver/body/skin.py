@@ -64,12 +64,12 @@ def crosses_itself(line: Array) -> bool:
     start, end = line[:-1], line[1:]
     low, high = np.minimum(start, end), np.maximum(start, end)
     overlap = (high[:, None] >= low).all(axis=2) & (high >= low[:, None]).all(axis=2)
-    one, other = np.nonzero(np.triu(overlap, 2))
-    return bool(np.any(_cuts(start, end, one, other) & _cuts(start, end, other, one)))
+    piece, partner = np.nonzero(np.triu(overlap, 2))
+    return bool(np.any(_cuts(start, end, piece, partner) & _cuts(start, end, partner, piece)))
 
 
-def _cuts(start: Array, end: Array, one: Indices, other: Indices) -> Flags:
-    """Return whether the line through each piece `one` (p,) has the ends of the piece `other` (p,) on both sides."""
-    along, first, last = (end - start)[one], start[other] - start[one], end[other] - start[one]
+def _cuts(start: Array, end: Array, piece: Indices, partner: Indices) -> Flags:
+    """Return whether the line through each `piece` (p,) has the ends of its `partner` (p,) on both sides."""
+    along, first, last = (end - start)[piece], start[partner] - start[piece], end[partner] - start[piece]
     sides = [along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0] for to in (first, last)]
     return np.asarray(sides[0] * sides[1] < 0.0)

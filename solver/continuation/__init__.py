@@ -241,8 +241,8 @@ def with_value(load: LoadState, by: int, value: float) -> LoadState:
 
 def jumped_branch(finger: BranchBody, before: EquilibriumState, after: EquilibriumState) -> bool:
     """Return whether a step led to another branch, on which the skin is folded."""
-    one, other = finger.skin_compression(before), finger.skin_compression(after)
-    return other.least < BRANCH.squeeze * one.least or other.kink > BRANCH.crease or finger.crosses(after)
+    start, end = finger.skin_compression(before), finger.skin_compression(after)
+    return end.least < BRANCH.squeeze * start.least or end.kink > BRANCH.crease or finger.crosses(after)
 
 
 def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, float]:

@@ -80,16 +80,16 @@ class LoadState(NamedTuple):
         """Whether a state depends on its load path: friction on each node then opposes the node's last motion."""
         return self.sense == 0 and not self.frictionless
 
-    def towards(self, other: "LoadState", part: float) -> "LoadState":
-        """Return the load state a `part` of the way to `other`; a bound where there was none is taken whole."""
+    def towards(self, target: "LoadState", part: float) -> "LoadState":
+        """Return the load state a `part` of the way to `target`; a bound where there was none is taken whole."""
         if part == 1.0:
-            return other
-        tau = self.tau + part * (other.tau - self.tau) if max(self.tau, other.tau) < np.inf else other.tau
+            return target
+        tau = self.tau + part * (target.tau - self.tau) if max(self.tau, target.tau) < np.inf else target.tau
         depth, travel = (
-            self.depth + part * (other.depth - self.depth),
-            self.travel + part * (other.travel - self.travel),
+            self.depth + part * (target.depth - self.depth),
+            self.travel + part * (target.travel - self.travel),
         )
-        return LoadState(depth, self.mu + part * (other.mu - self.mu), tau, other.sense, travel)
+        return LoadState(depth, self.mu + part * (target.mu - self.mu), tau, target.sense, travel)
 
     def validate(self) -> "LoadState":
         """Return a copy with floats, for the kernels. Raises ValueError for values that are not allowed."""
@@ -115,14 +115,14 @@ class ForceLoad(NamedTuple):
         drag = None if self.tangential is None else finite("tangential", self.tangential)
         return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
 
-    def towards(self, other: "ForceLoad", part: float) -> "ForceLoad":
-        """Return the forces a `part` of the way to `other`, which gives the same quantities."""
-        tangential = other.tangential
+    def towards(self, target: "ForceLoad", part: float) -> "ForceLoad":
+        """Return the forces a `part` of the way to `target`, which gives the same quantities."""
+        tangential = target.tangential
         if tangential is not None:
             start = 0.0 if self.tangential is None else self.tangential
             tangential = start + part * (tangential - start)
-        normal = self.normal + part * (other.normal - self.normal)
-        return ForceLoad(normal, tangential, self.travel + part * (other.travel - self.travel))
+        normal = self.normal + part * (target.normal - self.normal)
+        return ForceLoad(normal, tangential, self.travel + part * (target.travel - self.travel))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -212,11 +212,11 @@ class FiniteFinger(Finger[FinitePatches]):
         """Do as `Finger` says."""
         return FinitePatches(self.body, endings)
 
-    def transfer(self, state: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
-        """Return `state` of the mesh of `other`, interpolated to this mesh as a start."""
-        if other not in self._bridges:
-            self._bridges[other] = MeshTransfer.of(other.places, self.places)
-        return self._bridges[other].transfer_state(state)
+    def transfer(self, state: EquilibriumState, source: "FiniteFinger") -> EquilibriumState:
+        """Return `state` of the mesh of `source`, interpolated to this mesh as a start."""
+        if source not in self._bridges:
+            self._bridges[source] = MeshTransfer.of(source.places, self.places)
+        return self._bridges[source].transfer_state(state)
 
     @cached_property
     def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, MeshTransfer]":

@@ -96,9 +96,9 @@ class Aim(NamedTuple):
     press: float  # depth [mm], or a given normal force [N/mm]
     along: float  # travel along +x [mm], or a given tangential force on the skin along +x [N/mm]
 
-    def towards(self, other: "Aim", part: float) -> "Aim":
-        """Return the aim a `part` of the way to `other`."""
-        return Aim(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
+    def towards(self, target: "Aim", part: float) -> "Aim":
+        """Return the aim a `part` of the way to `target`."""
+        return Aim(*(a + part * (b - a) for a, b in zip(self, target, strict=True)))
 
 
 class Way:

@@ -188,9 +188,9 @@ def nested_numbers_of_all(
     `numbers` (c, COUNT) are those on the mesh of the answers.
     """
     states: dict[int, EquilibriumState] = {}
-    for number, one in enumerate(solutions):
+    for number, solution in enumerate(solutions):
         try:
-            states[number] = nearest(one.scene, mesh) if one.steps is None else end(one.scene, mesh)
+            states[number] = nearest(solution.scene, mesh) if solution.steps is None else end(solution.scene, mesh)
         except SolveFailure:
             continue
     out: list[NestedNumbers | None] = [None] * len(solutions)
@@ -198,7 +198,7 @@ def nested_numbers_of_all(
         with_forces = [(state, forces_of(solutions[number].scene, state.load)) for number, state in states.items()]
         values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
-            one = solutions[number]
-            there = nested_state(mesh, state, value, change, one.steps)
-            out[number] = None if there is None else with_shares(one.scene, numbers[number], there, one.steps)
+            solution = solutions[number]
+            there = nested_state(mesh, state, value, change, solution.steps)
+            out[number] = None if there is None else with_shares(solution.scene, numbers[number], there, solution.steps)
     return out

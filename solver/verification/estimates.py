@@ -88,17 +88,17 @@ def measure(request: Request) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
 
 def _estimate_published(request: Request, kinematics: Kinematics) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
     truths = known_truths(request, kinematics)
-    chosen = [scene for scene in cases(kinematics) if scene.title in truths]
-    if not chosen:
+    surfaces = [scene for scene in cases(kinematics) if scene.title in truths]
+    if not surfaces:
         return iter([LeftOut(f"No truth is known at {kinematics} strain.")])
 
     def rows_at(tolerance: float) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
-        scenes = [replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen]
+        scenes = [replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in surfaces]
         runs: list[Sequence[Prediction | SolveFailure]] = []
         took_s, results = median_time(lambda: runs.append(solve_many(scenes))), runs[-1]
         rows: list[Estimate] = []
         answers = [a for a in results if isinstance(a, Prediction)]
-        for scene, result in zip(chosen, results, strict=True):
+        for scene, result in zip(surfaces, results, strict=True):
             if isinstance(result, SolveFailure):
                 yield LeftOut(f"{scene.title} at {kinematics} strain has no answer at {percent(tolerance)}: {result}")
         for answer in answers:

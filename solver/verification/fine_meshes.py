@@ -70,8 +70,8 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) ->
     depth = max(expected_depth(scene) for scene in scenes)
     finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE))
     for scene in scenes:
-        marched = scene.viscoelastic and depends_on_way(scene)
-        state = (end if marched else settled_state)(scene, finger, times)
+        stepwise = scene.viscoelastic and depends_on_way(scene)
+        state = (end if stepwise else settled_state)(scene, finger, times)
         if finger.reaches_out(state, finger.displacement(state), state.load.depth):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
         yield np.abs(finger.numbers([state])[0])

@@ -8,8 +8,8 @@ def fill_marks(text: str, name: str, text_between: str) -> str:
     'a <!-- x: begin -->\nnew\n<!-- x: end --> b'
     """
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    head, _, rest = text.partition(begin)
-    _, mark, tail = rest.partition(end)
+    head, _, after = text.partition(begin)
+    _, mark, tail = after.partition(end)
     if not mark:
         raise ValueError(f"The page has no marks for {name}.")
     return f"{head}{begin}\n{text_between}\n{end}{tail}"

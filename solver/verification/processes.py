@@ -115,8 +115,8 @@ def _of_children() -> float:
 def _memory(kinematics: Kinematics, python: tuple[str, ...]) -> Memory | LeftOut:
     code = MEMORY.format(kinematics=kinematics, tolerance=TOLERANCE)
     try:
-        done = subprocess.run([*python, "-c", code], check=True, capture_output=True, text=True, timeout=LONGEST)
+        process = subprocess.run([*python, "-c", code], check=True, capture_output=True, text=True, timeout=LONGEST)
     except (subprocess.SubprocessError, OSError) as bad:
         return LeftOut(f"Memory of a solve at {kinematics} strain could not be measured here: {bad}.")
-    idle, solving, dofs, estimate = json.loads(done.stdout)
+    idle, solving, dofs, estimate = json.loads(process.stdout)
     return Memory(kinematics, TOLERANCE, dofs, estimate, idle, solving)

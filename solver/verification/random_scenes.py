@@ -33,10 +33,10 @@ def random_scene(family: str, number: int, kinematics: Kinematics) -> Scene:
     draw = np.random.default_rng([number, *family.encode()])
     while True:
         try:
-            drawn = FAMILIES[family](draw, number, kinematics)
+            sample = FAMILIES[family](draw, number, kinematics)
         except SceneError:  # impossible outline, or no room for the receptor
             continue
-        return replace(drawn, title=f"{family} {number}", solve=replace(drawn.solve, kinematics=kinematics))
+        return replace(sample, title=f"{family} {number}", solve=replace(sample.solve, kinematics=kinematics))
 
 
 def _common(draw: Draw, most: float = 0.7) -> Scene:
@@ -56,8 +56,8 @@ def _axis(draw: Draw, number: int, _: Kinematics) -> Scene:
 
     def with_tissue(name: str) -> Materials:
         tissue = tissues.of(name)
-        other = Material(tissue.E * _by_logarithm(draw, 0.4, 2.5), draw.uniform(0.3, 0.499))
-        return replace(tissues, **{name: other})
+        neighbour = Material(tissue.E * _by_logarithm(draw, 0.4, 2.5), draw.uniform(0.3, 0.499))
+        return replace(tissues, **{name: neighbour})
 
     changes: Sequence[Callable[[], dict[str, object]]] = (
         lambda: {"loading": replace(loads, indentation=draw.uniform(0.2, 2.2))},

@@ -65,15 +65,15 @@ def measure(request: Request) -> Iterator[Speed | LeftOut]:
 
 def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: float) -> Speed:
     """Return the row of one mesh; `patience` is the time for repetitions, by that of a full run."""
-    chosen = [scene for scene in cases(kind) if scene.title in truths]
-    deepest = max(chosen, key=lambda scene: scene.loading.depth)
-    prepared, setup, floors_before = _prepare(kind, deepest, fineness, 0.3 * patience)
+    surfaces = [scene for scene in cases(kind) if scene.title in truths]
+    deepest = max(surfaces, key=lambda scene: scene.loading.depth)
+    preparation, setup, floors_before = _prepare(kind, deepest, fineness, 0.3 * patience)
     mesh = MESHED[kind](deepest, fineness, False)
     first: list[float] = []
-    solved: list[Scene] = []
+    solvable: list[Scene] = []
     errors: dict[str, tuple[float, ...]] = {}
     failed: dict[str, str] = {}
-    for scene in chosen:
+    for scene in surfaces:
         try:
             state = mesh.solve(scene)
         except SolveFailure as failure:
@@ -82,15 +82,15 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
         true = np.array(truths[scene.title].numbers)
         off = np.abs(mesh.numbers(state) - true) / np.where(true > 0.0, true, 1.0)
         errors[scene.title] = tuple(off.tolist())
-        solved.append(scene)
+        solvable.append(scene)
         first.append(median_time(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
-    together = median_time(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
-    onward, between = _onward(mesh, solved, patience)
-    floors = floors_before if prepared else between  # measured at the same time as most of the work
+    together = median_time(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solvable]), 5, 0.5 * patience)
+    onward, between = _onward(mesh, solvable, patience)
+    floors = floors_before if preparation else between  # measured at the same time as most of the work
     next_s = median(onward) if onward else None
     return Speed(
-        kind, fineness, mesh.dofs, setup, prepared, median(floors),
-        prepared + median(first), next_s, prepared + together, len(solved), errors, failed,
+        kind, fineness, mesh.dofs, setup, preparation, median(floors),
+        preparation + median(first), next_s, preparation + together, len(solvable), errors, failed,
     )  # fmt: skip
 
 
@@ -106,8 +106,8 @@ def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> 
         spans.append((mesh.prepared_s, mesh.setup_s))
         floors.append(mesh.floor())
         del mesh
-    prepared, setup = zip(*spans, strict=True)
-    return median(prepared), median(setup), floors
+    preparation, setup = zip(*spans, strict=True)
+    return median(preparation), median(setup), floors
 
 
 def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:

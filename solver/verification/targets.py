@@ -90,15 +90,15 @@ def _at_error(
 ) -> Target:
     rows = [row for row in request.of(Speed) if row.kinematics == kinematics]
     doubts = {name: truth.doubt[0] for name, truth in known_truths(request, kinematics).items()}
-    known = [r for r in rows if r.judged_error is not None]
-    accurate = [(took, r) for r in known if r.largest_error(doubts) <= error and (took := time(r)) is not None]
+    with_error = [r for r in rows if r.judged_error is not None]
+    accurate = [(took, r) for r in with_error if r.largest_error(doubts) <= error and (took := time(r)) is not None]
     if not accurate:
-        best = min(known, key=lambda r: r.largest_error({}), default=None)
+        best = min(with_error, key=lambda r: r.largest_error({}), default=None)
         if best is None:
             return target
-        missed = best.largest_error({}) > error
-        words = "no mesh that was tried is below: the best is at" if missed else "the truth is too uncertain to tell:"
-        tried = missed and len(rows) >= len((QUICK if request.quick else MESHES)[kinematics])
+        coarse = best.largest_error({}) > error
+        words = "no mesh that was tried is below: the best is at" if coarse else "the truth is too uncertain to tell:"
+        tried = coarse and len(rows) >= len((QUICK if request.quick else MESHES)[kinematics])
         return replace(target, how=f"{words} {_error(best, doubts)}", tried=tried)
     took, best = min(accurate, key=lambda pair: pair[0])
     how = f"{best.dofs} unknowns, error {_error(best, doubts)}"
@@ -155,5 +155,5 @@ def _growth(rows: Sequence[Growth], target: Target) -> Target:
     return replace(target, measured=power, how=how)
 
 
-def _part(measured: int, total: int, what: str) -> str:
-    return f"{measured} of {total} {what}" if measured < total else ""
+def _part(count: int, total: int, what: str) -> str:
+    return f"{count} of {total} {what}" if count < total else ""

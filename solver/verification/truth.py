@@ -55,8 +55,8 @@ def cases(kinematics: Kinematics) -> list[Scene]:
 def measure(request: Request) -> Iterator[Truth | LeftOut]:
     """Yield the truth of every case; a quick run has coarser meshes, and the judged cases only."""
     for kinematics in KINEMATICS:
-        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not request.quick]
-        yield from _truths(request, kinematics, chosen)
+        surfaces = [s for s in cases(kinematics) if s.title in JUDGED or not request.quick]
+        yield from _truths(request, kinematics, surfaces)
 
 
 def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -65,20 +65,20 @@ def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
 
 
-def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
+def _truths(request: Request, kinematics: Kinematics, surfaces: list[Scene]) -> Iterator[Truth | LeftOut]:
     start = clock()
-    deepest = max(chosen, key=lambda scene: scene.loading.depth)
+    deepest = max(surfaces, key=lambda scene: scene.loading.depth)
     meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
-    shared = (clock() - start) / len(chosen)
-    for number, scene in enumerate(sorted(chosen, key=lambda scene: scene.title not in JUDGED)):
+    setup_s = (clock() - start) / len(surfaces)
+    for number, scene in enumerate(sorted(surfaces, key=lambda scene: scene.title not in JUDGED)):
         if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # other subjects need these
-            left = len(chosen) - number
-            yield LeftOut(f"Time was over before the truth of {left} cases at {kinematics} strain was known.")
+            count = len(surfaces) - number
+            yield LeftOut(f"Time was over before the truth of {count} cases at {kinematics} strain was known.")
             return
-        yield _truth(scene, meshes, shared)
+        yield _truth(scene, meshes, setup_s)
 
 
-def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], shared: float) -> Truth:
+def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], setup_s: float) -> Truth:
     """Return the truth of a case; the judged ones have one, and of others the solver is asked first."""
     start, kinematics = clock(), scene.solve.kinematics
     try:
@@ -88,7 +88,7 @@ def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], shared: f
     except SolveFailure as failure:
         return Truth(kinematics, scene.title, (), (), (), clock() - start, str(failure))
     mean, doubt = mean_and_doubt(solves)
-    elapsed_s, dofs = clock() - start + shared, tuple(mesh.dofs for mesh in meshes)
+    elapsed_s, dofs = clock() - start + setup_s, tuple(mesh.dofs for mesh in meshes)
     return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, elapsed_s, "")
 
 

@@ -26,7 +26,7 @@ def test_half_width_and_pressure_are_those_of_hertz(case):
     contact = contacts.hertz(young, nu, radius, load, half_width, peak)
     assert contact.load == pytest.approx(load, rel=1e-10)
     assert contact.half_width == pytest.approx(half_width, rel=1e-3)
-    assert contact.touched == pytest.approx(half_width, abs=0.51 * ELEMENT["small"] * half_width)
+    assert contact.half_extent == pytest.approx(half_width, abs=0.51 * ELEMENT["small"] * half_width)
     assert contact.peak == pytest.approx(peak, rel=1e-3)
     assert contact.worst < 2e-3
 

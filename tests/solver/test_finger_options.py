@@ -23,11 +23,11 @@ def solve_finger(kinematics, finger=None, bone=None, mu=0.3):
 @pytest.mark.parametrize("ratio", [1e6, 1e10])
 def test_a_meshed_bone_that_is_stiff_enough_gives_the_rigid_bones_answer(kinematics, ratio):
     rigid = solve_finger(kinematics)
-    meshed = solve_finger(kinematics, Finger(bone="meshed"), Material(0.034 * ratio, 0.3))
-    assert meshed.dofs > rigid.dofs
-    assert meshed.sed_ending == pytest.approx(rigid.sed_ending, rel=10.0 / ratio + 1e-8)
-    assert meshed.normal_force == pytest.approx(rigid.normal_force, rel=10.0 / ratio + 1e-8)
-    assert max(meshed.audits["equilibrium_x"], meshed.audits["equilibrium_y"]) < 1e-5
+    with_bone = solve_finger(kinematics, Finger(bone="meshed"), Material(0.034 * ratio, 0.3))
+    assert with_bone.dofs > rigid.dofs
+    assert with_bone.sed_ending == pytest.approx(rigid.sed_ending, rel=10.0 / ratio + 1e-8)
+    assert with_bone.normal_force == pytest.approx(rigid.normal_force, rel=10.0 / ratio + 1e-8)
+    assert max(with_bone.audits["equilibrium_x"], with_bone.audits["equilibrium_y"]) < 1e-5
 
 
 @pytest.mark.parametrize("kinematics", KINEMATICS)

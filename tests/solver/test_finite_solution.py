@@ -113,11 +113,11 @@ def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves
 
 def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeformed_finger_does():
     first, second = finite(SLIPPERINESS[0]), finite(SLIPPERINESS[1])
-    own, shared = Meshes(), Meshes()
-    coarse_solution(first, 1.5, 4.0, shared)
-    lows = [coarse_solution(second, 1.5, 4.0, meshes) for meshes in (shared, own)]
+    own, common = Meshes(), Meshes()
+    coarse_solution(first, 1.5, 4.0, common)
+    lows = [coarse_solution(second, 1.5, 4.0, meshes) for meshes in (common, own)]
     assert lows[0].state.iterations < lows[1].state.iterations
-    tops = [refine(second, 6.0, low, meshes).top.state for low, meshes in zip(lows, (shared, own), strict=True)]
+    tops = [refine(second, 6.0, low, meshes).top.state for low, meshes in zip(lows, (common, own), strict=True)]
     np.testing.assert_allclose(tops[0].u, tops[1].u, rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(tops[0].reaction, tops[1].reaction, rtol=0.0, atol=1e-11)
 
@@ -161,8 +161,8 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
 
 
 def test_a_shear_limit_acts_alike_on_both_sides_of_a_friction_of_one():
-    capped = Scene(loading=Loading(1.5, "-x"), friction=Friction(1.0, 0.003), solve=Solve("finite", tolerance=0.3))
-    below, above = solve_many(replace(capped, friction=Friction(mu, 0.003)) for mu in (1.0 - 1e-9, 1.0 + 1e-9))
+    scene = Scene(loading=Loading(1.5, "-x"), friction=Friction(1.0, 0.003), solve=Solve("finite", tolerance=0.3))
+    below, above = solve_many(replace(scene, friction=Friction(mu, 0.003)) for mu in (1.0 - 1e-9, 1.0 + 1e-9))
     assert above.sed_ending == pytest.approx(below.sed_ending, rel=1e-8)
     assert above.tangential_force == pytest.approx(below.tangential_force, rel=1e-8)
 

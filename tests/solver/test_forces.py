@@ -95,9 +95,9 @@ def test_a_drag_of_the_friction_limit_is_the_settled_slide_and_more_is_refused_i
     sliding = solve(scene)
     limit = sliding.tangential_force  # below mu N, since part of the skin slips at the bound
     assert limit < 0.999 * 0.24 * 0.1
-    same = solve(under_force(scene, normal_force=0.1, tangential_force=limit))
-    assert same.sed_ending == pytest.approx(sliding.sed_ending, rel=1e-6)
-    assert same.error_estimate < 0.1  # though coarser meshes slide a little earlier
+    at_limit = solve(under_force(scene, normal_force=0.1, tangential_force=limit))
+    assert at_limit.sed_ending == pytest.approx(sliding.sed_ending, rel=1e-6)
+    assert at_limit.error_estimate < 0.1  # though coarser meshes slide a little earlier
     with pytest.raises(NoSteadyState, match=r"outside the friction limit.*slides from 0\.0"):
         solve(under_force(scene, normal_force=0.1, tangential_force=(limit + 0.024) / 2))
 

@@ -73,7 +73,7 @@ def test_the_same_question_is_answered_bit_by_bit_the_same_again():
     scenes = [scene(surface) for surface in SLIPPERINESS]
     first = solve_many(scenes)
     second = solve_many(scenes)
-    for prediction, repeated in zip(first, second, strict=True):
-        assert (prediction.sed_ending, prediction.error_estimate) == (repeated.sed_ending, repeated.error_estimate)
-        np.testing.assert_array_equal(prediction.displacement, repeated.displacement)
+    for prediction, repeat in zip(first, second, strict=True):
+        assert (prediction.sed_ending, prediction.error_estimate) == (repeat.sed_ending, repeat.error_estimate)
+        np.testing.assert_array_equal(prediction.displacement, repeat.displacement)
     assert solve(scenes[0]).sed_ending == solve(scenes[0]).sed_ending

@@ -63,8 +63,8 @@ def test_a_bone_too_soft_to_count_as_rigid_is_told():
     slippery = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
     soft = replace(slippery, materials=replace(slippery.materials, bone=Material(1.0, 0.3)))
     assert any('finger.bone = "meshed"' in warning for warning in solve(soft).warnings)
-    meshed = replace(soft, finger=replace(soft.finger, bone="meshed"))
-    assert not any("bone" in warning for warning in solve(meshed).warnings)
+    with_bone = replace(soft, finger=replace(soft.finger, bone="meshed"))
+    assert not any("bone" in warning for warning in solve(with_bone).warnings)
 
 
 @pytest.mark.slow
@@ -80,9 +80,9 @@ def test_evidence_of_another_kind_is_refused():
         Solve(evidence="guessed")
 
 
-def residual_overstress(settled, marched):
+def residual_overstress(settled, stepwise):
     """Return what a whole course has at the ending above the settled SED, when a settled answer says that it looks."""
-    course, slip = marched.history, entry(settled, "viscosity")["from"]["slide_s"]
+    course, slip = stepwise.history, entry(settled, "viscosity")["from"]["slide_s"]
     return np.interp(1.0 + slip, course.time, course.sed_ending) / settled.sed_ending - 1.0
 
 
@@ -91,9 +91,9 @@ def test_a_relaxing_finger_solved_as_settled_is_told_what_it_still_holds_and_one
     dermis = replace(slippery.materials.dermis, prony=(Relaxation(0.3, 1.0),))
     settled = solve(replace(slippery, materials=replace(slippery.materials, dermis=dermis)))
     assert any("viscosity" in warning and "history" in warning for warning in settled.warnings)
-    marched = solve(replace(settled.scene, solve=Solve("small", "history", 0.5)))
-    assert entry(marched, "viscosity")["estimate"] == 0.0
-    assert entry(settled, "viscosity")["estimate"] == pytest.approx(residual_overstress(settled, marched), rel=0.1)
+    stepwise = solve(replace(settled.scene, solve=Solve("small", "history", 0.5)))
+    assert entry(stepwise, "viscosity")["estimate"] == 0.0
+    assert entry(settled, "viscosity")["estimate"] == pytest.approx(residual_overstress(settled, stepwise), rel=0.1)
 
 
 @pytest.mark.slow
@@ -103,8 +103,8 @@ def test_a_relaxing_finger_solved_as_settled_is_told_what_it_still_holds_and_one
 )
 def test_what_tissues_would_still_hold_is_what_a_course_in_small_steps_on_a_finer_mesh_has(kinematics, surface):
     settled = solve(replace(scene(surface), solve=Solve(kinematics)))
-    marched = solve(replace(relaxing_scene(settled.scene), solve=Solve(kinematics, "history")))
-    assert entry(settled, "viscosity")["estimate"] == pytest.approx(residual_overstress(settled, marched), rel=0.1)
+    stepwise = solve(replace(relaxing_scene(settled.scene), solve=Solve(kinematics, "history")))
+    assert entry(settled, "viscosity")["estimate"] == pytest.approx(residual_overstress(settled, stepwise), rel=0.1)
 
 
 def test_a_rigid_bone_too_stiff_to_be_meshed_with_the_tissues_leaves_the_estimate_with_the_reason():

@@ -31,16 +31,16 @@ def test_skin_that_is_squeezed_evenly_has_one_stretch_and_no_crease():
 def test_stretch_at_the_ends_of_elements_is_exact_where_it_varies_linearly():
     after = BEFORE.copy()
     after[:, 0] -= 0.2 * BEFORE[:, 0] ** 2  # stretch 1 - 0.4 x
-    seen = SkinCompression.of(BEFORE, after, LOOSE, OPEN)
-    assert seen.lowest == pytest.approx(1.0 - 0.4 * BEFORE[-1, 0], rel=1e-12)
-    assert seen.place == ELEMENTS - 1
-    assert seen.least == pytest.approx(1.0 - 0.2 * (BEFORE[-1, 0] + BEFORE[-2, 0]), rel=1e-12)  # of its last half
+    skin = SkinCompression.of(BEFORE, after, LOOSE, OPEN)
+    assert skin.lowest == pytest.approx(1.0 - 0.4 * BEFORE[-1, 0], rel=1e-12)
+    assert skin.place == ELEMENTS - 1
+    assert skin.least == pytest.approx(1.0 - 0.2 * (BEFORE[-1, 0] + BEFORE[-2, 0]), rel=1e-12)  # of its last half
 
 
 def test_a_crease_is_the_jump_of_the_tangent():
     squeeze, angle = 0.6, 1.1
-    seen = SkinCompression.of(BEFORE, bent_at_a_joint(squeeze, angle), LOOSE, OPEN)
-    assert seen.kink == pytest.approx(2.0 * squeeze * np.sin(angle / 2.0), rel=1e-12)
+    skin = SkinCompression.of(BEFORE, bent_at_a_joint(squeeze, angle), LOOSE, OPEN)
+    assert skin.kink == pytest.approx(2.0 * squeeze * np.sin(angle / 2.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("reason", ["touching", "stretched", "held"])
@@ -54,9 +54,9 @@ def test_a_jump_of_the_tangent_is_no_crease_where_skin_is(reason):
 def test_held_skin_is_not_squeezed():
     after = BEFORE.copy()
     after[6, 0] = BEFORE[5, 0] + 0.01
-    squeezed, held = (SkinCompression.of(BEFORE, after, loose, OPEN) for loose in (LOOSE, np.arange(ELEMENTS) < 2))
-    assert squeezed.place == 2
-    assert squeezed.least < 0.2
+    loose_skin, held = (SkinCompression.of(BEFORE, after, loose, OPEN) for loose in (LOOSE, np.arange(ELEMENTS) < 2))
+    assert loose_skin.place == 2
+    assert loose_skin.least < 0.2
     assert held.least == pytest.approx(1.0)
     assert SkinCompression.of(BEFORE, after, ~LOOSE, OPEN).least == np.inf
 

@@ -26,7 +26,7 @@ def return_nine(answer, **_):
     return 9.0 if isinstance(answer, Prediction) else 0.0
 
 
-def end_refinement(monkeypatch, finer, *, missed=None):
+def end_refinement(monkeypatch, finer, *, error=None):
     """Let all refined meshes end as `finer`; return the list of requested meshes, by fineness or lines."""
     coarse_answers, finenesses = FiniteMeshing.answers, []
 
@@ -35,15 +35,15 @@ def end_refinement(monkeypatch, finer, *, missed=None):
         return [finer] * len(scenes) if isinstance(fineness, Lines) else coarse_answers(self, scenes, fineness, watch)
 
     monkeypatch.setattr(FiniteMeshing, "answers", answers)
-    if missed is not None:
-        monkeypatch.setattr(solution, "_error_by_tolerance", missed)
+    if error is not None:
+        monkeypatch.setattr(solution, "_error_by_tolerance", error)
     return finenesses
 
 
 def test_an_answer_that_a_finer_mesh_does_not_find_is_told_as_the_coarser_has_it_with_a_sentence(monkeypatch):
     scene = stiffening_scene(0.3, 0.01)
     coarse = solve(replace(scene, solve=replace(scene.solve, tolerance=0.5)))
-    finenesses = end_refinement(monkeypatch, NotConverged("lost"), missed=return_nine)
+    finenesses = end_refinement(monkeypatch, NotConverged("lost"), error=return_nine)
     prediction = solve(scene)
     assert len(finenesses) == 2
     assert (prediction.sed_ending, prediction.error_estimate) == (coarse.sed_ending, coarse.error_estimate)
@@ -59,7 +59,7 @@ def test_a_tolerance_so_strict_that_its_first_mesh_finds_nothing_does_not_lose_t
 
 def test_a_state_that_a_finer_mesh_puts_far_beyond_its_limit_is_refused_with_that_limit(monkeypatch):
     failure = NoSteadyState("beyond", limit_mu=0.29)
-    end_refinement(monkeypatch, failure, missed=return_nine)
+    end_refinement(monkeypatch, failure, error=return_nine)
     with pytest.raises(NoSteadyState, match=r"^Beyond\.$") as refusal:
         solve(stiffening_scene(0.3, 0.01))
     assert refusal.value.limit_mu == 0.29
@@ -68,13 +68,13 @@ def test_a_state_that_a_finer_mesh_puts_far_beyond_its_limit_is_refused_with_tha
 @pytest.mark.parametrize("tolerance", [0.01, None])
 def test_a_state_as_near_its_limit_as_limits_are_known_is_told_by_a_coarser_mesh_with_a_warning(monkeypatch, tolerance):
     failure = NoSteadyState("beyond", limit_mu=0.299)
-    end_refinement(monkeypatch, failure, missed=return_nine)
+    end_refinement(monkeypatch, failure, error=return_nine)
     prediction = solve(stiffening_scene(0.3, tolerance))
     assert "That mesh ends settled sliding at mu = 0.299, which is known to 3 %" in " ".join(prediction.warnings)
 
 
 def test_a_number_of_which_little_is_known_near_its_limit_gives_way_to_the_limit(monkeypatch):
-    end_refinement(monkeypatch, NoSteadyState("beyond", limit_mu=0.299), missed=return_nine)
+    end_refinement(monkeypatch, NoSteadyState("beyond", limit_mu=0.299), error=return_nine)
     monkeypatch.setattr(solution, "USABLE_ESTIMATE", 1e-6)
     with pytest.raises(NoSteadyState, match=r"^Beyond\.$"):
         solve(stiffening_scene(0.3, 0.01))

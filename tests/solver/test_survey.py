@@ -88,15 +88,15 @@ def test_a_survey_of_answers_holds_every_estimate_of_the_program_against_fine_me
 
 def test_what_a_file_keeps_is_not_solved_again_and_stands_in_the_page(tmp_path, monkeypatch, capsys):
     keep, page = tmp_path / "kept.json", tmp_path / "page.md"
-    kept = "| axis | finite | 9 | 90 % |"
-    page.write_text(f"Before.\n<!-- judged: begin -->\n| axis | small | 0 |\n{kept}\n<!-- judged: end -->\nAfter.\n")
+    entry = "| axis | finite | 9 | 90 % |"
+    page.write_text(f"Before.\n<!-- judged: begin -->\n| axis | small | 0 |\n{entry}\n<!-- judged: end -->\nAfter.\n")
     first = answers.Row("axis", 0, "small", (estimate(0.02, 0.01),))
     assert list(rows([("axis", 0, "small")], keep, lambda *_: first)) == [first]
     monkeypatch.setattr(sys, "argv", ["survey", "--scenes", "1", "--keep", str(keep), "--page", str(page)])
     main()
     line = "| axis | small | 1 | 100 % |"
     assert line in capsys.readouterr().out
-    judged = [row for row in page.read_text().splitlines() if row.startswith("| axis")]
-    assert judged[0].startswith(line)
-    assert judged[1:] == [kept]
+    lines = [row for row in page.read_text().splitlines() if row.startswith("| axis")]
+    assert lines[0].startswith(line)
+    assert lines[1:] == [entry]
     assert page.read_text().endswith("After.\n")

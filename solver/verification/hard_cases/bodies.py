@@ -191,11 +191,11 @@ def two_parts() -> tuple[Mesh, Mesh]:
     region = np.zeros(len(whole.elements), np.int64)
     region.reshape(-1, layers)[:, :STIFF_LAYERS] = 1  # elements of a column are numbered from its top down
     column = 2 * layers + 1
-    kept = np.arange(len(whole.nodes)).reshape(-1, column)[:, 2 * STIFF_LAYERS :]
+    nodes = np.arange(len(whole.nodes)).reshape(-1, column)[:, 2 * STIFF_LAYERS :]
     number = np.full(len(whole.nodes), -1)
-    number[kept.ravel()] = np.arange(kept.size)
+    number[nodes.ravel()] = np.arange(nodes.size)
     elements = number[whole.elements[region == 0]]
-    alone = Mesh(whole.nodes[kept.ravel()], elements, region[region == 0], number[whole.skin], number[kept[:, 0]])
+    alone = Mesh(whole.nodes[nodes.ravel()], elements, region[region == 0], number[whole.skin], number[nodes[:, 0]])
     return replace(whole, region=region), alone
 
 

@@ -10,7 +10,7 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.verification.hard_cases.outcome import Outcome, of_answer
 
-KNOWN = 1e-3  # indentation with many elements in contact, which is still far smaller than the epidermis [mm]
+RESOLVABLE = 1e-3  # indentation with many elements in contact, which is still far smaller than the epidermis [mm]
 MODEL = 0.005  # change of both laws by the rest of the finger, from there to lighter touches
 
 
@@ -58,12 +58,12 @@ def hertz(scene: Scene) -> Touch:
 
     skin = scene.materials.of("epidermis")
     modulus = skin.E / (1.0 - skin.nu**2)
-    yields, response = _finger(replace(scene, loading=replace(scene.loading, indentation=KNOWN)))
-    rest = yields[0] / yields[1] + log(yields[1]) / (pi * modulus)
+    yields, response = _finger(replace(scene, loading=replace(scene.loading, indentation=RESOLVABLE)))
+    offset = yields[0] / yields[1] + log(yields[1]) / (pi * modulus)
 
     def too_deep(power: float) -> float:
         force = 10.0**power
-        return force * (rest - log(force) / (pi * modulus)) - scene.loading.depth
+        return force * (offset - log(force) / (pi * modulus)) - scene.loading.depth
 
     force = 10.0 ** float(brentq(too_deep, -20.0, 0.0))
     return Touch(force, response * force**2, 2.0 * sqrt(4.0 * force * scene.finger.tip_radius / (pi * modulus)))

@@ -7,7 +7,7 @@ from typing import Literal
 
 from solver.scene import Scene
 from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Slide, Solve
-from solver.verification.hard_cases.light import KNOWN, of_light_touch
+from solver.verification.hard_cases.light import RESOLVABLE, of_light_touch
 from solver.verification.hard_cases.outcome import Outcome, of_scene
 from solver.verification.methods import Kinematics
 
@@ -119,10 +119,10 @@ def _friction(make: Callable[..., Scene]) -> Iterator[Case]:
 
 def _depths(make: Callable[..., Scene], *, small: bool) -> Iterator[Case]:
     for depth in (1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0):
-        yield _case(f"depth {depth:g} mm", make(depth=depth), run=of_light_touch if depth < KNOWN else of_scene)
+        yield _case(f"depth {depth:g} mm", make(depth=depth), run=of_light_touch if depth < RESOLVABLE else of_scene)
     yield _case("depth 2 mm", make(depth=2.0), ANSWER if small else EITHER)
     yield _case("depth 3 mm", make(depth=3.0), EITHER, slow=not small)
     for depth in (1e-6, 1e-3, 0.1, 2.0):
-        run = of_light_touch if depth < KNOWN else of_scene
+        run = of_light_touch if depth < RESOLVABLE else of_scene
         yield _case(f"depth {depth:g} mm without friction", make(0.0, depth=depth), run=run)
     yield _case("depth 3 mm without friction", make(0.0, depth=3.0), ANSWER if small else EITHER, slow=not small)

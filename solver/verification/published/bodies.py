@@ -153,10 +153,10 @@ def distort(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> M
         nodes[middles] = mesh.nodes[middles] + shift[sides].sum(axis=0) / 2
         nodes[mesh.elements[:, 8]] = mesh.nodes[mesh.elements[:, 8]] + shift[corners].sum(axis=1) / 4
         det = np.linalg.det(np.swapaxes(nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(Q2P1.corners)[1])
-        folded = det.min(axis=1) < 0.02 * det.max(axis=1)
-        if not folded.any():
+        folds = det.min(axis=1) < 0.02 * det.max(axis=1)
+        if not folds.any():
             return replace(mesh, nodes=nodes)
-        shift[np.unique(corners[folded])] *= 0.8
+        shift[np.unique(corners[folds])] *= 0.8
 
 
 def locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:

@@ -56,7 +56,7 @@ class Hertz:
 
     load: float  # [N/mm]
     half_width: float  # from the pressure's second moment, a = 2 sqrt(<x^2>) [mm]
-    touched: float  # half the distance from the first to the last touching node [mm]
+    half_extent: float  # half the distance from the first to the last touching node [mm]
     peak: float  # pressure in the middle [MPa]
     worst: float  # largest difference of the pressure from the ellipse inside 0.9 a, by the peak
     approach: float = 0.0  # of the plate to the cylinder's centre [mm]
@@ -159,12 +159,12 @@ def light(kinematics: Kinematics = "small", nu: float = 0.4999, wide: float | No
     if kinematics == "small":
         body = LinearBody.of(mesh, [Hooke(YOUNG, nu)])
         newton = Newton(body.condensed)
-        pressed = slide_from_guess(newton, NONE, touching_within(newton, 1.05), np.pi * plane / (4 * RADIUS))
+        state = slide_from_guess(newton, NONE, touching_within(newton, 1.05), np.pi * plane / (4 * RADIUS))
     else:
         body = FiniteBody.of(mesh, [NeoHooke(YOUNG, nu)])
         newton = Newton(body.condensed)
-        pressed = solve_full_slip(newton, LoadState(DEPTH, 0.0, sense=1), tolerance=1e-12)
-    load, length = float(pressed.normal.sum()), np.zeros(len(x))
+        state = solve_full_slip(newton, LoadState(DEPTH, 0.0, sense=1), tolerance=1e-12)
+    load, length = float(state.normal.sum()), np.zeros(len(x))
     for first in range(0, len(x) - 1, 2):
         length[first : first + 3] += (x[first + 2] - x[first]) * np.array([1.0, 4.0, 1.0]) / 6.0
-    return LightContact(body, newton, pressed, load, float(np.sqrt(4 * load * RADIUS / (np.pi * plane))), x, length)
+    return LightContact(body, newton, state, load, float(np.sqrt(4 * load * RADIUS / (np.pi * plane))), x, length)

@@ -68,8 +68,8 @@ def merge(page: Sequence[str], rows: Iterable[str]) -> list[str]:
     """Return the table of a page with new `rows` for their sets, sorted by strain and set; its header comes first."""
     header, rule, *new = rows
     by_set = {tuple(line.split(" | ")[:2]): line for line in (*page, *new) if line.startswith("| ")}
-    judged = [line for (_, *strain), line in sorted(by_set.items()) if strain in (["small"], ["finite"])]
-    return [header, rule, *sorted(judged, key=lambda line: line.split(" | ")[1] != "small")]
+    lines = [line for (_, *strain), line in sorted(by_set.items()) if strain in (["small"], ["finite"])]
+    return [header, rule, *sorted(lines, key=lambda line: line.split(" | ")[1] != "small")]
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     Near, ratio (estimate by error, median), rank (Spearman's, of estimate and error), sign (whether the nested value
     lies on the truth's side) and corrected (its error by the answer's, median) are those of the SED.
     """
-    decided = [row for row in rows if row.above is not None and row.error > EXACT]
-    by_number = [[row for row in decided if row.number == number] for number in GOALS]
+    decidable = [row for row in rows if row.above is not None and row.error > EXACT]
+    by_number = [[row for row in decidable if row.number == number] for number in GOALS]
     sed = by_number[0]
     within = [row for row in sed if row.met is not None and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]

@@ -32,12 +32,12 @@ def overstress_energy(T: Array, F: Array) -> Array:
 
 def overstress_tangent(T: Array, F: Array) -> Array:
     """Return dP_aA/dF_bB (..., a, A, b, B) [MPa] within a step."""
-    J, inverse, pulled, contraction = stress_parts(F, T)
+    J, inverse, product, contraction = stress_parts(F, T)
     expanded = (..., None, None, None, None)
     plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    outer = np.einsum("...aA,...bB->...aAbB", pulled, inverse)
+    outer = np.einsum("...aA,...bB->...aAbB", product, inverse)
     tangent = np.einsum("ab,...AB->...aAbB", np.eye(2), plane)
-    tangent = tangent - 2.0 / 3.0 * (outer + np.einsum("...aA,...bB->...aAbB", inverse, pulled))
+    tangent = tangent - 2.0 / 3.0 * (outer + np.einsum("...aA,...bB->...aAbB", inverse, product))
     tangent += 2.0 / 9.0 * contraction[expanded] * np.einsum("...aA,...bB->...aAbB", inverse, inverse)
     tangent += contraction[expanded] / 3.0 * np.einsum("...aB,...bA->...aAbB", inverse, inverse)
     return (J ** (-2.0 / 3.0))[expanded] * tangent
