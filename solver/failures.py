@@ -76,8 +76,8 @@ def at_end_of_path(depth: float, travel: float, reason: object) -> NotConverged:
     >>> str(at_end_of_path(-4.754, 0.0, "no equilibrium"))[:75]
     'the course was followed to where the drag holds the bone 4.754 mm above fir'
     """
-    lifted = f"where the drag holds the bone {-depth:.4g} mm above first touch"
-    there = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lifted
+    lift = f"where the drag holds the bone {-depth:.4g} mm above first touch"
+    there = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lift
     slip = f" and {abs(travel):.4g} mm of sliding" if travel else ""
     return NotConverged(
         f"the course was followed to {there}{slip}, and in the smallest steps no further: {reason}; ask for less "

@@ -102,7 +102,7 @@ def _estimates(measured: RunResults) -> Table:
     for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
         mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
         if mine:
-            met = _share([row.met for row in mine]) if name == NUMBERS[0] else "–"
+            met = _share([row.meets_tolerance for row in mine]) if name == NUMBERS[0] else "–"
             ratios = [row.estimate / max(row.error, 1e-9) for row in mine if row.above is not None]
             ratio = number(median(ratios), 2) if ratios else "–"
             above, near = _share([row.above for row in mine]), _share([row.near for row in mine])
@@ -240,7 +240,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "quantity": lambda row: row.quantity, "expected": lambda row: number(row.expected, 5),
             "obtained": lambda row: number(row.obtained, 5), "off": lambda row: percent(row.off),
             "of": lambda row: row.of, "allowed": lambda row: percent(row.allowed),
-            "verdict": lambda row: "met" if row.met else "MISSED",
+            "verdict": lambda row: "met" if row.agrees else "MISSED",
         },
     ),
     partial(_hard, kinematics="small"),

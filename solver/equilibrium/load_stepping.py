@@ -126,25 +126,25 @@ def find_root(at: Callable[[float], tuple[float, State]], start: float, close: f
     >>> round(find_root(lambda x: (x**3 - 8e-9, x), 0.0, 1e-18), 9)
     0.002
     """
-    here = there = start
+    previous = latest = start
     off, state = at(start)
     beyond, stride = off, FIRST if off < 0.0 else -FIRST
     while beyond * off > 0.0:
-        here, off = there, beyond
-        there, stride = there + stride, 2.0 * stride
+        previous, off = latest, beyond
+        latest, stride = latest + stride, 2.0 * stride
         if abs(stride) > FURTHEST:
             return None
-        beyond, state = at(there)
+        beyond, state = at(latest)
     for _ in range(SEARCHES):
         if abs(beyond) <= close:
             return state
-        between = there - beyond * (there - here) / (beyond - off)
+        between = latest - beyond * (latest - previous) / (beyond - off)
         new, state = at(between)
         if new * beyond < 0.0:
-            here, off = there, beyond
+            previous, off = latest, beyond
         else:
             off /= 2.0
-        there, beyond = between, new
+        latest, beyond = between, new
     return None
 
 

@@ -71,10 +71,10 @@ def distinct(numbers: NDArray[Numbers]) -> NDArray[Numbers]:
     array([1, 3])
     """
     # several times as fast for few numbers as np.unique, which imports masked arrays
-    ordered = np.sort(numbers, axis=None)
-    new = np.ones(len(ordered), bool)
-    new[1:] = ordered[1:] != ordered[:-1]
-    return ordered[new]
+    numbers = np.sort(numbers, axis=None)
+    new = np.ones(len(numbers), bool)
+    new[1:] = numbers[1:] != numbers[:-1]
+    return numbers[new]
 
 
 @dataclass(frozen=True, eq=False)  # no slots: cached properties need a dictionary

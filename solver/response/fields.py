@@ -117,8 +117,8 @@ class Sketch:
 
 def fields_of(prediction: Prediction, sketch: Sketch | None = None) -> Fields:
     """Return the picture of `prediction`; `sketch` is that of its mesh, where it was made before."""
-    drawn = sketch or Sketch.of(prediction.mesh, prediction.scene)
-    return drawn.fields(prediction.displacement, prediction.indentation, _values(prediction, drawn))
+    sketch = sketch or Sketch.of(prediction.mesh, prediction.scene)
+    return sketch.fields(prediction.displacement, prediction.indentation, _values(prediction, sketch))
 
 
 def _values(prediction: Prediction, sketch: Sketch) -> Array:

@@ -45,10 +45,8 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
     than an SA-II. nan where the finger ends before the ending does. `row_along` has their errors too.
     """
     out: list[Array] = []
-    for _, same in groupby(
-        predictions, lambda prediction: (id(prediction.geometry), prediction.scene.solve.kinematics)
-    ):
-        group = list(same)
+    for _, run in groupby(predictions, lambda prediction: (id(prediction.geometry), prediction.scene.solve.kinematics)):
+        group = list(run)
         along = _row_patches(group[0], arcs, receptor or group[0].scene.receptor)
         out += [along.responses(prediction.displacement) for prediction in group]
     return np.array(out)

@@ -147,7 +147,7 @@ def _solve_group(
     if kind == "small" and any(scene.solve.course == "history" for scene in scenes):
         return _march(scenes, meshing, watch)
     refinement = _refine(scenes, meshing, watch, rough)
-    return [_add_warnings(answer, more) for answer, more in zip(refinement.answers, refinement.warnings, strict=True)]
+    return [_add_warnings(answer, words) for answer, words in zip(refinement.answers, refinement.warnings, strict=True)]
 
 
 def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:

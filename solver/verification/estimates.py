@@ -57,7 +57,7 @@ class Estimate:
         return self.estimate < bound if self.doubt <= bound / 3.0 else None
 
     @property
-    def met(self) -> bool | None:
+    def meets_tolerance(self) -> bool | None:
         """Whether the true error lies below the requested tolerance; None where the truth is too uncertain."""
         return self.error <= self.tolerance if self.doubt <= self.tolerance / 3.0 else None
 
@@ -111,7 +111,7 @@ def _estimate_published(request: Request, kinematics: Kinematics) -> Iterator[Es
                 kinematics, tolerance, len(answers), max(a.dofs for a in answers), took_s,
                 sum(a.wall_s for a in answers), answers[0].setup_s, sum(a.estimate_s for a in answers),
                 max(a.error_estimate for a in answers),
-                None if any(row.met is None for row in sed) else max(row.error for row in sed),
+                None if any(row.meets_tolerance is None for row in sed) else max(row.error for row in sed),
             )  # fmt: skip
 
     tolerances = request.pick(TOLERANCES, TOLERANCES[:1])

@@ -308,8 +308,8 @@ def test_an_estimate_counts_only_where_the_truth_can_tell():
     assert estimate(0.003, 0.0001, doubt=0.002).above is None
     assert estimate(0.01, 0.004).near is True
     assert estimate(0.0021, 0.0).near is False  # ten times 0.02 %
-    assert estimate(0.01, 0.02).met is False
-    assert estimate(0.01, 0.0).met is True
+    assert estimate(0.01, 0.02).meets_tolerance is False
+    assert estimate(0.01, 0.0).meets_tolerance is True
 
 
 def test_growth_is_the_power_of_the_unknowns():

@@ -135,4 +135,4 @@ def test_a_bound_on_a_hertz_pressure_carries_the_elementary_integral(light, k, f
 def test_every_published_problem_of_the_page_is_met():
     rows = list(problems.measure(Request(quick=False, until=np.inf)))
     assert len(rows) > 60
-    assert [f"{row.problem}, {row.quantity}: off by {row.off:.2g}" for row in rows if not row.met] == []
+    assert [f"{row.problem}, {row.quantity}: off by {row.off:.2g}" for row in rows if not row.agrees] == []

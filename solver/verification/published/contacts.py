@@ -132,8 +132,8 @@ class LightContact:
 
     def shear(self, mu: float, part: float) -> EquilibriumState:
         """Return the state after a tangential force `part` mu P along -x on the far side of the pressed state."""
-        stuck = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
-        before = replace(self.press, state=stuck, load=LoadState(self.press.load.depth, mu))
+        sticks = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
+        before = replace(self.press, state=sticks, load=LoadState(self.press.load.depth, mu))
         return solve_under_forces(self.newton, before, ForceLoad(self.load, -part * mu * self.load))
 
     def slip(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:

@@ -58,8 +58,8 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     at = (Q2P1.shape(local)[0][:, None] @ mesh.nodes[mesh.elements[element]])[:, 0]
     r2 = np.sum(at * at, axis=1)[:, None, None]
     across: Array = np.eye(2) - 2 * at[:, :, None] * at[:, None] / r2  # +1 across the radius, -1 along it
-    closed: Array = _SHARE * (np.eye(2) + across * (OUTER**2 / r2))
-    misfit: Array = stress_at(body, displacement, element, local) - closed
+    closed_form: Array = _SHARE * (np.eye(2) + across * (OUTER**2 / r2))
+    misfit: Array = stress_at(body, displacement, element, local) - closed_form
     energy = 0.5 * float(np.sum(loads * displacement))
     true = 0.5 * 2 * np.pi * INNER * widening(nu)
     return (

@@ -28,7 +28,7 @@ class Problem:
     of: str = "expected"
 
     @property
-    def met(self) -> bool:
+    def agrees(self) -> bool:
         """Whether the obtained number is close enough."""
         return self.off <= self.allowed
 

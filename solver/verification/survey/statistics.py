@@ -24,7 +24,7 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
     decidable = [row for row in rows if row.above is not None and row.error > EXACT]
     by_number = [[row for row in decidable if row.number == number] for number in GOALS]
     sed = by_number[0]
-    within = [row for row in sed if row.met is not None and row.estimate <= row.tolerance]
+    within = [row for row in sed if row.meets_tolerance is not None and row.estimate <= row.tolerance]
     true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
     halves = [row.corrected / row.error for row in true if row.corrected is not None]
     return (
@@ -33,7 +33,7 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         str(len(sed)),
         *(_share([bool(row.above) for row in column]) for column in by_number),
         _share([row.near for row in sed if row.near is not None]),
-        f"{sum(not row.met and not row.warned for row in within)} of {len(within)}",
+        f"{sum(not row.meets_tolerance and not row.warned for row in within)} of {len(within)}",
         _ratio(sed),
         _ratio(by_number[1]),
         f"{spearmanr([(row.estimate, row.error) for row in sed]).statistic:.2f}" if len(sed) > 2 else "–",
