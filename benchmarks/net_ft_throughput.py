@@ -150,13 +150,13 @@ def draw(rate: int, pipe: Connection) -> None:
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     from PySide6.QtWidgets import QApplication
 
-    from daq_app.qt.live_panel import AXES
+    from daq_app.qt.live_panel import AXIS_PLOTS
     from daq_app.qt.live_plot import LivePlot
     from daq_app.window.live_trace import CHANNELS, LiveTrace
 
     application = QApplication([])
     trace = LiveTrace(float(rate))
-    plots = [LivePlot(*axis) for axis in AXES]
+    plots = [LivePlot(*axis) for axis in AXIS_PLOTS]
     for plot in plots:
         plot.resize(1200, 500)
         plot.show()

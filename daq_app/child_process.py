@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # multiprocessing takes a while to import, and most verbs sta
     from multiprocessing.context import SpawnContext
     from multiprocessing.process import BaseProcess
 
-BELOW = 5  # on POSIX, nice's steps towards the end of the queue
+_BELOW = 5  # on POSIX, nice's steps towards the end of the queue
 BELOW_NORMAL = 0x4000  # on Windows, its name for the same
 MOST_WORKERS = 61  # on Windows, which waits for no more processes at once (Python's ProcessPoolExecutor)
 SAFE_PATH = "PYTHONSAFEPATH"  # a Python that finds this in its environment starts as with -P
@@ -119,4 +119,4 @@ def give_way() -> None:
         kernel = ctypes.windll.kernel32
         kernel.SetPriorityClass(kernel.GetCurrentProcess(), BELOW_NORMAL)
     else:
-        os.nice(BELOW)
+        os.nice(_BELOW)

@@ -18,7 +18,7 @@ from solver.progress import listening
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130  # exit codes
 OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")  # packages
 _COLUMNS = 80  # of a terminal that does not say how many it has
-PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
+_PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
 
 
 @dataclass(slots=True)
@@ -178,7 +178,7 @@ class Console:
             return True
 
         def show() -> None:
-            pause = PATIENCE
+            pause = _PATIENCE
             while not over.wait(pause):
                 self.progress(
                     at.part, f"{at.doing}, {time.monotonic() - start:.0f} s so far; Ctrl-C stops", end_known=False

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TypeVar
 from xml.etree import ElementTree
 
-ENGLISH = "en"
-FOLDER = Path(__file__).parent / "translations"
+SOURCE_LANGUAGE = "en"
+_FOLDER = Path(__file__).parent / "translations"
 VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this process and to those that it starts
 SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.xlf
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 def translations(context: str, language: str) -> Mapping[str, str]:
     """Return the texts of a language by the English ones; none where its file is missing or cannot be read."""
     try:
-        units = ElementTree.parse(FOLDER / f"{context}_{language}.xlf").iterfind(".//{*}trans-unit")
+        units = ElementTree.parse(_FOLDER / f"{context}_{language}.xlf").iterfind(".//{*}trans-unit")
     except (OSError, ElementTree.ParseError):
         return {}
     return {one.findtext("{*}source", ""): text for one in units if (text := one.findtext("{*}target", ""))}
@@ -33,7 +33,10 @@ def translations(context: str, language: str) -> Mapping[str, str]:
 
 def languages(context: str) -> tuple[str, ...]:
     """Return the languages that a context is translated into, English first."""
-    return (ENGLISH, *sorted(place.stem.removeprefix(f"{context}_") for place in FOLDER.glob(f"{context}_*.xlf")))
+    return (
+        SOURCE_LANGUAGE,
+        *sorted(place.stem.removeprefix(f"{context}_") for place in _FOLDER.glob(f"{context}_*.xlf")),
+    )
 
 
 def tr(text: str, /, **values: object) -> str:
@@ -44,7 +47,7 @@ def tr(text: str, /, **values: object) -> str:
     >>> tr("Trial {number} of {count}", number=3, count=10)
     'Trial 3 of 10'
     """
-    translation = translations(EXPERIMENTER, os.environ.get(VARIABLE, ENGLISH)).get(text, text)
+    translation = translations(EXPERIMENTER, os.environ.get(VARIABLE, SOURCE_LANGUAGE)).get(text, text)
     if not values:
         return translation
     try:
@@ -65,7 +68,7 @@ COUNT_WORDS: Mapping[str, str] = tr_noop({  # of a transducer's `Health`, by the
 })  # fmt: skip
 
 
-ANSWERS: Mapping[str, str] = tr_noop({  # by what became of a trial, or which of two was chosen
+_ANSWERS: Mapping[str, str] = tr_noop({  # by what became of a trial, or which of two was chosen
     "scored": "score {answer:.0f}", "numbered": "number {answer:.9g}", "first": "the first", "second": "the second",
 })  # fmt: skip
 
@@ -78,7 +81,7 @@ def answer_words(outcome: str, answer: float | str | None) -> str:
     """
     if answer is None:
         return tr("no answer")
-    return tr(ANSWERS[answer]) if isinstance(answer, str) else tr(ANSWERS[outcome], answer=answer)
+    return tr(_ANSWERS[answer]) if isinstance(answer, str) else tr(_ANSWERS[outcome], answer=answer)
 
 
 def quantity(value: float | None, digits: int, unit: str = "") -> str:

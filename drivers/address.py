@@ -110,8 +110,8 @@ class Driver:
     serial_line: bool = False  # it reads a serial line, and its addresses name the port
 
 
-FARTHEST = 1000.0  # displacement that is believed [mm]
-MOST = 360.0  # turn that is believed [degrees]
+_FARTHEST = 1000.0  # displacement that is believed [mm]
+_MOST = 360.0  # turn that is believed [degrees]
 
 Tool = tuple[float, ...]  # (6,), or empty for none
 
@@ -127,11 +127,11 @@ def without_tool(address: Address) -> tuple[Address, Tool]:
     if text is None:
         return address, ()
     numbers = tuple(map(number, text.split(",")))
-    limits = (FARTHEST,) * 3 + (MOST,) * 3
+    limits = (_FARTHEST,) * 3 + (_MOST,) * 3
     if len(numbers) != 6 or not all(abs(value) <= most for value, most in zip(numbers, limits, strict=True)):
         raise AddressError(
-            f"{address.uri}: tool={text[:60]} must be six numbers, dx,dy,dz in mm (at most {FARTHEST:g}) and "
-            f"rx,ry,rz in degrees (at most {MOST:g}), for example tool=0,0,-5,0,0,0"
+            f"{address.uri}: tool={text[:60]} must be six numbers, dx,dy,dz in mm (at most {_FARTHEST:g}) and "
+            f"rx,ry,rz in degrees (at most {_MOST:g}), for example tool=0,0,-5,0,0,0"
         )
     options = {name: value for name, value in address.options.items() if name != "tool"}
     return replace(address, options=options), numbers if any(numbers) else ()

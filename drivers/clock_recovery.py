@@ -11,7 +11,7 @@ import numpy as np
 from drivers.arrays import Array, Indices
 
 WINDOW = 1.0  # of the records that arrive within, the one that waited least is taken [real s]
-COARSE, FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
+_COARSE, _FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
 
 
 class RateWatch:
@@ -29,7 +29,7 @@ class RateWatch:
         self._vague = vague
         self._window = WINDOW * factor
         self._silence = silence
-        self._points: deque[tuple[int, float]] = deque(maxlen=2 * FINE[0] + 1)  # count and arrival, one a window
+        self._points: deque[tuple[int, float]] = deque(maxlen=2 * _FINE[0] + 1)  # count and arrival, one a window
         self._best: tuple[float, int, float] | None = None  # in this window: lateness, count, arrival
         self._ends = 0.0  # of this window
         self._last = 0.0  # arrival
@@ -60,7 +60,7 @@ class RateWatch:
 
     def _judged(self) -> bool:
         """Compare two stretches, one after the other, with the rate believed."""
-        for windows, most in (COARSE, FINE):
+        for windows, most in (_COARSE, _FINE):
             if len(self._points) <= 2 * windows:
                 continue
             first, middle, last = (self._points[i] for i in (-1 - 2 * windows, -1 - windows, -1))
@@ -69,7 +69,7 @@ class RateWatch:
                 self._points.clear()
                 self._find(_rate(first, last), most)
                 return True
-            if windows == FINE[0]:
+            if windows == _FINE[0]:
                 self._vague = 0.0  # it is as it was measured
         return False
 

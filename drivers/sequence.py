@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivers.arrays import Indices
 
 WRAP = 2**32
-NEAR = 10_000  # a rejected record at most so many numbers behind was late; further off it was garbage
+_NEAR = 10_000  # a rejected record at most so many numbers behind was late; further off it was garbage
 
 Relation = Literal["same", "next", "frozen", "behind", "off"]
 
@@ -200,7 +200,7 @@ class SequenceAccount:
     def _reject(self, record: _Record) -> None:
         """Count a record that nothing went on from."""
         ahead, _ = (0, 0) if self._last is None else record.since(self._last)
-        if -NEAR <= ahead < 0:
+        if -_NEAR <= ahead < 0:
             self.late += 1
         else:
             self.garbage += 1

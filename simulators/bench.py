@@ -219,8 +219,8 @@ def calibration_file(folder: Path, serial: str) -> Path:
     return path
 
 
-RATE = 200.0  # readings a second
-MIDDLE = (0.3, 0.7)  # part of a stroke's slide that is lost or frozen [-]
+_RATE = 200.0  # readings a second
+_MIDDLE = (0.3, 0.7)  # part of a stroke's slide that is lost or frozen [-]
 _SCALE = np.array([1e-6] * 3 + [1e-3] * 3)  # one count [N, N mm]
 
 
@@ -236,7 +236,7 @@ class DirectTransducer:
             f"SIM{bench.seed}", "counts", np.diag(_SCALE), np.array(RATED), "of the simulated bench"
         )
         self.info = TransducerInfo(
-            f"bench:{bench.seed}", "direct", "simulated bench", calibration.serial, True, RATE, RATE, calibration
+            f"bench:{bench.seed}", "direct", "simulated bench", calibration.serial, True, _RATE, _RATE, calibration
         )
         self._bench = bench
         self._clock = clock
@@ -276,9 +276,9 @@ class DirectTransducer:
         numbers = np.arange(self._sent, self._due, dtype=np.int64)
         self._sent += len(numbers)
         start, stop = self._middle(self._lost_stroke)
-        kept = numbers[(numbers / RATE < start) | (numbers / RATE >= stop)]
+        kept = numbers[(numbers / _RATE < start) | (numbers / _RATE >= stop)]
         self._lost += len(numbers) - len(kept)
-        time = kept / RATE
+        time = kept / _RATE
         start, stop = self._middle(self._frozen_stroke)
         sampled = np.where((time >= start) & (time < stop), start, time)
         counts = np.rint(self._bench.wrench(sampled) / _SCALE)
@@ -287,7 +287,7 @@ class DirectTransducer:
 
     @property
     def _due(self) -> int:
-        return int(self.now() * RATE) + 1
+        return int(self.now() * _RATE) + 1
 
     def _middle(self, number: int) -> tuple[float, float]:
         """Return the middle stretch [s, bench] of a stroke that was begun; nothing of another number."""
@@ -295,5 +295,5 @@ class DirectTransducer:
         if not 0 < number <= len(begun):
             return np.inf, np.inf
         stroke = begun[number - 1]
-        first, last = (stroke.slip + part * (stroke.lift - stroke.slip) for part in MIDDLE)
+        first, last = (stroke.slip + part * (stroke.lift - stroke.slip) for part in _MIDDLE)
         return first, last

@@ -14,7 +14,7 @@ from simulators.bench import FT32831, Bench
 from simulators.faults import Faults
 from simulators.simulator import ROOM, LineBox, PseudoTerminal, Simulator, serve_on_ports
 
-RATE = 7000  # packets a second
+_RATE = 7000  # packets a second
 COUNTS_PER_VOLT = 3000.0  # of a gauge
 _COUNTS = 1_000_000  # in one N and in one N m, of what the stored matrix gives
 _SIZE = 3_400  # registers
@@ -47,7 +47,7 @@ class DigitalFtBox(LineBox):
         """Set up a transducer whose sampling is wrong by `rate_error` [-], perhaps left `streaming` by somebody."""
         super().__init__("ttyDigitalFT", clock, faults)
         self._bench = bench
-        self._rate = RATE * (1.0 + rate_error)
+        self._rate = _RATE * (1.0 + rate_error)
         self._rated = np.array(bench.settings.rated)
         self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
         self._stored = self._calibration()

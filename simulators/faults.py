@@ -14,9 +14,9 @@ Kind = Literal[
     "lose", "repeat", "reorder", "corrupt", "shorten", "delay", "stall", "saturate", "status", "units", "drift",
     "miscalibrate", "slow", "steal", "reboot", "unplug",
 ]  # fmt: skip
-KINDS: tuple[Kind, ...] = get_args(Kind)
+FAULT_KINDS: tuple[Kind, ...] = get_args(Kind)
 FOREVER = 1e7  # [s]
-_ON_THE_WAY = KINDS[:6]
+_ON_THE_WAY = FAULT_KINDS[:6]
 
 Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]  # in a timetable file [s]
 
@@ -36,8 +36,8 @@ class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         """Refuse what cannot be carried out."""
-        if self.kind not in KINDS:
-            raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(KINDS)}")
+        if self.kind not in FAULT_KINDS:
+            raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(FAULT_KINDS)}")
         if not (0.0 <= self.start < self.stop and 0.0 < self.share <= 1.0 and self.delay > 0.0):
             raise ValueError(f"fault {self.kind!r} needs 0 <= from < to, 0 < share <= 1 and a delay above 0")
         if (self.kind == "status") != (0 < self.status < 2**32):
@@ -136,7 +136,7 @@ class Faults:
             fault = self._at(kind, time)
             if fault is None:
                 continue
-            draw = np.random.default_rng([self._seed, round(time * 1e6), KINDS.index(kind)])
+            draw = np.random.default_rng([self._seed, round(time * 1e6), FAULT_KINDS.index(kind)])
             if draw.uniform() < fault.share:
                 leaving = self._carry_out(fault, time, datagram, draw)
                 break

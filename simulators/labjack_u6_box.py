@@ -22,7 +22,7 @@ from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
 from simulators.simulator import RunningSimulator, Simulator, unplug
 
-ROOM = 984  # readings the converter keeps for a computer that is late
+_ROOM = 984  # readings the converter keeps for a computer that is late
 _NAP = 0.0005  # [real s]
 _VOLTS_PER_CODE = 3.1572e-4  # this unit's, near the nominal 3.1580578e-4
 _VOLTS_PER_CODE_BELOW = -3.1585e-4
@@ -160,8 +160,8 @@ class LabJackU6Box:
             return
         gauges, _, rate = self._scan
         times, self._done = self._faults.due(self._begun, self.now(), rate, self._done)
-        room = (ROOM - len(self._buffer)) // len(gauges)
-        if self._missed and self._report is None and room > ROOM // len(gauges) // 2:
+        room = (_ROOM - len(self._buffer)) // len(gauges)
+        if self._missed and self._report is None and room > _ROOM // len(gauges) // 2:
             # One scan of ones stands for those lost; the guide counts it among them.
             self._report = (len(self._buffer), self._missed)
             self._buffer += [0xFFFF] * len(gauges)

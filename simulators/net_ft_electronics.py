@@ -14,7 +14,7 @@ from drivers.arrays import Array, Indices
 from simulators.bench import Bench
 from simulators.faults import Faults
 
-COUNTS = 1_000_000  # counts in one unit of force, and in one of torque
+_COUNTS = 1_000_000  # counts in one unit of force, and in one of torque
 
 _FORCES = {  # code: name, newtons
     1: ("lb", 4.4482216152605),
@@ -73,7 +73,7 @@ class Pages:
     @property
     def counts_per_wrench(self) -> Array:
         """Counts in one N or N mm of each axis, shape (6,), by the units; `counting` is beyond it."""
-        return COUNTS / np.repeat([_FORCES[self.force_code][1], _TORQUES[self.torque_code][1]], 3)
+        return _COUNTS / np.repeat([_FORCES[self.force_code][1], _TORQUES[self.torque_code][1]], 3)
 
     @property
     def scales(self) -> list[int]:
@@ -83,7 +83,7 @@ class Pages:
     @property
     def counts(self) -> int:
         """Counts in one unit."""
-        return max(round(COUNTS * self.counting), 1)
+        return max(round(_COUNTS * self.counting), 1)
 
     def answer(self, target: str, status: int, counts: list[int]) -> tuple[int, str]:
         """Return (HTTP status, page) for a GET of `target`, with the box's status and counts of this instant."""

@@ -17,7 +17,7 @@ from simulators.simulator import RunningSimulator, Simulator, unplug
 
 ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]
 OVERFLOW = "The application is not able to keep up with the hardware acquisition.\n\nTask Name: _unnamedTask<0>"
-ABSENT = "Device identifier is invalid, or the device was removed.\n\nTask Name: _unnamedTask<0>"
+_ABSENT = "Device identifier is invalid, or the device was removed.\n\nTask Name: _unnamedTask<0>"
 _MODULES = ("nidaqmx", "nidaqmx.constants", "nidaqmx.system")
 
 
@@ -123,7 +123,7 @@ class _Task:
 
     def _refuse_without_device(self) -> None:
         if any(self._library.faults.active(kind, self._library.now()) for kind in ("unplug", "reboot")):
-            raise DaqError(ABSENT)
+            raise DaqError(_ABSENT)
 
 
 def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningSimulator:

@@ -15,7 +15,7 @@ from solver.arrays import Array, determinant, inverse
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # Ogden's exponent of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
-NEAR = 0.04  # Q up to which the series is used: above, the closed form loses no digits
+_NEAR = 0.04  # Q up to which the series is used: above, the closed form loses no digits
 TERMS = 14  # of the series: enough up to an exponent of 20
 
 
@@ -249,7 +249,7 @@ def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
         slope = slope - (n + 1.0) / 4.0 * factor * term
         term = term * factor * x
         value = value + term
-    far = np.real(Q) > NEAR
+    far = np.real(Q) > _NEAR
     s = np.arcsinh(np.sqrt(np.where(far, Q, 1.0)) / 2.0)
     one, two = np.sinh(a * s), np.sinh(2.0 * s)
     wide = 2.0 / a * one / two

@@ -67,10 +67,10 @@ class FrictionLaw:
         return np.full(length.shape, np.inf) if self.tau_max == np.inf else self.tau_max * length
 
 
-LAWS = (FrictionLaw,)
+FRICTION_LAWS = (FrictionLaw,)
 
 
-FEWEST = 5  # touching nodes needed to locate the ends of contact
+_FEWEST = 5  # touching nodes needed to locate the ends of contact
 
 
 def edges(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> tuple[float, float] | None:
@@ -108,7 +108,7 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     alternate between ends and middles of edges, an end first.
     """
     on = [number for number, touches in enumerate(touching.tolist()) if touches]  # few: lists are fast
-    if len(on) < FEWEST:
+    if len(on) < _FEWEST:
         return None
     last = on[-1]
     line = last - 2 if last % 2 == 0 else last - 1  # the last line between elements with contact on both sides

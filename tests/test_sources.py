@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -76,6 +77,28 @@ def test_no_name_of_the_column_not_this_is_used(trees):
             words = {word.lower() for word in re.findall("[A-Z]?[a-z]+|[A-Z]+", name)}
             uses += [f"{file}: {name}"] if refused & {name.strip("_"), *words} else []
     assert uses == []
+
+
+PARTS_OF_A_KIND = {"DRIVER", "SIMULATOR", "EXAMPLE"}  # one in every driver, simulator and verb
+
+
+def public_constants(tree: ast.Module) -> Iterator[str]:
+    """Yield the constants of a module that other modules may import."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            yield from (name for name in names if name.isupper() and len(name) > 1 and name[0] != "_")
+
+
+def test_the_name_of_a_public_constant_is_unique_in_the_tree(trees):
+    places = defaultdict(list)
+    for file, tree in trees.items():
+        if file.parts[0] not in ("drivers", "simulators"):  # each device stands alone
+            for name in public_constants(tree):
+                places[name].append(str(file))
+    assert len(places) > 300
+    assert {name: files for name, files in places.items() if len(files) > 1 and name not in PARTS_OF_A_KIND} == {}
 
 
 # ---- names that begin with an underscore belong to the file or the class that defines them

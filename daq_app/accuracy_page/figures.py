@@ -20,10 +20,10 @@ from solver.verification.orders import Order
 from solver.verification.speed import Speed
 from solver.verification.truth import JUDGED, Truth
 
-COLOURS = {"small": style.GREEN, "finite": style.VERMILLION}
-MARKS = {"small": "o", "finite": "s"}
-WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
-PARTS = (
+_COLOURS = {"small": style.GREEN, "finite": style.VERMILLION}
+_MARKS = {"small": "o", "finite": "s"}
+_WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
+_PARTS = (
     style.GREEN, style.VERMILLION, style.SKY, style.PURPLE, "#E69F00", "#0072B2", "#F0E442", style.GREY, style.PALE,
     "#8C564B", style.INK,
 )  # of a solve  # fmt: skip
@@ -36,7 +36,7 @@ def _by_strain(rows: Sequence[R]) -> dict[str, list[R]]:
 
 def _strain_legend(axes: Axes, kinds: Iterable[str], place: Literal["upper right", "lower right"]) -> None:
     for kind in kinds:
-        axes.plot([], [], MARKS[kind], color=COLOURS[kind], markersize=4, label=f"{kind} strain")
+        axes.plot([], [], _MARKS[kind], color=_COLOURS[kind], markersize=4, label=f"{kind} strain")
     axes.legend(frameon=False, loc=place)
 
 
@@ -49,7 +49,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
         known = [(error, 1e3 * span, r) for error, span, r in timed if error is not None and span is not None]
         if not known:
             continue
-        colour = COLOURS[kinematics]
+        colour = _COLOURS[kinematics]
         points = [
             (error, span, error < 3.0 * doubt[kinematics], f"{kinematics} strain: {row.dofs} unknowns, ", "")
             for error, span, row in known
@@ -70,12 +70,12 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
 
 def _curve(drawn: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
     """Draw times [ms] against errors [-], with a mark at each, hollow or not, and words around its numbers."""
-    axes, colour = drawn.axes[0], COLOURS[kinematics]
+    axes, colour = drawn.axes[0], _COLOURS[kinematics]
     axes.plot([100 * error for error, *_ in points], [span for _, span, *_ in points], color=colour, linewidth=0.8)
     for error, span, hollow, before, behind in points:
         gid = drawn.note(f"{before}{100 * error:.2g} %, {span:.3g} ms{behind}")
         face = "white" if hollow else colour
-        axes.plot(100 * error, span, MARKS[kinematics], color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
+        axes.plot(100 * error, span, _MARKS[kinematics], color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
 
 
 def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
@@ -108,7 +108,7 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
 
 
 def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
-    drawn = style.sheet(*WIDE)
+    drawn = style.sheet(*_WIDE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
     shown = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
@@ -149,10 +149,10 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for row in rows:
-        face = COLOURS[row.kinematics] if row.above is not None else "none"
+        face = _COLOURS[row.kinematics] if row.above is not None else "none"
         words = f"{row.case}, {row.kinematics}: estimate {100 * row.estimate:.2g} %, true {100 * row.error:.2g} %"
         axes.plot(
-            100 * max(row.error, 1e-7), 100 * row.estimate, MARKS[row.kinematics], color=COLOURS[row.kinematics],
+            100 * max(row.error, 1e-7), 100 * row.estimate, _MARKS[row.kinematics], color=_COLOURS[row.kinematics],
             markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=drawn.note(words),
         )  # fmt: skip
     _logarithmic(axes)
@@ -171,10 +171,10 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
 
 
 def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
-    drawn = style.sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
+    drawn = style.sheet(_WIDE[0], max(190, 60 + 45 * len(rows)))
     axes = drawn.axes[0]
     parts = dict.fromkeys(name for row in rows for name in row.parts)
-    colours = dict(zip(parts, cycle(PARTS), strict=False))
+    colours = dict(zip(parts, cycle(_PARTS), strict=False))
     table: list[tuple[str | float, ...]] = []
     for number, row in enumerate(rows):
         left = 0.0
@@ -202,8 +202,8 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
         power = exponent(mine)
         words = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
         axes.plot(
-            [r.dofs for r in mine], [1e3 * r.floor_s for r in mine], label=words, color=COLOURS[kinematics],
-            marker=MARKS[kinematics], markersize=4, linewidth=0.9,
+            [r.dofs for r in mine], [1e3 * r.floor_s for r in mine], label=words, color=_COLOURS[kinematics],
+            marker=_MARKS[kinematics], markersize=4, linewidth=0.9,
         )  # fmt: skip
     largest = max(rows, key=lambda row: row.dofs)
     ends = np.array([min(row.dofs for row in rows), largest.dofs])
@@ -244,7 +244,7 @@ def plates(measured: RunResults) -> dict[str, style.Plate]:
     speeds, guaranteed, orders = measured.of(Speed), measured.of(GuaranteedCost), measured.of(Order)
     costs, growth = measured.of(Cost), measured.of(Growth)
     truths = [truth for truth in measured.of(Truth) if truth.case in JUDGED and truth.doubt]
-    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
+    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in _COLOURS}
     estimates = [[row for row in measured.of(Estimate) if row.number == number] for number in GOALS]
     with style.look():
         panels: dict[str, list[style.Panel | None]] = {

@@ -27,7 +27,7 @@ from solver.verification.published.problems import Problem
 from solver.verification.request import PROCESSOR_TIME
 from solver.verification.speed import Speed
 from solver.verification.targets import Target
-from solver.verification.truth import NUMBERS, Truth
+from solver.verification.truth import TRUE_NUMBERS, Truth
 from solver.verification.warm import Warm
 
 R = TypeVar("R")
@@ -102,7 +102,7 @@ def _estimates(measured: RunResults) -> Table:
     for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
         mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
         if mine:
-            met = _share([row.meets_tolerance for row in mine]) if name == NUMBERS[0] else "–"
+            met = _share([row.meets_tolerance for row in mine]) if name == TRUE_NUMBERS[0] else "–"
             ratios = [row.estimate / max(row.error, 1e-9) for row in mine if row.above is not None]
             ratio = number(median(ratios), 2) if ratios else "–"
             above, near = _share([row.above for row in mine]), _share([row.near for row in mine])
@@ -141,7 +141,7 @@ def _value(row: Truth, at: int) -> str:
     return number(row.numbers[at], 5) if row.numbers else "–"
 
 
-TABLES: tuple[Callable[[RunResults], Table], ...] = (
+_TABLES: tuple[Callable[[RunResults], Table], ...] = (
     _machine,
     _table_maker(
         "targets", Target,
@@ -250,7 +250,7 @@ TABLES: tuple[Callable[[RunResults], Table], ...] = (
 
 def tables(measured: RunResults) -> dict[str, Table]:
     """Return the tables that there are rows for, by name."""
-    return {table.name: table for table in (make(measured) for make in TABLES) if table.rows}
+    return {table.name: table for table in (make(measured) for make in _TABLES) if table.rows}
 
 
 def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:

@@ -10,7 +10,7 @@ from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
 Compared = tuple[tuple[str, tuple[tuple[float | None, float | None], ...]], ...]
-NAMES = tr_noop(("µ", "SED [kPa]", "score"))
+MEAN_PANELS = tr_noop(("µ", "SED [kPa]", "score"))
 PHASES = {
     "pressing": tr_noop("pressing down"), "sticking": tr_noop("sticking: dragged, nothing slips yet"),
     "slipping in part": tr_noop("slipping in part"), "sliding": tr_noop("sliding: every point slips"),
@@ -18,7 +18,7 @@ PHASES = {
 
 
 def compare_reports(first: Report, second: Report) -> Compared:
-    """Return every stimulus of either session, experiments in their order, and both sessions' means of each of `NAMES`.
+    """Return every stimulus of either session, experiments in their order, and both sessions' means in `MEAN_PANELS`.
 
     mu is the one that the model got; None where a session has no number.
     """
@@ -26,7 +26,7 @@ def compare_reports(first: Report, second: Report) -> Compared:
     names = [experiment.name for report in (first, second) for experiment in report.experiments]
     keys = sorted({*tables[0], *tables[1]}, key=lambda key: (names.index(key[0]) if key[0] in names else -1, *key))
     one, other = ([table.get(key, {}) for key in keys] for table in tables)
-    rows = (tuple((a.get(name), b.get(name)) for name in NAMES) for a, b in zip(one, other, strict=True))
+    rows = (tuple((a.get(name), b.get(name)) for name in MEAN_PANELS) for a, b in zip(one, other, strict=True))
     return tuple((f"{experiment} {index}", row) for (experiment, index), row in zip(keys, rows, strict=True))
 
 

@@ -13,18 +13,18 @@ from solver.quantities import FIELDS
 
 Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
 
-TOP = 0.97  # of the corners' values lies below the end of the colour scale
-STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+_TOP = 0.97  # of the corners' values lies below the end of the colour scale
+_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 Box = tuple[float, float, float, float]  # left, right, below, above [mm]
 Range = tuple[float, float]
 FIELD_ERRORS = tr_noop(
     "Fields, at every place: no estimate of the mesh's or the model's error. The SED over the finger has both."
 )
-UNITS = {"MPa": ("kPa", 1000.0)}  # as people read them, and the factor
+_UNITS = {"MPa": ("kPa", 1000.0)}  # as people read them, and the factor
 Line = tuple[tuple[float, float], tuple[float, float]]  # its ends [mm]
 
-TISSUES = tr_noop(("epidermis", "dermis", "fat", "bone"))  # by the number of their region in the mesh
-POINTS = 201  # along a line: finer than any element it crosses
+_TISSUES = tr_noop(("epidermis", "dermis", "fat", "bone"))  # by the number of their region in the mesh
+_POINTS = 201  # along a line: finer than any element it crosses
 OUTSIDE = -1e-9  # least share of a corner: what lies on a side is in both triangles, whatever round-off says [-]
 
 
@@ -96,7 +96,7 @@ class Film:
 
 
 def step_above(value: float) -> float:
-    """Return the smallest of `STEPS` times a power of ten that is not below a value.
+    """Return the smallest of `_STEPS` times a power of ten that is not below a value.
 
     >>> step_above(0.013), step_above(0.5), step_above(0.0), step_above(9.0)
     (0.015, 0.5, 1.0, 10.0)
@@ -104,7 +104,7 @@ def step_above(value: float) -> float:
     if not value > 0.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
-    return float(next(step * power for step in STEPS if step * power >= value * (1.0 - 1e-9)))
+    return float(next(step * power for step in _STEPS if step * power >= value * (1.0 - 1e-9)))
 
 
 def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
@@ -188,7 +188,7 @@ class FieldChoice:
 
 
 FIELD_CHOICES = (
-    *(FieldChoice(one.name, one.label, *UNITS.get(one.unit, (one.unit, 1.0)), one.signed) for one in FIELDS),
+    *(FieldChoice(one.name, one.label, *_UNITS.get(one.unit, (one.unit, 1.0)), one.signed) for one in FIELDS),
     FieldChoice("displacement", tr_noop("displacement from the bone"), "mm", 1.0, signed=False),
 )
 
@@ -200,7 +200,7 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
         values = np.abs(field.of(frame))
         known = values[np.isfinite(values)]
         if len(known):
-            tops.append(float(np.quantile(known, TOP)))
+            tops.append(float(np.quantile(known, _TOP)))
     high = step_above(max(tops))
     return (-high if field.signed else 0.0), high
 
@@ -241,7 +241,7 @@ def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: flo
     (value,), (triangle,) = value_at(frame, parts, field, np.array([[x, y]]))
     if triangle < 0:
         return tr("{where} · no tissue", where=where)
-    return f"{field.words(value)} · {where} · {tr(TISSUES[parts.region[triangle]])}"
+    return f"{field.words(value)} · {where} · {tr(_TISSUES[parts.region[triangle]])}"
 
 
 def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, Array]:
@@ -255,7 +255,7 @@ def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, A
 def along_line(frame: Frame, parts: Parts, field: FieldChoice, line: Line) -> tuple[Array, Array]:
     """Return the distance from the first end (m,) [mm] and the field there (m,); nan where there is no tissue."""
     ends = np.array(line)
-    part = np.linspace(0.0, 1.0, POINTS)
+    part = np.linspace(0.0, 1.0, _POINTS)
     values, _ = value_at(frame, parts, field, ends[0] + part[:, None] * (ends[1] - ends[0]))
     return part * float(np.hypot(*(ends[1] - ends[0]))), values
 

@@ -13,7 +13,7 @@ from daq_app.child_process import Child
 from daq_app.wording import tr
 
 Connection = Any  # one end of a pipe; its type is another one on each system
-PATIENCE = 0.15  # work that has not stopped by itself after so long is ended [s]
+_PATIENCE = 0.15  # work that has not stopped by itself after so long is ended [s]
 URGENT = (m.Stop, m.Move, m.Undo)  # asks for which the model's answers are left, and begun anew
 
 
@@ -103,7 +103,7 @@ class Analyst:
                     said.append(m.Problem(words))
         if any(isinstance(one, m.Cancelled) for one in said):
             self._stopped = None
-        if self._stopped is not None and time.monotonic() - self._stopped > PATIENCE:
+        if self._stopped is not None and time.monotonic() - self._stopped > _PATIENCE:
             self.close()
             said.append(m.Cancelled())
         return tuple(said)

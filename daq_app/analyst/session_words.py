@@ -11,7 +11,7 @@ from sessions.report.contents import AnswerFinding, PredictionFinding, Report, S
 from sessions.report.wording import shown_response
 
 Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
-PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
+_PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
 RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
 FRICTION_HEAD = tr_noop(
     ("trial", "stimulus", "µ steady", "95 %", "µ greatest", "τ max [kPa]", "V [mm/s]", "N [N]", "way", "flaws")
@@ -20,7 +20,7 @@ PICTURES = {  # one of each experiment
     "relation": tr_noop("SED against score"), "scores": tr_noop("scores"), "friction": tr_noop("friction over time"),
     "speed": tr_noop("speed over time"), "response": tr_noop("response over time"),
 }  # fmt: skip
-WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
+_WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ def picture_errors(report: Report | None, picture: str) -> str:
 def _effect(report: Report | None) -> str:
     """Return the greatest effect on the SED of what the model leaves out; "" where none is known."""
     facts = [fact for fact in (() if report is None else report.left_out) if fact.name != "warning"]
-    most = max(facts, key=lambda fact: max(map(float, PLAIN.findall(fact.value)), default=0.0), default=None)
+    most = max(facts, key=lambda fact: max(map(float, _PLAIN.findall(fact.value)), default=0.0), default=None)
     return "" if most is None else f"{most.name} {most.value}"
 
 
@@ -160,7 +160,7 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     said = None if row is None else row.prediction
     facts: list[tuple[str, str, str]] = []
     if said is not None:
-        way = "" if said.direction is None else tr("{way}, as measured", way=tr(WAYS[said.direction]))
+        way = "" if said.direction is None else tr("{way}, as measured", way=tr(_WAYS[said.direction]))
         facts += [
             (tr("µ of this trial"), _value(said, "mu", "{:.4f}"), tr(said.mu_rule)),
             (tr("τ max of this trial"), _value(said, "tau_max", "{:.2f} kPa", 1000.0), ""),
@@ -241,7 +241,7 @@ def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
         quantity(s.mu_dynamic, 3),
         "–" if low is None else tr("{low:.3f} to {high:.3f}", low=low, high=high),
         *(quantity(*pair) for pair in ((s.mu_max, 3), (tau, 1), (s.speed, 1), (s.normal_force, 2))),
-        "–" if s.direction is None else tr(WAYS[s.direction]),
+        "–" if s.direction is None else tr(_WAYS[s.direction]),
         _flaws(s),
     )
 

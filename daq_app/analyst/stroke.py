@@ -19,9 +19,9 @@ AROUND = 1.0  # before and after a stroke of a recording without trials [s]
 MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a replay [s]
 Edge = Literal["onset", "lift", "steady begin", "steady end"]
 EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
-PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
-APART = 0.02  # edges keep so far from each other [s]
-STEP, LEAP = 0.005, 0.05  # a key moves an edge by so much [s]
+_PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
+EDGE_DISTANCE = 0.02  # edges keep so far from each other [s]
+EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # a key moves an edge by so much [s]
 WHAT: dict[Edge, str] = {"onset": "onset", "lift": "lift", "steady begin": "steady", "steady end": "steady"}
 
 
@@ -67,7 +67,7 @@ class RawFile:
         first = self._row(int(block.sequence[0]), int(block.received_ns[0]))
         rows = "" if first is None else tr(", rows {first} to {last}", first=first, last=first + len(block) - 1)
         sealed = (folder / SEALED_FILE).is_file()
-        return tr(PLACES[sealed], name=folder.name, file=SEALED_FILE if sealed else LIVE_FILE, rows=rows)
+        return tr(_PLACES[sealed], name=folder.name, file=SEALED_FILE if sealed else LIVE_FILE, rows=rows)
 
     def _row(self, sequence: int, received_ns: int) -> int | None:
         """Return the row of a reading; None where its block is damaged or gone."""
@@ -130,8 +130,8 @@ def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:
     """Return the instant nearest to `time` [s] at which an edge may lie: between its neighbours."""
     times = {placed.edge: placed.time for placed in edges_of(stroke)}
     at = EDGES.index(edge)
-    low = times[EDGES[at - 1]] + APART if at > 0 else float("-inf")
-    high = times[EDGES[at + 1]] - APART if at + 1 < len(EDGES) else float("inf")
+    low = times[EDGES[at - 1]] + EDGE_DISTANCE if at > 0 else float("-inf")
+    high = times[EDGES[at + 1]] - EDGE_DISTANCE if at + 1 < len(EDGES) else float("inf")
     return min(max(time, low), high)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import NAMES, compare_reports, film_words, name_and_errors
+from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports, film_words, name_and_errors
 from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Parts
 from daq_app.analyst.session_words import picture_errors, sed_words
 from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history, reversal
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 Say = Callable[[m.Said], None]
 Progress = Callable[[float], bool]
 Urgent = Callable[[], bool]  # whether what is being done must be left for something else
-MOST = 150  # states of a way that did not settle, which may be long
+_MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn between two reports of progress
 
 
@@ -225,7 +225,7 @@ class Work:
             return None
         names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
         with look(simulated=simulated):
-            return comparison_panel(NAMES, names, compare_reports(self._report, other))
+            return comparison_panel(MEAN_PANELS, names, compare_reports(self._report, other))
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
@@ -354,7 +354,7 @@ def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progre
 def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
     """Return the states up to where a solve that has no answer came, and what stopped it there."""
     instants, failure = way_until(way.scene, way.finger, progress)
-    every = max(1, -(-len(instants) // MOST))
+    every = max(1, -(-len(instants) // _MOST))
     film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, progress)
     if failure is None:
         return film, ""

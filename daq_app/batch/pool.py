@@ -29,9 +29,9 @@ from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.strokes.decisions import DECISIONS
 
-LOOK = 0.1  # between two looks whether something is done [s]
+_LOOK = 0.1  # between two looks whether something is done [s]
 WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
-ANSWERS = 20.0  # that a scheduler may take to answer [s]
+_ANSWERS = 20.0  # that a scheduler may take to answer [s]
 AGAIN = "run this again once it is there: what is done is kept"
 NUMBERS_BY = ("daq-app", "numpy", "scipy", "numba")  # whose other versions may give other numbers
 # All that a visit's numbers come from.
@@ -94,7 +94,7 @@ def cluster_client(address: str) -> Generator[Any]:
     kind = asyncio.run(_identity(library, address, security))
     if kind != "Scheduler":
         raise SchedulerError(f"{address} is the address of a Dask {kind.lower()}: give that of its scheduler")
-    client: Any = library.Client(address, timeout=ANSWERS, set_as_default=False, security=security)
+    client: Any = library.Client(address, timeout=_ANSWERS, set_as_default=False, security=security)
     try:
         yield client
     except OSError as error:
@@ -146,7 +146,7 @@ def by_cluster(
                 under_way[future.key] = name
                 answers.add(future)
             if not answers.has_ready():
-                time.sleep(LOOK)
+                time.sleep(_LOOK)
                 continue
             future = next(answers)
             if future.cancelled():  # nobody cancels but a client that has lost its scheduler
@@ -184,10 +184,10 @@ async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: 
     """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
     try:
         secured = security.get_connection_args("client")
-        async with asyncio.timeout(ANSWERS), library.rpc(address, timeout=ANSWERS, connection_args=secured) as there:
+        async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=secured) as there:
             return str((await there.identity())["type"])
     except Exception as error:  # any program may listen there and answer anything
-        why = " ".join(str(error).split()) or f"nothing within {ANSWERS:.0f} s"
+        why = " ".join(str(error).split()) or f"nothing within {_ANSWERS:.0f} s"
         raise SchedulerError(
             f"{address}: no Dask scheduler answers there ({why}); start one, or give no address"
         ) from error
@@ -328,7 +328,7 @@ def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generat
     try:
         waiting = {pool.submit(work, *arguments): name for name, arguments in jobs.items()}
         while waiting:
-            for future in wait(waiting, LOOK, FIRST_COMPLETED).done:
+            for future in wait(waiting, _LOOK, FIRST_COMPLETED).done:
                 yield waiting.pop(future), future.result()
         pool.shutdown()
     except BaseException:

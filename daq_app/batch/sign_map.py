@@ -46,7 +46,7 @@ DESIGN: Mapping[str, tuple[float, float]] = {
 }
 RADII = tuple(np.arange(4.5, 8.01, 0.5).tolist())  # of the map [mm]
 PLACES = tuple(np.arange(-2.0, 2.01, 0.25).tolist())  # of the map [mm]
-FORCE = 0.1  # of the change "pressed by one force" [N/mm]: 1.5 N on a finger 15 mm wide
+_FORCE = 0.1  # of the change "pressed by one force" [N/mm]: 1.5 N on a finger 15 mm wide
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
     return {
         "as published": Trial(base),
         f"{other} strain": Trial(published_finger(other)),
-        f"pressed by {FORCE:g} N/mm": Trial(base, Press(force=FORCE)),
+        f"pressed by {_FORCE:g} N/mm": Trial(base, Press(force=_FORCE)),
         "receptor 1 mm proximal": Trial(base, arcs=(-1.0,)),
         "receptor 0.25 mm proximal": Trial(base, arcs=(-0.25,)),
         "receptor 0.25 mm distal": Trial(base, arcs=(0.25,)),

@@ -20,8 +20,8 @@ from daq_app.console import (
     takes_all,
 )
 
-HELP = frozenset({"-h", "--help"})
-LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
+_HELP = frozenset({"-h", "--help"})
+_LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
 
 # Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
 VERBS = {
@@ -82,7 +82,7 @@ def _dispatch(arguments: list[str]) -> int:
         Console(as_json=False).note(_overview().format_help().rstrip())
         return WRONG
     name, *rest = arguments
-    if name in HELP:
+    if name in _HELP:
         _overview().print_help()
         return DONE
     if name == "--version":
@@ -94,7 +94,7 @@ def _dispatch(arguments: list[str]) -> int:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
     verb = verb_module(name)
     parser = parser_of(name, verb)
-    if HELP & {*rest}:
+    if _HELP & {*rest}:
         parser.print_help()
         return DONE
     options = parser.parse_args(_join_values(rest))
@@ -151,8 +151,8 @@ def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 def _failure(error: Exception) -> tuple[str, int]:
     sentence = " ".join(str(error).split())
-    if len(sentence) > LONGEST:  # a damaged file put the middle into it
-        sentence = f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"
+    if len(sentence) > _LONGEST:  # a damaged file put the middle into it
+        sentence = f"{sentence[: _LONGEST // 2]} … {sentence[-_LONGEST // 2 :]}"
     if any(f"{kind.__module__}.{kind.__qualname__}" in _WRONG for kind in type(error).__mro__):
         return sentence, WRONG
     if sentence and is_ours(error):

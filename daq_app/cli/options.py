@@ -12,10 +12,10 @@ from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
 from sessions.plan.protocols.protocol import HEIGHTS
 from sessions.plan.protocols.protocol import LARGEST_SEED as LARGEST
-from sessions.strokes.stroke import FIXED, HERTZ, PLANNED_AT, AreaLaw
+from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, PLANNED_AT, AreaLaw
 from solver.quantities import NAMES, SED
 
-LARGEST_SEED = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large
+STUDY_SEED_END = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large
 
 
 def within(
@@ -61,7 +61,9 @@ def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
     parser.add_argument(name, action="store_true", help=meaning)
 
 
-def add_seed(parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = LARGEST_SEED) -> None:
+def add_seed(
+    parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = STUDY_SEED_END
+) -> None:
     """Declare --seed, of something that is drawn at random."""
     add_number(parser, "--seed", int, (0, largest), use, default)
 
@@ -136,7 +138,7 @@ def add_shared(parser: argparse.ArgumentParser, *names: str, **uses: str) -> Non
         parser.add_argument(*options, **how)
 
 
-FINGER = ("tip_radius", "width", "contact_angle")
+_FINGER = ("tip_radius", "width", "contact_angle")
 
 
 def add_body_arguments(parser: argparse.ArgumentParser) -> None:
@@ -151,8 +153,8 @@ def body_of(options: argparse.Namespace) -> Body:
     """Return what the options state. Raises WrongValue."""
     finger = numbers_by_key(options.finger, "--finger", "tip_radius=6.5")
     for key in finger:
-        if key not in FINGER:
-            raise WrongValue(f"--finger {key} is not known; allowed here: {', '.join(FINGER)}")
+        if key not in _FINGER:
+            raise WrongValue(f"--finger {key} is not known; allowed here: {', '.join(_FINGER)}")
     return Body(
         Finger(finger.get("tip_radius"), finger.get("width")),
         finger.get("contact_angle"),
@@ -200,7 +202,7 @@ def area_law(options: argparse.Namespace) -> AreaLaw | None:
         return FIXED
     force = PLANNED_AT if options.area_force is None else options.area_force
     if options.area == "hertz":
-        return AreaLaw("hertz", HERTZ, force)
+        return AreaLaw("hertz", HERTZ_EXPONENT, force)
     try:
         exponent = float(options.area)
     except ValueError:

@@ -18,15 +18,15 @@ from sessions.run.interruptions import Interruptions, interruptions
 from sessions.run.runner import SessionEnd, Status
 from sessions.run.steps import Command
 
-HELP = (
+_HELP = (
     "Enter does what is asked. At any time: redo REASON, skip REASON, pause, resume, note TEXT, abort REASON; "
     "undo, of a redo, until the next stroke. "
     "An answer is a number, or 1 or 2 for the first or second of two, or - for no answer."
 )
 PAUSED = "The session is paused. Type resume to go on."
 KEYBOARD = "keyboard"
-CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
-WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
+_CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
+_WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Terminal:
         self.closed = False  # nobody can type any more
         # A daemon: a blocked read of stdin must not keep the program alive.
         threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
-        self._print(HELP)
+        self._print(_HELP)
 
     def show(self, command: steps.Command) -> None:
         """Print what is to be done, and remember what was asked."""
@@ -88,7 +88,7 @@ class Terminal:
                 return Prompt(f"{kind} {trial.number}: mount {code}, then press Enter.", steps.StimulusMounted(code))
             case steps.AskStroke(trial, allowed):
                 often = "once" if allowed == 1 else f"up to {allowed} times"
-                stroke = f"Stroke {often}, {WAYS[trial.direction]}."
+                stroke = f"Stroke {often}, {_WAYS[trial.direction]}."
                 return (
                     Prompt(stroke)
                     if self._forces
@@ -138,7 +138,7 @@ class Terminal:
         elif self._prompt is not None and (number is not None or line == "-"):
             event = self._prompt.answer(number)
         if event is None:
-            due = PAUSED if self._paused else HELP if self._prompt is None else self._prompt.question
+            due = PAUSED if self._paused else _HELP if self._prompt is None else self._prompt.question
             nothing = f"'{line}' means nothing now" if line else "Nothing is waiting for Enter now"
             doubt = ": it is {} or {}".format(*meanings) if (meanings := two_meanings(line)) else ""
             self._print(f"{nothing}{doubt}. {due}")
@@ -152,13 +152,13 @@ class Terminal:
 
 def _choice(number: float | None) -> steps.Event | None:
     """Return the choice of 1, 2 or neither; None for any other number."""
-    if number is not None and number not in CHOICES:
+    if number is not None and number not in _CHOICES:
         return None
-    return steps.PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
+    return steps.PairedChoice(None if number is None else _CHOICES[number], input_device=KEYBOARD)
 
 
 SILENCE = 3.0  # after which a recorder that should answer ten times a second is wondered about [s]
-LOOK = 0.02  # between two looks at recorder, terminal and Ctrl-C [s]
+_LOOK = 0.02  # between two looks at recorder, terminal and Ctrl-C [s]
 _WRONG = frozenset({"AddressError", "NotNow"})  # failures that come of the command line
 
 
@@ -182,7 +182,7 @@ def open_device(recorder: Recorder, uri: str) -> m.Device:
     with interruptions() as interrupted:
         recorder.send(m.Connect(uri))
         while True:
-            for report in recorder.poll(LOOK):
+            for report in recorder.poll(_LOOK):
                 if isinstance(report, m.Device):
                     return report
                 _raise_failure(report)
@@ -216,7 +216,7 @@ class _Attendance:
 
     def to_the_end(self) -> Outcome:
         while True:
-            for report in self._recorder.poll(LOOK):
+            for report in self._recorder.poll(_LOOK):
                 if (outcome := self._take(report)) is not None:
                     return outcome
             if self._interrupted.heard:

@@ -44,9 +44,9 @@ from sessions.exchange import FORMATS
 from sessions.prediction import QUANTITIES
 from sessions.report.wording import shown_response
 
-LOOK = 30  # between two looks at the work [ms]
-ONE_ROW = 760  # width in which what is being done stands beside the buttons, before the font's scale [px]
-LEAST = (480, 320)  # the window can be made as small as that [px]
+_LOOK = 30  # between two looks at the work [ms]
+_ONE_ROW = 760  # width in which what is being done stands beside the buttons, before the font's scale [px]
+_LEAST = (480, 320)  # the window can be made as small as that [px]
 
 
 class LineageLabel(QLabel):
@@ -131,7 +131,7 @@ class AnalystWindow(QMainWindow):
         self._place_columns()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look)
-        self._timer.start(LOOK)
+        self._timer.start(_LOOK)
         self._show()
 
     def sizeHint(self) -> QSize:
@@ -177,7 +177,7 @@ class AnalystWindow(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the columns beside each other, or on pages where there is little room."""
         super().resizeEvent(event)
-        set_horizontal(self._foot, self.width() >= px(ONE_ROW))
+        set_horizontal(self._foot, self.width() >= px(_ONE_ROW))
         self._place_columns()
         self.keys.fit()
 
@@ -286,7 +286,7 @@ class AnalystWindow(QMainWindow):
         self.format.setFixedWidth(px(90))
         window = QWidget()
         window.setObjectName("window")
-        window.setMinimumSize(*LEAST)  # the columns find room in less than they would like
+        window.setMinimumSize(*_LEAST)  # the columns find room in less than they would like
         acts = self.stop, self.go_on, self.report, self.format, self.export
         head, doing = hbox((self.way, 1), self._head), hbox((self._words, 1), self.progress)
         self._foot = hbox((doing, 1), hbox(1, *acts))

@@ -27,19 +27,19 @@ from daq_app.wording import POINTS, two_meanings, typed_number
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event, Scored
 
-REACH = 12.0  # above and below the line that counts as touching it [mm]
+_REACH = 12.0  # above and below the line that counts as touching it [mm]
 MARK = 10.0  # height of the mark [mm]
 
-KEYS = {
+_KEYS = {
     Qt.Key.Key_Left: -STEP, Qt.Key.Key_Down: -STEP, Qt.Key.Key_Right: STEP, Qt.Key.Key_Up: STEP,
     Qt.Key.Key_PageDown: -LEAP, Qt.Key.Key_PageUp: LEAP, Qt.Key.Key_Home: -100.0, Qt.Key.Key_End: 100.0,
 }  # fmt: skip
-NUMBER = QRegularExpression(
+_NUMBER = QRegularExpression(
     rf"\d{{0,9}}([{POINTS}]\d{{0,9}})?", QRegularExpression.PatternOption.UseUnicodePropertiesOption
 )  # what can be typed of one
-LARGE = 36  # type of the number [device-independent pixels]
-WORDS = 24  # type of the buttons
-WIDE, HIGH = 220, 96  # a button, at least
+_LARGE = 36  # type of the number [device-independent pixels]
+_WORDS = 24  # type of the buttons
+_WIDE, HIGH = 220, 96  # a button, at least
 FULL = 5.0  # of the bar [N]
 OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
 
@@ -100,7 +100,7 @@ class ScoreLine(QAbstractSlider):
 
     def sizeHint(self) -> QSize:
         scale = self._pixels_per_mm
-        return QSize(round((LENGTH + MARK) * scale), round(2 * REACH * scale))
+        return QSize(round((LENGTH + MARK) * scale), round(2 * _REACH * scale))
 
     def event(self, event: QEvent) -> bool:
         """Take touches; Qt makes mouse events only of those that nobody takes."""
@@ -121,7 +121,7 @@ class ScoreLine(QAbstractSlider):
         self._take(self.answer.release())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        step = KEYS.get(Qt.Key(event.key()))
+        step = _KEYS.get(Qt.Key(event.key()))
         if step is None:
             super().keyPressEvent(event)
             return
@@ -233,8 +233,8 @@ class NumberField(_Field):
         self.field.setAccessibleName(Text.OWN_NUMBER)
         self.field.setFixedWidth(px(260))
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.field.setStyleSheet(f"font-size: {px(LARGE)}px;")
-        self.field.setValidator(QRegularExpressionValidator(NUMBER, self.field))
+        self.field.setStyleSheet(f"font-size: {px(_LARGE)}px;")
+        self.field.setValidator(QRegularExpressionValidator(_NUMBER, self.field))
         self.field.textEdited.connect(self._type)
         fill(QHBoxLayout(self), 1, self.field, 1)
         self.setFocusProxy(self.field)
@@ -301,8 +301,8 @@ class ChoiceOfTwo(_Field):
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.
-        size = f"min-width: {px(WIDE)}px; min-height: {px(HIGH)}px;"
-        choice.setStyleSheet(f"font-size: {px(WORDS)}px; {size}")
+        size = f"min-width: {px(_WIDE)}px; min-height: {px(HIGH)}px;"
+        choice.setStyleSheet(f"font-size: {px(_WORDS)}px; {size}")
         return choice
 
     def _take(self, answer: Choice) -> None:

@@ -12,14 +12,14 @@ from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS
 from daq_app.window.state import Message
-from daq_app.window.view import NAMES, Bar, BenchView
+from daq_app.window.view import HEALTH_NAMES, Bar, BenchView
 from daq_app.wording import tr, tr_noop
 
 SHOWN_COUNTERS = tr_noop(
     ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "lag")
 )
 
-FIELDS = tr_noop(("serial", "calibration", "rate", "tare", "drift"))
+_FIELDS = tr_noop(("serial", "calibration", "rate", "tare", "drift"))
 SPOKEN = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the zero")}  # where a caption does not say
 
 
@@ -32,9 +32,9 @@ class BenchPanel(Panel):
         self._view: BenchView | None = None
         self._lamp = Lamp(tr("transducer"))
         self._lamp_words = label(tr("not connected"), wrap=True)
-        self._fields = {name: label("–", wrap=True) for name in FIELDS}
+        self._fields = {name: label("–", wrap=True) for name in _FIELDS}
         self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
-        self._life = {name: label("–", wrap=True) for name in NAMES}
+        self._life = {name: label("–", wrap=True) for name in HEALTH_NAMES}
         self._name = label("", "title", wrap=True)
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         for count in self._counters.values():

@@ -32,10 +32,10 @@ from daq_app.window.view import View, derive_view
 from drivers.catalog import reachable
 from sessions.plan.plan import Frame
 
-FRAME = 16  # between two looks at the recorder [ms]: 60 a second
+_FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
 BEGINNING = (m.Connect, m.StartSession, m.ResumeSession)  # requests for which another recorder is started
-TICK = 0.1  # between two looks at the clock, for what tells an age [s]
+_TICK = 0.1  # between two looks at the clock, for what tells an age [s]
 
 
 class Client(Protocol):
@@ -75,7 +75,7 @@ class Bridge(QObject):
         self.model = LiveModel()
         self.session_offset = 0.0  # session clock minus this machine's [s]
         self._timer = QTimer(self)
-        self._timer.setInterval(FRAME)
+        self._timer.setInterval(_FRAME)
         self._timer.timeout.connect(self.poll)
 
     @property
@@ -124,7 +124,7 @@ class Bridge(QObject):
     def poll(self) -> None:
         """Take what has come, and let it be drawn."""
         now = time.monotonic()
-        if now - self._ticked >= TICK:
+        if now - self._ticked >= _TICK:
             self._ticked = now
             self._fold(Tick(now))
         for report in together(self._client.poll()):

@@ -19,8 +19,8 @@ from sessions.run import steps
 
 MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # that take a text
 ACTS = ("skip", "redo", "pause", "note", "no answer", "end")  # that have a button
-WORDS = {name: key.words for key in KEYS for name in (key.key, key.act)}
-ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
+_WORDS = {name: key.words for key in KEYS for name in (key.key, key.act)}
+_ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
 
 
 class CoursePanel(Panel):
@@ -33,7 +33,7 @@ class CoursePanel(Panel):
         self._asking = ""
         self._asked_for = ""  # the question that stands over the line
         self.plan = row_list(tr("plan: trials done, in hand and coming"))
-        self.buttons = {act: button("", tr(WORDS[act]), partial(self.ask, act), "small") for act in ACTS}
+        self.buttons = {act: button("", tr(_WORDS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
@@ -47,7 +47,7 @@ class CoursePanel(Panel):
         self._bottom = stack_pages(acts, self._entry_row())
         self._timer = label("", "quiet")
         self.mirror = Mirror()
-        self._roomy = px(ROOMY, most=1.4)
+        self._roomy = px(_ROOMY, most=1.4)
         head = hbox((label(tr("Plan"), "section"), 1), self._timer)
         around = (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         vbox(head, (self.plan, 1), self.mirror, self._bottom, on=self, margins=around, spacing=GRID)
@@ -66,7 +66,7 @@ class CoursePanel(Panel):
             shown = view.buttons[name]
             if before is None or shown != before.buttons[name]:
                 widget.setText(f"{shown.label} {tr(shown.key)}".strip())
-                widget.setAccessibleName(f"{shown.label}: {tr(WORDS.get(shown.key, WORDS['no answer']))}")
+                widget.setAccessibleName(f"{shown.label}: {tr(_WORDS.get(shown.key, _WORDS['no answer']))}")
                 widget.setEnabled(shown.enabled)
 
     def ask(self, what: str) -> None:

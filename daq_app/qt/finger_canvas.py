@@ -14,25 +14,25 @@ from daq_app.qt.plots import name_axis, pg, style_axis
 from daq_app.qt.tokens import SMALL, Tokens, font, px
 from daq_app.wording import tr, tr_noop
 
-HELP = tr_noop(
+_HELP = tr_noop(
     "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
     "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
 )
 NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
 SHADES = 64
 ZOOM = 1.25  # of a key [-]: three of them double the picture
-STEP = 0.1  # of the picture's width that an arrow key moves it
-END_STEP = 0.2  # of `STEP`, by which an arrow key moves an end of a line
-LEAST = 110  # height of the finger, before the font's scale [px]
+_STEP = 0.1  # of the picture's width that an arrow key moves it
+END_STEP = 0.2  # of `_STEP`, by which an arrow key moves an end of a line
+_LEAST = 110  # height of the finger, before the font's scale [px]
 BAR_LINES = 3.5  # of text: height of the colour bar
 LEAST_LINES = 2.2  # of words over a finger: with fewer of them the picture stays where it is
-NEAREST, FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
+NEAREST, _FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
 # Black lines lie on the colours: magma begins a fifth above its dark end, and nought of a signed field is pale.
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
 LINE_KEYS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
-ARROWS = {
-    Qt.Key.Key_Left: (-STEP, 0.0), Qt.Key.Key_Right: (STEP, 0.0), Qt.Key.Key_Up: (0.0, STEP),
-    Qt.Key.Key_Down: (0.0, -STEP),
+_ARROWS = {
+    Qt.Key.Key_Left: (-_STEP, 0.0), Qt.Key.Key_Right: (_STEP, 0.0), Qt.Key.Key_Up: (0.0, _STEP),
+    Qt.Key.Key_Down: (0.0, -_STEP),
 }  # fmt: skip
 
 
@@ -80,10 +80,10 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._shades = {signed: _shades(*what) for signed, what in MAPS.items()}
         self.setBackground(tokens.surface)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self._least = px(LEAST)
+        self._least = px(_LEAST)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setToolTip(tr(HELP))
+        self.setToolTip(tr(_HELP))
         self.setAccessibleName(tr("finger of the model: none"))
         self._box, self._bar = _Box(self.sight), self._colour_bar()
         self.ci.addItem(self._box, 0, 0)
@@ -181,10 +181,10 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             self.sight.look_at(None)
         elif key == Qt.Key.Key_Delete and self.sight.line is not None:
             self.sight.set_line(None)
-        elif key in ARROWS and event.modifiers() & LINE_KEYS:
+        elif key in _ARROWS and event.modifiers() & LINE_KEYS:
             self._move_end(key, begins=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
-        elif key in ARROWS:
-            self._box.move(*ARROWS[key])
+        elif key in _ARROWS:
+            self._box.move(*_ARROWS[key])
         else:
             event.ignore()
 
@@ -192,7 +192,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
         part = self._box.viewRect()
         line = self.sight.line or ((part.center().x(), part.center().y()),) * 2
-        across, up = (END_STEP * step * part.width() for step in ARROWS[key])
+        across, up = (END_STEP * step * part.width() for step in _ARROWS[key])
         x, y = line[0 if begins else 1]
         moved = (x + across, y + up)
         self.sight.set_line((moved, line[1]) if begins else (line[0], moved))
@@ -254,7 +254,7 @@ class _Box(pg.ViewBox):
         pg.ViewBox.__init__(self, lockAspect=True, enableMenu=False, defaultPadding=0.0)
         self._sight = sight
         self.draws = False  # what is dragged is the end of a line
-        self.setLimits(minXRange=NEAREST, maxXRange=FARTHEST)
+        self.setLimits(minXRange=NEAREST, maxXRange=_FARTHEST)
         self.sigRangeChangedManually.connect(self._tell)
 
     def zoom(self, factor: float) -> None:

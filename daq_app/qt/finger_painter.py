@@ -13,10 +13,10 @@ from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
 
-ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
-TRACTIONS = LONGEST + 0.4  # below the surface: the arrows, and the line of what the skin does [mm]
-NEAR = (4.6, 4.4)  # half width and height above the surface of the close view [mm]
-COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four [pixel2]: its steps would be seen
+_ARROWS, _LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
+TRACTIONS = _LONGEST + 0.4  # below the surface: the arrows, and the line of what the skin does [mm]
+_NEAR = (4.6, 4.4)  # half width and height above the surface of the close view [mm]
+_COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four [pixel2]: its steps would be seen
 STYLES = {"slip": Qt.PenStyle.SolidLine, "cap": Qt.PenStyle.DashLine, "stick": Qt.PenStyle.DotLine}
 STATE_WORDS = {"slip": tr_noop("slips"), "cap": tr_noop("slips at the bound"), "stick": tr_noop("sticks")}
 
@@ -40,7 +40,7 @@ def whole_box(frame: Frame, look: Look) -> Box:
     places: list[float] = frame.contact.x.tolist()
     touching = [x for x, state in zip(places, frame.contact.state, strict=True) if state != "open"]
     middle = (min(touching) + max(touching)) / 2.0 if touching else 0.0
-    half, above = NEAR
+    half, above = _NEAR
     return middle - half, middle + half, -TRACTIONS, above
 
 
@@ -84,7 +84,7 @@ class FingerPainter:
         shown = self.view.visible(box.left(), box.top(), box.width(), box.height())
         nodes, values = frame.nodes, look.field.of(frame)
         triangles = visible(nodes, self.parts.triangles, shown)
-        if len(triangles) and box.width() * box.height() / len(triangles) > COARSE:
+        if len(triangles) and box.width() * box.height() / len(triangles) > _COARSE:
             nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
         part = (values[triangles].mean(axis=1) - low) / (high - low)
@@ -153,14 +153,14 @@ class FingerPainter:
         places: list[float] = self.view.to_screen(np.column_stack([contact.x, np.zeros(len(contact.x))]))[:, 0].tolist()
         strongest = float(np.hypot(contact.pressure, contact.traction)[touching].max())
         painter.setPen(QPen(ink, 1.0))
-        for i in touching[:: max(1, -(-len(touching) // ARROWS))] if strongest > 0.0 else ():
-            reach = self.view.per_mm * LONGEST / strongest
+        for i in touching[:: max(1, -(-len(touching) // _ARROWS))] if strongest > 0.0 else ():
+            reach = self.view.per_mm * _LONGEST / strongest
             tip = QPointF(places[i], ground + 2.0)
             tail = QPointF(tip.x() - reach * contact.traction[i], tip.y() + reach * contact.pressure[i])
             painter.drawLine(tail, tip)
             painter.drawLine(tip, QPointF(tip.x() - 2.5, tip.y() + 4.0))
             painter.drawLine(tip, QPointF(tip.x() + 2.5, tip.y() + 4.0))
-        level = ground + self.view.per_mm * (LONGEST + 0.3)
+        level = ground + self.view.per_mm * (_LONGEST + 0.3)
         for state, run in itertools.groupby(zip(contact.state, places, strict=True), key=lambda one: one[0]):
             if state == "open":
                 continue

@@ -15,10 +15,10 @@ from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
 
-ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
+_ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
-LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
-MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
+_LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
+_MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 
 class Header(QWidget):
@@ -41,7 +41,7 @@ class Header(QWidget):
         self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         subject = hbox((self._heading, 3), (self._device, 2), self._language, spacing=GRID)
         lamp = hbox(1, self._simulated, self._lamp, self._words, self._saved, spacing=GRID)
-        self._one_row = px(ONE_ROW)
+        self._one_row = px(_ONE_ROW)
         self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
         longest = tr("saved {age:.1f} s ago", age=99.9)
         self._saved.setFixedWidth(QFontMetrics(font(SMALL)).horizontalAdvance(f"{longest} "))
@@ -94,7 +94,7 @@ class Notice(Panel):
         if grade == "wrong" and (before is None or before.grade != "wrong"):
             QApplication.beep()  # nobody looks at the window all the time
         words = self.warning or notice
-        text = f"{MARKS[grade]} {banner.sentence} {self.warning}" if banner else words[:1].upper() + words[1:]
+        text = f"{_MARKS[grade]} {banner.sentence} {self.warning}" if banner else words[:1].upper() + words[1:]
         say(self._words, text.strip(), tr("Notice:"))
         regrade(self, grade)
         self._button.setVisible(banner is not None and banner.sends is not None)
@@ -126,7 +126,7 @@ class ToDo(Panel):
         self._small = False
         self._arrow = Arrow()
         self.sentence = label("", "headline", wrap=True)
-        self.sentence.setMinimumHeight(LEAST)
+        self.sentence.setMinimumHeight(_LEAST)
         self.primary = button("", tr("do it"), primary, "primary")
         self.second = button(tr("Review  F4"), tr("look at the session that has ended"), review)
         self.second.hide()
@@ -154,7 +154,7 @@ class ToDo(Panel):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
-            self.sentence.setMinimumHeight(LEAST)
+            self.sentence.setMinimumHeight(_LEAST)
 
     def show_small(self, small: bool) -> None:
         """Use smaller type, and one button below the other, where there is little room."""
@@ -164,7 +164,7 @@ class ToDo(Panel):
             self._buttons.setDirection(ways.BottomToTop if small else ways.LeftToRight)
             regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)
-            self.sentence.setMinimumHeight(LEAST)
+            self.sentence.setMinimumHeight(_LEAST)
 
 
 class Arrow(QWidget):

@@ -13,7 +13,7 @@ from daq_app.qt.tokens import GRID, px
 from daq_app.window.subject import owner
 from daq_app.wording import tr, tr_noop
 
-WIDTH = 720  # of the page, before the font's scale
+_WIDTH = 720  # of the page, before the font's scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +79,14 @@ ANALYST_KEYS = (
     Key("F1", "keys", tr_noop("show or hide these keys")),
 )
 
-SAME = {"Return": "Space", "Enter": "Space", "=": "+"}  # keys that do what another does
-PLAIN = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier  # change nothing of a key's meaning
+_SAME = {"Return": "Space", "Enter": "Space", "=": "+"}  # keys that do what another does
+_PLAIN = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier  # change nothing of a key's meaning
 
 
 def act_of(event: QKeyEvent) -> str | None:
     """Return the act a key stands for; None where it stands for none."""
-    name, modifiers = QKeySequence(event.key()).toString(), event.modifiers() & ~PLAIN
-    name = SAME.get(name, name)
+    name, modifiers = QKeySequence(event.key()).toString(), event.modifiers() & ~_PLAIN
+    name = _SAME.get(name, name)
     if modifiers == Qt.KeyboardModifier.ControlModifier:
         name = f"Ctrl+{name}"
     elif modifiers != Qt.KeyboardModifier.NoModifier:
@@ -96,7 +96,7 @@ def act_of(event: QKeyEvent) -> str | None:
 
 def name_of(event: QKeyEvent) -> str:
     """Return the name of a key that is pressed without Ctrl, Alt or the like; empty where it is held with one."""
-    if event.modifiers() & ~PLAIN:
+    if event.modifiers() & ~_PLAIN:
         return ""
     return "Enter" if event.key() == Qt.Key.Key_Return else QKeySequence(event.key()).toString()
 
@@ -134,7 +134,7 @@ class KeysPage(Panel):
         if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  it was never seen
             return
         window = self._over.size()
-        size = QSize(px(WIDTH), 0).boundedTo(window - QSize(4 * GRID, 4 * GRID))
+        size = QSize(px(_WIDTH), 0).boundedTo(window - QSize(4 * GRID, 4 * GRID))
         around = self._column.totalMinimumSize() - self._area.minimumSizeHint()
         keys = self._rows.totalHeightForWidth(size.width() - around.width())
         size.setHeight(min(around.height() + keys, window.height() - 4 * GRID))

@@ -20,19 +20,19 @@ from daq_app.window.live_trace import CHANNELS, PlotScale
 from daq_app.wording import quantity, tr, tr_noop
 from drivers.arrays import Array
 
-LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
-COLOURS = {"N": N, "T": T, "mu": MU}  # under the captions of the numbers
-SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
+_LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
+_COLOURS = {"N": N, "T": T, "mu": MU}  # under the captions of the numbers
+_SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
 LEAST_FOR_ACTS = 170  # a lower panel has room for the numbers alone, before the font's scale [px]
-NAMES = {  # as spoken
+_NAMES = {  # as spoken
     "N": tr_noop("Normal force"), "T": tr_noop("Tangential force"),
     "mu": tr_noop("Friction coefficient"), "speed": tr_noop("Speed"),
 }  # fmt: skip
-WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
+_WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
 TRAIL = 2.0  # of the centre of pressure [s] ...
-POINTS = 120  # ... in so many points
+_POINTS = 120  # ... in so many points
 TAB = 24  # width of what opens and closes the drawer, before the font's scale [px]
 READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
 
@@ -42,12 +42,12 @@ PLOTS = (
     (tr_noop("speed [mm/s]"), (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
 )
 TORQUES = (Curve("Tx", FX, dashed=True), Curve("Ty", FY, dashed=True), Curve("Tz", "text", dashed=True))
-AXES = (
+AXIS_PLOTS = (
     ("Fx Fy Fz [N]", (Curve("Fx", FX), Curve("Fy", FY), Curve("Fz", "text")), PlotScale(-5.0, 5.0, 10.0)),
     ("Tx Ty Tz [N mm]", TORQUES, PlotScale(-50.0, 50.0, 100.0)),
 )
 INSTEAD = Curve("SED instead", MODEL, dashed=True, named=False)
-SED = (tr_noop("SED [kPa], model"), (Curve("SED", MODEL), INSTEAD), PlotScale(0.0, 5.0, 5.0))
+_SED = (tr_noop("SED [kPa], model"), (Curve("SED", MODEL), INSTEAD), PlotScale(0.0, 5.0, 5.0))
 FINITE = "live model/finite strain"  # under which the choice is remembered
 
 
@@ -67,8 +67,8 @@ class LiveBar(QWidget):
         self.finite = button(words, name, lambda: finite(self.finite.isChecked()), checkable=True)
         words = tr("Live model at small strain, or at finite strain where the forces are within its reach")
         self.finite.setToolTip(words)
-        self.length = choice(tr("stretch of time that is shown"), (f"{seconds} s" for seconds in LENGTHS))
-        self.length.activated.connect(lambda: length(LENGTHS[self.length.currentIndex()]))
+        self.length = choice(tr("stretch of time that is shown"), (f"{seconds} s" for seconds in _LENGTHS))
+        self.length.activated.connect(lambda: length(_LENGTHS[self.length.currentIndex()]))
         self.length.setFixedWidth(px(84))
         acts = hbox(1, self.finite, self.length, self.hold, spacing=GRID)
         self._rows = hbox(self._numbers(), acts, on=self, spacing=GRID // 2)
@@ -103,7 +103,7 @@ class LiveBar(QWidget):
         self._short = self._acts > self.width()
         self.show_words()
         set_horizontal(self._rows, self._in_a_row(self.width()))
-        size, role = next((pair for pair in SIZES if self._needed_width(pair[0]) <= self.width()), SIZES[-1])
+        size, role = next((pair for pair in _SIZES if self._needed_width(pair[0]) <= self.width()), _SIZES[-1])
         room = self.width()
         for channel, value in self.values.items():
             caption = self._captions[channel]
@@ -132,7 +132,7 @@ class LiveBar(QWidget):
         return captions + sum(self._widest(channel, size) for channel in self.values)
 
     def _widest(self, channel: str, size: int) -> int:
-        return QFontMetrics(font(size, bold=size == TITLE)).horizontalAdvance(WIDEST[channel]) + 4
+        return QFontMetrics(font(size, bold=size == TITLE)).horizontalAdvance(_WIDEST[channel]) + 4
 
     def _numbers(self) -> QHBoxLayout:
         for channel in PICTURE:
@@ -141,8 +141,8 @@ class LiveBar(QWidget):
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setAccessibleName(spoken(channel, "–"))
             caption = label(short_name(channel), "quiet")
-            if channel in COLOURS:
-                caption.setStyleSheet(f"border-bottom: 3px solid {COLOURS[channel]};")
+            if channel in _COLOURS:
+                caption.setStyleSheet(f"border-bottom: 3px solid {_COLOURS[channel]};")
             self.values[channel], self._captions[channel] = value, caption
         # Where there is room, a caption stands nearer to its own number than to another.
         spread = [part for channel, value in self.values.items() for part in (1, self._captions[channel], value)]
@@ -155,7 +155,7 @@ def spoken(channel: str, text: str) -> str:
     >>> spoken("N", "1.20 N"), spoken("mu", "–")
     ('Normal force 1.20 N', 'Friction coefficient no number')
     """
-    return f"{tr(NAMES[channel])} {tr('no number') if text == '–' else text}"
+    return f"{tr(_NAMES[channel])} {tr('no number') if text == '–' else text}"
 
 
 def short_name(channel: str) -> str:
@@ -175,8 +175,8 @@ class LivePanel(Panel):
         self._drawn: object = None  # what the picture was drawn of
         self._forces_shown = True
         self._least_for_acts = px(LEAST_FOR_ACTS)
-        self.plots = [LivePlot(*plot) for plot in (*PLOTS, *AXES)]
-        self._model_plot = LivePlot(*SED, MODEL_CHANNELS)
+        self.plots = [LivePlot(*plot) for plot in (*PLOTS, *AXIS_PLOTS)]
+        self._model_plot = LivePlot(*_SED, MODEL_CHANNELS)
         self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
         self._column = (*self.plots[:3], self._model_plot)  # below each other
         self.finger = FingerView()
@@ -224,13 +224,13 @@ class LivePanel(Panel):
         self._seconds = seconds
         for plot in (*self.plots, self._model_plot):
             plot.show_axis(seconds)
-        self.bar.length.setCurrentIndex(LENGTHS.index(seconds))
+        self.bar.length.setCurrentIndex(_LENGTHS.index(seconds))
 
     def change_length(self, by: int) -> None:
         """Show the next longer (+1) or shorter (-1) stretch."""
-        at = LENGTHS.index(self._seconds) + by
-        if 0 <= at < len(LENGTHS):
-            self.show_seconds(LENGTHS[at])
+        at = _LENGTHS.index(self._seconds) + by
+        if 0 <= at < len(_LENGTHS):
+            self.show_seconds(_LENGTHS[at])
 
     def show_finite(self, finite: bool) -> None:
         self.bar.finite.setChecked(finite)
@@ -263,7 +263,7 @@ class LivePanel(Panel):
             for plot in self.plots[3:]:
                 plot.show_axis(end=hold or latest)
             if self.map.isVisible():
-                every = max(round(TRAIL * trace.rate / POINTS), 1)
+                every = max(round(TRAIL * trace.rate / _POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
                 self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1, : 0 if silent else None].T)
         self._draw_model(end, clock, still=end != newest, silent=silent)

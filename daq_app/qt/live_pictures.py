@@ -14,12 +14,12 @@ from daq_app.wording import tr
 from drivers.arrays import Array
 from solver.prediction import ROW
 
-ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
-MARGIN = 4  # [pixels]
+_ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
+_MARGIN = 4  # [pixels]
 TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 
-SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
-PART = 0.62  # of the height that the finger takes; the row has the rest
+_SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
+_PART = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = (
     "#fcfdbf", "#fde9aa", "#fed698", "#fec186", "#feae77", "#fd9a6a", "#fb8660", "#f7715c", "#f05f5d", "#e44f64",
@@ -28,7 +28,7 @@ MAGMA = (
 ROW_LINES = 4.0  # of text, below which height the row is left out and the finger has all the room
 TOP_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
 EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
-TOP = 0.97  # of the faces' SED lies below the end of the colour scale
+_TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
 
 class ContactMap(PaintedWidget):
@@ -79,16 +79,16 @@ class ContactMap(PaintedWidget):
             painter.drawEllipse(QPointF(x[-1], y[-1]), 6, 6)
 
     def _per_mm(self) -> float:
-        return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - self._words_width() - 2 * MARGIN) / ACROSS)
+        return min((self.height() - 2 * _MARGIN) / _ALONG, (self.width() - self._words_width() - 2 * _MARGIN) / ACROSS)
 
     def _words_width(self) -> float:
         """Return the width of the column of words at the right of the sample."""
         metrics = QFontMetricsF(font(SMALL))
-        return max(metrics.horizontalAdvance(words) for words in self._words) + 2 * MARGIN
+        return max(metrics.horizontalAdvance(words) for words in self._words) + 2 * _MARGIN
 
     def _middle(self) -> QPointF:
         """Return where the middle of the face is: that of the widget, or as far left as the words need."""
-        room = self.width() - self._words_width() - MARGIN
+        room = self.width() - self._words_width() - _MARGIN
         return QPointF(min(self.width() / 2, room - ACROSS * self._per_mm() / 2), self.height() / 2)
 
     def draw_ground(self) -> QPixmap:
@@ -100,14 +100,16 @@ class ContactMap(PaintedWidget):
         painter = QPainter(picture)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle = self._middle()
-        box = QRectF(0, 0, ACROSS * per_mm, ALONG * per_mm)
+        box = QRectF(0, 0, ACROSS * per_mm, _ALONG * per_mm)
         box.moveCenter(middle)
         painter.setPen(QPen(QColor(t.line), 1))
         painter.setBrush(QColor(t.raised))
         painter.drawRoundedRect(box, 4, 4)
         painter.setFont(font(SMALL))
         painter.setPen(QColor(t.quiet))
-        margin_box = QRectF(box.right() + 2 * MARGIN, box.top(), self.width() - box.right() - 2 * MARGIN, box.height())
+        margin_box = QRectF(
+            box.right() + 2 * _MARGIN, box.top(), self.width() - box.right() - 2 * _MARGIN, box.height()
+        )
         places = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
         if box.height() >= len(places) * painter.fontMetrics().height():
             for place, text in zip(places, self._words, strict=True):
@@ -150,7 +152,7 @@ class FingerView(QWidget):
         self._drawn_at = clock
         self._picture, self._row, self._words = picture, 1000.0 * row, words
         if picture is not None and len(picture.sed):
-            self._colours = self._colours.following(0.0, 1000.0 * float(np.quantile(picture.sed, TOP)), clock)
+            self._colours = self._colours.following(0.0, 1000.0 * float(np.quantile(picture.sed, _TOP)), clock)
         known = self._row[np.isfinite(self._row)]
         if len(known):
             self._heights = self._heights.following(0.0, float(known.max()), clock)
@@ -172,7 +174,7 @@ class FingerView(QWidget):
         top = max(needed, 3.0 * line) + 4
         painter.setFont(font(SMALL))
         room = self.height() - top
-        row = room * (1.0 - PART) if room * (1.0 - PART) >= ROW_LINES * line else 0.0
+        row = room * (1.0 - _PART) if room * (1.0 - _PART) >= ROW_LINES * line else 0.0
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if room - row >= line:
             self._paint_finger(painter, QRectF(0, top, self.width(), room - row))
@@ -180,7 +182,7 @@ class FingerView(QWidget):
             self._paint_row(painter, QRectF(0, top + room - row, self.width(), row))
 
     def _paint_finger(self, painter: QPainter, box: QRectF) -> None:
-        t, view = theme_of(self), View.fit(SHOWN, box.left(), box.top(), box.width(), box.height())
+        t, view = theme_of(self), View.fit(_SHOWN, box.left(), box.top(), box.width(), box.height())
         if view.per_mm < 1.0:
             return
         painter.save()

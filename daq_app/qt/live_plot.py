@@ -15,14 +15,14 @@ from daq_app.qt.painting import PaintedWidget, blank, draw_line, fine, sheer
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import SMALL, font, px
 from daq_app.window.course_state import Mark
-from daq_app.window.live_trace import CHANNELS, MARGIN, Columns, PlotScale, ticks, times
+from daq_app.window.live_trace import CHANNELS, SCALE_MARGIN, Columns, PlotScale, ticks, times
 from daq_app.wording import tr, tr_noop
 
 AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
-LEAST = 36  # height that holds the name and the times under it, likewise
+_LEAST = 36  # height that holds the name and the times under it, likewise
 SAMPLE = 14  # length of the piece of line before a curve's name, likewise
 DASHES = 45  # times two thirds of a dash in the stretch that is shown
-TOP = 2  # above the names [px]
+_TOP = 2  # above the names [px]
 LINES = 3  # of type: a lower plot has no line to spare for its names
 FAR = 1e4  # a value so many pixels away is as good as any beyond it
 
@@ -60,7 +60,7 @@ class LivePlot(PaintedWidget):
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
         self._words = {kind: QStaticText(tr(kind)) for kind in tr_noop(("onset", "lift"))}
-        self.setMinimumSize(40, px(LEAST))
+        self.setMinimumSize(40, px(_LEAST))
         self.setAccessibleName(tr("plot of {name}", name=self._name))
 
     def show_axis(self, seconds: float | None = None, *, times: bool | None = None, end: str | None = None) -> None:
@@ -103,13 +103,13 @@ class LivePlot(PaintedWidget):
         """Return where curves are: below the names, but in a plot so low that its names must lie over them."""
         left = px(AXIS_WIDTH)
         below = px(SMALL + 5) if self._times_shown else 3
-        names, high = QFontMetricsF(font(SMALL, bold=True)).height(), self.height() - below - TOP
-        top = TOP + names if high >= LINES * names else TOP
+        names, high = QFontMetricsF(font(SMALL, bold=True)).height(), self.height() - below - _TOP
+        top = _TOP + names if high >= LINES * names else _TOP
         return QRectF(left, top, max(self.width() - left - 4, 8), max(self.height() - below - top, 8))
 
     def _reach(self) -> tuple[float, float]:
         """Return the values at the lower and the upper edge."""
-        beyond = MARGIN * (self._scale.high - self._scale.low)
+        beyond = SCALE_MARGIN * (self._scale.high - self._scale.low)
         return self._scale.low - beyond, self._scale.high + beyond
 
     def draw_ground(self) -> QPixmap:
@@ -168,7 +168,7 @@ class LivePlot(PaintedWidget):
         picture = blank(self, "transparent")
         painter = QPainter(picture)
         painter.setFont(font(SMALL, bold=True))
-        x, baseline = inside.left() + 6, TOP + metrics.ascent() + 1
+        x, baseline = inside.left() + 6, _TOP + metrics.ascent() + 1
         named = [curve for curve in self._curves if curve.named]
         several = len(named) > 1
         unit = self._name[max(self._name.find("["), 0) :] if several else self._name
@@ -176,7 +176,7 @@ class LivePlot(PaintedWidget):
         room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
         sample = max(min(SAMPLE * type_scale(), room), 0.0)
         width = words + len(named) * sample if several else 0.0
-        ground = QRectF(x - 3, TOP, width + metrics.horizontalAdvance(unit) + 6, metrics.height())
+        ground = QRectF(x - 3, _TOP, width + metrics.horizontalAdvance(unit) + 6, metrics.height())
         painter.fillRect(ground, sheer(self.theme.surface, 200))
         for curve in named if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
@@ -212,11 +212,11 @@ class LivePlot(PaintedWidget):
             painter.setPen(fine(self.theme.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
-            if inside.bottom() - TOP >= 5 * line:  # a lower plot has no room for words; the ones above it say them
+            if inside.bottom() - _TOP >= 5 * line:  # a lower plot has no room for words; the ones above it say them
                 width = words.size().width()
                 left = start - width - 3 if onset else start + 3
                 if free <= left <= inside.right() - width:
-                    painter.drawStaticText(QPointF(left, TOP + line), words)
+                    painter.drawStaticText(QPointF(left, _TOP + line), words)
                     free = left + width
 
     def _colour(self, name: str) -> str:

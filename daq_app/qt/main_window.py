@@ -32,13 +32,13 @@ from daq_app.window.view_course import Button
 from daq_app.wording import tr
 from sessions.run import steps
 
-COURSE = frozenset({"primary", *ACTS})  # of the session in hand
+_COURSE = frozenset({"primary", *ACTS})  # of the session in hand
 # Before the scale of the fonts [px]:
-WIDE = 1366  # below it the bench folds to a strip of lamps
-ROOMY = 1100  # below it the six axes and the sample fold away
+_WIDE = 1366  # below it the bench folds to a strip of lamps
+_ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
 LOW = 540  # below it an empty notice gives up its line
-CARDS, PLAN = 600, 316  # widths of the checklist and of the plan
+CARDS, _PLAN = 600, 316  # widths of the checklist and of the plan
 LEAST_CARDS = 260  # width in which no field of the checklist is cut
 
 
@@ -112,13 +112,13 @@ class MainWindow(QMainWindow):
 
     def act(self, act: str) -> None:
         """Do what a key, a button or an entry of the menu stands for."""
-        if act in COURSE and self.rooms.room == "review":
+        if act in _COURSE and self.rooms.room == "review":
             self.go_to("run" if self.bridge.view.course is not None else "prepare")
         elif act.startswith("open "):
             self.rooms.open(Path(act.removeprefix("open ")))
         elif act in self._acts:
             self._acts[act]()
-        elif act in COURSE and self.course.isVisible():
+        elif act in _COURSE and self.course.isVisible():
             self.course.ask(act)
             if self.course.asking:
                 self.side.come_back()
@@ -298,18 +298,18 @@ class MainWindow(QMainWindow):
 
     def _fit(self) -> None:
         width, height = self.width() / type_scale(), self.height() / type_scale()
-        wide = width >= WIDE
+        wide = width >= _WIDE
         shown = wide if self._bench_shown is None else self._bench_shown
         self.bench.setVisible(shown)
-        cards = self._left.currentIndex() == 0 and width >= WIDE
+        cards = self._left.currentIndex() == 0 and width >= _WIDE
         scale = type_scale() if wide else min(type_scale(), 1.4)
         least = LEAST_CARDS * type_scale() if self._left.currentIndex() == 0 and (wide or not shown) else 0.0
-        self._left.setMaximumWidth(round((CARDS if cards else max(PLAN, least / scale)) * scale))
-        self._left.setMinimumWidth(round(max(PLAN * scale, least)))
+        self._left.setMaximumWidth(round((CARDS if cards else max(_PLAN, least / scale)) * scale))
+        self._left.setMinimumWidth(round(max(_PLAN * scale, least)))
         self.bench.setFixedWidth(px(290))
         self.strip.setVisible(not shown and width >= 800)
-        self.live.set_room(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
-        self.to_do.show_small(height < TALL or width < ROOMY)
+        self.live.set_room(width >= _ROOMY + (CARDS if cards else 0) and not (shown and not wide))
+        self.to_do.show_small(height < TALL or width < _ROOMY)
         self.notice.set_collapsible(height < LOW)
         self.keys.fit()
 

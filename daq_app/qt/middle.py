@@ -26,7 +26,7 @@ from daq_app.qt.parts import (
 from daq_app.qt.tokens import GRID, SMALL, TARGET, px
 from daq_app.window.course_state import PICTURE, Mark
 from daq_app.window.live_trace import Columns
-from daq_app.window.view_course import KINDS, CourseView, Inspection, StrokeView, Tile, inspection
+from daq_app.window.view_course import TILES, CourseView, Inspection, StrokeView, Tile, inspection
 from daq_app.wording import tr
 from sessions.strokes.stroke import Stroke, StrokeCurve
 
@@ -63,7 +63,7 @@ class TrialStrip(QScrollArea):
         while len(self.tiles) < len(tiles):
             self._add()
         for tile_button, tile in zip(self.tiles, tiles, strict=True):
-            tile_button.setText(f"{KINDS[tile.kind][0]} {tile.number}\n{tile.code}")
+            tile_button.setText(f"{TILES[tile.kind][0]} {tile.number}\n{tile.code}")
             tile_button.setAccessibleName(tile.words)
             tile_button.setToolTip(tile.words)
             regrade(tile_button, TILE_GRADES.get(tile.kind, ""))

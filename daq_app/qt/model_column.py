@@ -24,8 +24,8 @@ from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
 from daq_app.qt.pictures import (
+    COMPARISON_NAME,
     FILM_SUFFIXES,
-    PICTURE,
     ComparedView,
     PictureView,
     SaveButtons,
@@ -39,7 +39,7 @@ from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr
 from solver.quantities import SED
 
-FINGER, SESSION, COMPARISON = range(3)  # tabs
+FINGER, SESSION, _COMPARISON = range(3)  # tabs
 STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing takes long and sliding little time
 
 
@@ -133,7 +133,7 @@ class ModelColumn(QWidget):
                 self._drawing = ("", -1)
                 self.together.setChecked(True)
                 self._paint()
-                self.tabs.setCurrentIndex(COMPARISON)
+                self.tabs.setCurrentIndex(_COMPARISON)
         self._show_picture()
 
     def _show_picture(self, *_: object) -> None:
@@ -141,8 +141,8 @@ class ModelColumn(QWidget):
         state, tab, which = self._state, self.tabs.currentIndex(), self.which.currentIndex()
         if state is None:
             return
-        if tab == COMPARISON and state.compared is not None:
-            view, name, words = self.compared.picture, PICTURE, tr("both sessions")
+        if tab == _COMPARISON and state.compared is not None:
+            view, name, words = self.compared.picture, COMPARISON_NAME, tr("both sessions")
         elif tab == SESSION and 0 <= which < len(names := session_pictures(state.report)):
             view, (name, words) = self.picture, names[which]
             self.session_errors.show_text(picture_errors(state.report, name))

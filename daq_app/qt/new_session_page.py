@@ -23,9 +23,9 @@ from daq_app.qt.parts import (
     vbox,
 )
 from daq_app.qt.tokens import GRID, TARGET, px
-from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
+from daq_app.window.checklist import CARD_FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.new_session import (
-    AXES,
+    SIGNED_AXES,
     Bench,
     SessionForm,
     enrol_subject,
@@ -55,7 +55,7 @@ class NewSessionPage(Panel):
         self._send = send
         self._cards: tuple[Card, ...] = ()
         self._checked: object = None  # what the cards were derived from
-        self.frames = {name: CardFrame(name) for name in FIELDS}
+        self.frames = {name: CardFrame(name) for name in CARD_FIELDS}
         self.subject = entry(tr("subject code, never a name"))
         words = tr("take the proposed code")
         self._proposal = button("", words, lambda: self.subject.setText(self._proposal.text()), "small")
@@ -72,7 +72,9 @@ class NewSessionPage(Panel):
         self.seed = entry(tr("seed of the stimulus order; empty for a new one"), tr("a new one"))
         words = tr("height of the face above the transducer's origin in millimetres; may be empty")
         self.height_above = entry(words, tr("as stated"))
-        self.normal = choice(tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *AXES))
+        self.normal = choice(
+            tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *SIGNED_AXES)
+        )
         words = tr("contact area of finger and surface in square millimetres; may be empty")
         self.area = entry(words, tr("as stated"))
         hands = [tr(words) for words in HAND_NAMES]

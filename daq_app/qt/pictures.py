@@ -14,7 +14,7 @@ from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPixmap
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QApplication, QFileDialog, QProgressDialog, QPushButton, QSizePolicy, QWidget
 
-from daq_app.analyst.finger_words import NAMES, Compared
+from daq_app.analyst.finger_words import MEAN_PANELS, Compared
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.painting import paint_fitted
 from daq_app.qt.parts import button, hbox, label, say, vbox
@@ -23,13 +23,13 @@ from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 from sessions.file_access import write_whole
 
-KINDS = ("SVG", "PNG", "CSV")
+_KINDS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
-PICTURE = "compared"  # its name
-DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
-SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
-LOOK = 0.02  # between two looks at a film that is being written [s]
-COLOURS = 256  # of a frame of a GIF: all that the format has
+COMPARISON_NAME = "compared"  # its name
+_DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
+_SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
+_LOOK = 0.02  # between two looks at a film that is being written [s]
+_COLOURS = 256  # of a frame of a GIF: all that the format has
 FILM_SUFFIXES = (".gif", ".mp4")
 NO_MP4 = tr_noop("MP4 needs the package imageio-ffmpeg: pip install 'daq-app[film]', or save the film as GIF")
 
@@ -42,7 +42,7 @@ class SaveButtons(QWidget):
         self._name, self._save = "", save
         self.buttons = [
             button(kind, tr("save {what} as {kind}", what=what, kind=kind), lambda kind=kind: self._ask(kind), "small")
-            for kind in KINDS
+            for kind in _KINDS
         ]
         hbox(1, *self.buttons, on=self, spacing=GRID // 2)
         self.set_name("")
@@ -106,7 +106,7 @@ class ComparedView(QWidget):
         super().__init__()
         self.words = label("", "quiet", wrap=True)
         self.choose = button(tr("Compare with…"), tr("compare with another session"), choose)
-        head = (tr("stimulus"), *(f"{tr(name)} {part}" for name in NAMES for part in ("A", "B", "B − A")))
+        head = (tr("stimulus"), *(f"{tr(name)} {part}" for name in MEAN_PANELS for part in ("A", "B", "B − A")))
         self.table = TextTable(tr("two sessions compared"), head)
         self.table.setMinimumHeight(130)
         self.picture = PictureView(tr("the picture of both sessions"), save)
@@ -123,7 +123,7 @@ class ComparedView(QWidget):
         lines: list[tuple[str, ...]] = []
         for stimulus, pairs in rows:
             cells = [stimulus]
-            for name, (first, second) in zip(NAMES, pairs, strict=True):
+            for name, (first, second) in zip(MEAN_PANELS, pairs, strict=True):
                 digits = 1 if name == "score" else 3
                 difference = None if first is None or second is None else second - first
                 values = (first, ""), (second, ""), (difference, "+")
@@ -153,7 +153,7 @@ def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
             write_whole(path, bytes(buffer.data().data()))
         case _:
             buffer = QBuffer()
-            _image(canvas, DENSITY, head).save(buffer, "PNG")  # pyright: ignore[reportCallIssue, reportArgumentType]
+            _image(canvas, _DENSITY, head).save(buffer, "PNG")  # pyright: ignore[reportCallIssue, reportArgumentType]
             write_whole(path, bytes(buffer.data().data()))
 
 
@@ -187,12 +187,12 @@ def write_film(canvas: FingerCanvas, head: str, show: Callable[[int], None], cou
             size = (image.width(), image.height())
             whole = Image.frombytes("RGB", size, bytes(image.constBits()), "raw", "RGB", image.bytesPerLine())
             gif = path.suffix.lower() != ".mp4"
-            frames.append(whole.quantize(COLOURS, Image.Quantize.FASTOCTREE) if gif else whole)
+            frames.append(whole.quantize(_COLOURS, Image.Quantize.FASTOCTREE) if gif else whole)
         dialog.setValue(count)
         dialog.setCancelButton(None)
         with ThreadPoolExecutor(1) as pool:
             writing = pool.submit(_write_film, path, frames)
-            while wait([writing], LOOK).not_done:
+            while wait([writing], _LOOK).not_done:
                 QApplication.processEvents()
         if error := writing.exception():
             return tr("The film could not be written: {error}", error=error)
@@ -208,7 +208,7 @@ def _write_film(path: Path, frames: list[Image.Image]) -> None:
         write_whole(path, _mp4(frames))
         return
     content = io.BytesIO()
-    frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], duration=SHOWN, loop=0)
+    frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], duration=_SHOWN, loop=0)
     write_whole(path, content.getvalue())
 
 
@@ -219,7 +219,7 @@ def _mp4(frames: list[Image.Image]) -> bytes:
     except ImportError as error:
         raise ImportError(tr(NO_MP4)) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
-    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / SHOWN:g}", "-i", "-"]
+    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / _SHOWN:g}", "-i", "-"]
     codec = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
     pixels = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
     with TemporaryDirectory() as folder:  # the place of an MP4's parts is known at its end: no pipe takes it

@@ -19,17 +19,17 @@ from drivers.arrays import Array
 
 pg: Any = pyqtgraph  # it has no types: who draws by it imports it from here
 Curve = tuple[Array, Array]
-NOTHING: Curve = (np.empty(0), np.empty(0))
-NAMES = ("A", "B")  # of two sessions
-RECEPTORS, SKIN, LINE = range(3)
+_NOTHING: Curve = (np.empty(0), np.empty(0))
+_NAMES = ("A", "B")  # of two sessions
+_RECEPTORS, SKIN, LINE = range(3)
 SOURCES = (tr_noop("SED of the receptors"), tr_noop("Field along the skin"), tr_noop("Field along the line"))
-PLACES = (
+_PLACES = (
     tr_noop("along the skin, proximal to distal [mm]"),
     tr_noop("along the skin at rest, proximal to distal [mm]"),
     tr_noop("from A to B [mm]"),
 )
-ALL_TRIALS, OWN, FIXED = range(3)
-LARGEST = 1e6  # in a number field: far beyond any stress or strain of tissue
+ALL_TRIALS, OWN, FIXED_RANGE = range(3)
+_LARGEST = 1e6  # in a number field: far beyond any stress or strain of tissue
 
 
 class RoomyAxis(pg.AxisItem):
@@ -170,12 +170,12 @@ class FieldPlot(QWidget):
         self.plot = ZoomedPlot(tokens)
         self.plot.read = self._read
         self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of words under it
-        self.values, self._unit = [NOTHING], ""
+        self.values, self._unit = [_NOTHING], ""
         self._named = False  # two curves are
         pens = (pg.mkPen(MODEL, width=2, style=style) for style in (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine))
         self._curves = [
             pg.PlotDataItem(pen=pen, connect="finite", symbolSize=4, symbolPen=None, name=name)
-            for name, pen in zip(NAMES, pens, strict=True)
+            for name, pen in zip(_NAMES, pens, strict=True)
         ]
         self._here = pg.InfiniteLine(pos=0.0, angle=90, pen=pg.mkPen(tokens.quiet, width=1))
         for curve in self._curves:
@@ -187,15 +187,15 @@ class FieldPlot(QWidget):
     def show_field(self, fingers: Sequence[Finger | None], field: FieldChoice, line: Line | None) -> None:
         """Plot a field of at most two fingers, the second dashed."""
         source = self.source.currentIndex()
-        axis = "SED [kPa]" if source == RECEPTORS else field.axis
+        axis = "SED [kPa]" if source == _RECEPTORS else field.axis
         self.values = [_curve(finger, source, field, line) for finger in fingers]
         place, _ = self.values[0]
-        words = tr(PLACES[source])
+        words = tr(_PLACES[source])
         if source == LINE and line is None:
             words = tr("Press Line and drag over the finger, or drag with Shift.")
         for at, curve in enumerate(self._curves):
-            known = self.values[at] if at < len(self.values) else NOTHING
-            curve.setData(*known, symbol="o" if source == RECEPTORS else None, symbolBrush=MODEL)
+            known = self.values[at] if at < len(self.values) else _NOTHING
+            curve.setData(*known, symbol="o" if source == _RECEPTORS else None, symbolBrush=MODEL)
         if (len(fingers) > 1) != self._named:
             self._named = len(fingers) > 1
             self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
@@ -203,10 +203,10 @@ class FieldPlot(QWidget):
         self.plot.name_across(f"{axis}<br>{words}" if len(place) else words)
         self.plot.show_numbers(shown=len(place) > 0)
         self.plot.setAccessibleName(f"{axis}: {words}")
-        self._unit = "kPa" if source == RECEPTORS else field.unit.removesuffix("-")
+        self._unit = "kPa" if source == _RECEPTORS else field.unit.removesuffix("-")
 
     def _read(self, at: float) -> str:
-        names = NAMES if len(self.values) > 1 else ("",)
+        names = _NAMES if len(self.values) > 1 else ("",)
         curves = zip(names, self.values, strict=True)
         said = (read_out("mm", place, at, [(name, self._unit, values)]) for name, (place, values) in curves)
         return "   ".join(filter(None, said))
@@ -215,12 +215,12 @@ class FieldPlot(QWidget):
 def _curve(finger: Finger | None, source: int, field: FieldChoice, line: Line | None) -> Curve:
     """Return places (m,) [mm] and values (m,) of what is plotted; none where the finger has none."""
     if finger is None:
-        return NOTHING
-    if source == RECEPTORS:
-        return (finger.arcs, 1000.0 * finger.frame.row) if len(finger.arcs) == len(finger.frame.row) else NOTHING
+        return _NOTHING
+    if source == _RECEPTORS:
+        return (finger.arcs, 1000.0 * finger.frame.row) if len(finger.arcs) == len(finger.frame.row) else _NOTHING
     if source == SKIN:
         return along_skin(finger.frame, finger.parts, field)
-    return NOTHING if line is None else along_line(finger.frame, finger.parts, field, line)
+    return _NOTHING if line is None else along_line(finger.frame, finger.parts, field, line)
 
 
 class FieldBar(QWidget):
@@ -247,23 +247,23 @@ class FieldBar(QWidget):
 
     @property
     def mode(self) -> int:
-        """`ALL_TRIALS`, `OWN` or `FIXED`."""
+        """`ALL_TRIALS`, `OWN` or `FIXED_RANGE`."""
         return self.ranges.currentIndex()
 
     def range(self, automatic: Range) -> Range:
         """Return where colours begin and end: as given, or as somebody fixed them, the lesser number first."""
         self._automatic = automatic
         ends = sorted((self.low.value(), self.high.value()))
-        return (ends[0], ends[1]) if self.mode == FIXED and ends[0] < ends[1] else automatic
+        return (ends[0], ends[1]) if self.mode == FIXED_RANGE and ends[0] < ends[1] else automatic
 
     def fix(self, ends: Range) -> None:
         self._automatic = ends
-        self.ranges.setCurrentIndex(FIXED)
+        self.ranges.setCurrentIndex(FIXED_RANGE)
         self._fix()
 
     def _free(self) -> None:
         """Fit the colours to another field: numbers that were fixed are of another unit."""
-        if self.mode == FIXED:
+        if self.mode == FIXED_RANGE:
             self.ranges.setCurrentIndex(ALL_TRIALS)
         else:
             self.changed.emit()
@@ -271,7 +271,7 @@ class FieldBar(QWidget):
     def _fix(self) -> None:
         """Begin fixed colours with those that were shown."""
         for number, end in zip((self.low, self.high), self._automatic, strict=True):
-            number.setVisible(self.mode == FIXED)
+            number.setVisible(self.mode == FIXED_RANGE)
             with QSignalBlocker(number):
                 number.setSuffix(f" {self.field.unit}".removesuffix(" -"))
                 number.setSingleStep((self._automatic[1] - self._automatic[0]) / 20.0)
@@ -288,7 +288,7 @@ class _NumberField(QDoubleSpinBox):
         self.setAccessibleName(name)
         self.lineEdit().setAccessibleName(name)
         self.setMinimumHeight(TARGET)
-        self.setRange(-LARGEST, LARGEST)
+        self.setRange(-_LARGEST, _LARGEST)
         self.setDecimals(3)
 
     def validate(self, text: str, pos: int) -> tuple[QValidator.State, str, int]:

@@ -11,7 +11,7 @@ from PySide6.QtGui import QFontInfo, QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
 from daq_app.window.subject import LENGTH
-from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr, tr_noop
+from daq_app.wording import EXPERIMENTER, SOURCE_LANGUAGE, VARIABLE, languages, tr, tr_noop
 from sessions.recording import Setting
 
 THEMES = tr_noop(("system", "light", "dark"))
@@ -60,7 +60,7 @@ def font_scale() -> float:
 def language() -> str:
     """Return the language of the experimenter's windows: as it was chosen, or as the environment says."""
     said = str(settings().value(LANGUAGE) or os.environ.get(VARIABLE))
-    return said if said in languages(EXPERIMENTER) else ENGLISH
+    return said if said in languages(EXPERIMENTER) else SOURCE_LANGUAGE
 
 
 def recent_sessions() -> tuple[Path, ...]:
@@ -111,7 +111,7 @@ def name_of(language: str) -> str:
     >>> name_of("de")
     'Deutsch (de)'
     """
-    own = "English" if language == ENGLISH else QLocale(language).nativeLanguageName()
+    own = "English" if language == SOURCE_LANGUAGE else QLocale(language).nativeLanguageName()
     return f"{own[:1].upper()}{own[1:]} ({language})" if own else language
 
 

@@ -42,9 +42,9 @@ WHY_NOT = {
 }
 KEY_OF = {key.act: key.key for key in KEYS}
 ROOM_NAMES: Mapping[Room, str] = {"prepare": tr_noop("Prepare"), "run": tr_noop("Run"), "review": tr_noop("Review")}
-WIDTH = 84  # before the font's scale [px]
+_WIDTH = 84  # before the font's scale [px]
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
-SESSION = (
+_SESSION = (
     ("redo", tr_noop("Redo…")), ("undo", tr_noop("Undo the last redo")), ("skip", tr_noop("Skip…")),
     ("pause", tr_noop("Pause or go on")), ("note", tr_noop("Note…")), ("end", tr_noop("End…")),
 )  # fmt: skip
@@ -53,7 +53,7 @@ PANELS = (
     ("mirror", tr_noop("The subject's page")), ("inspect", tr_noop("Inspect the last trial")),
     ("hold", tr_noop("Hold the picture")), ("model", tr_noop("Live model at finite strain")),
 )  # fmt: skip
-LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
+_LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
 LEAST_FOR_LIST = 760  # width for the list beside an open session: in less the menu alone lists them; likewise [px]
 
@@ -70,7 +70,7 @@ class Rail(Panel):
                 f"{name}\n{KEY_OF[f'go to {room}']}", name, partial(go, room), "rail", checkable=True
             )
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
-        self.setFixedWidth(px(WIDTH, most=1.4))
+        self.setFixedWidth(px(_WIDTH, most=1.4))
 
     def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:
         """Show which room is open, and which can be; a session may be `in_hand`, or `over`."""
@@ -106,7 +106,7 @@ class Menus:
         self._add(self.session, "preview", tr("Preview the subject's pages"))
         self._add(self.session, "tare", tr("Zero the bench"))
         self.session.addSeparator()
-        self.course = [self._add(self.session, name, tr(words)) for name, words in SESSION]
+        self.course = [self._add(self.session, name, tr(words)) for name, words in _SESSION]
         view = bar.addMenu(tr("&View"))
         for room in ROOMS:
             self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
@@ -174,7 +174,7 @@ def about_box(parent: QWidget) -> QMessageBox:
 def about_words() -> str:
     """Return the versions of the program and of what it stands on."""
     known = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
-    return "\n".join((*known, *(f"{name} {_version(name)}" for name in LIBRARIES)))
+    return "\n".join((*known, *(f"{name} {_version(name)}" for name in _LIBRARIES)))
 
 
 def _version(name: str) -> str:

@@ -30,7 +30,7 @@ NO_SCREEN = (
     "or use the command line, 'daq-app --help'"
 )
 # What Qt loads to speak X11, and the Debian package that holds it.
-LIBRARIES = {
+_LIBRARIES = {
     "libxcb-cursor.so.0": "libxcb-cursor0",
     "libxcb-icccm.so.4": "libxcb-icccm4",
     "libxcb-image.so.0": "libxcb-image0",
@@ -224,7 +224,7 @@ def what_is_missing() -> str | None:
         return None
     if not os.environ.get("DISPLAY"):
         return NO_SCREEN
-    for library, package in LIBRARIES.items():
+    for library, package in _LIBRARIES.items():
         if _load(library) is None:
             return f"the window needs {library}, which is not on this computer: install the system package {package}"
     return None if _answers() else f"the display {os.environ['DISPLAY']} does not answer: {NO_SCREEN}"

@@ -20,7 +20,7 @@ from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
-NUMBERS, READINGS = range(2)  # tabs
+_NUMBERS, _READINGS = range(2)  # tabs
 BY = "analyst/by"  # where the code is remembered
 NOBODY = "analyst"  # who decided, where nobody gave a code
 DRAGGED = "dragged by hand"
@@ -92,7 +92,7 @@ class StrokeColumn(QWidget):
 
     def go_to_readings(self) -> None:
         """Go to the first reading of the steady window."""
-        self.tabs.setCurrentIndex(READINGS)
+        self.tabs.setCurrentIndex(_READINGS)
         self.readings.table.setFocus()
         if self._read is not None and self._stroke is not None and self._stroke.steady is not None:
             readings = self._read.readings
@@ -102,7 +102,7 @@ class StrokeColumn(QWidget):
         self._ask(m.Choose(row))
 
     def go_to_numbers(self) -> None:
-        self.tabs.setCurrentIndex(NUMBERS)
+        self.tabs.setCurrentIndex(_NUMBERS)
         self._scroll.setFocus()
 
     def play(self) -> None:

@@ -8,7 +8,7 @@ from PySide6.QtGui import QFocusEvent, QFontMetricsF, QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.frame import read_out
-from daq_app.analyst.stroke import EDGES, LEAP, STEP, Edge, PlacedEdge, RawReadings, edges_of, within
+from daq_app.analyst.stroke import EDGE_LEAP, EDGE_STEP, EDGES, Edge, PlacedEdge, RawReadings, edges_of, within
 from daq_app.qt.painting import sheer
 from daq_app.qt.parts import hbox, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
@@ -16,7 +16,7 @@ from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
 from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
-NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
+_NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
 ROWS: dict[Edge, int] = {"onset": 0, "steady begin": 1, "steady end": 1, "lift": 0}  # of the words above the curves
 
 
@@ -52,9 +52,9 @@ class EdgeHandle(QPushButton):
         far = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
         match event.key():
             case Qt.Key.Key_Left:
-                self.moved.emit(self.edge, self._time - (LEAP if far else STEP))
+                self.moved.emit(self.edge, self._time - (EDGE_LEAP if far else EDGE_STEP))
             case Qt.Key.Key_Right:
-                self.moved.emit(self.edge, self._time + (LEAP if far else STEP))
+                self.moved.emit(self.edge, self._time + (EDGE_LEAP if far else EDGE_STEP))
             case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._away:
                 self.recorded.emit(self.edge, self._time)
             case Qt.Key.Key_Escape if self._away:
@@ -77,7 +77,7 @@ class EdgeHandle(QPushButton):
             self.moved.emit(self.edge, self._placed.time)
 
     def _show(self) -> None:
-        name, placed = tr(NAMES[self.edge]), self._placed
+        name, placed = tr(_NAMES[self.edge]), self._placed
         if placed is None:
             self.setText(name)
             self.setAccessibleName(tr("{name}: no stroke", name=name))

@@ -19,7 +19,7 @@ THUMBNAIL_HEIGHT = 110  # before the font's scale [px]
 MIRROR_HEIGHT = 150  # of the picture, before the font's scale [px]
 MIRROR = "panels/mirror"  # under which it is remembered whether it is open
 LIST = 250  # width of the list, before the font's scale [px]
-STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_PageUp: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_PageDown: 1, Qt.Key.Key_Space: 1}
+_STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_PageUp: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_PageDown: 1, Qt.Key.Key_Space: 1}
 
 
 class SubjectPicture(QWidget):
@@ -185,7 +185,7 @@ class _Pages(QListWidget):
     """A list in which the keys that turn pages turn them too."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        step = STEPS.get(Qt.Key(event.key()))
+        step = _STEPS.get(Qt.Key(event.key()))
         if step is None:
             super().keyPressEvent(event)
         else:

@@ -26,7 +26,7 @@ from daq_app.wording import tr
 from sessions.recording import Setting
 
 FORCE_EVERY = 0.05  # between two values of the bar [s]
-STEPS = 200  # of the bar, that can be distinguished
+_STEPS = 200  # of the bar, that can be distinguished
 
 
 class TabletScreen(QObject):
@@ -79,7 +79,7 @@ class TabletScreen(QObject):
 
     def show_force(self, trace: LiveTrace) -> None:
         part, now = min(max(newest_force(trace) / FULL, 0.0), 1.0), time.monotonic()
-        if now - self._last_sent >= FORCE_EVERY and round(part * STEPS) != round(self._part * STEPS):
+        if now - self._last_sent >= FORCE_EVERY and round(part * _STEPS) != round(self._part * _STEPS):
             self._part, self._last_sent = part, now
             self.server.send(Force(part))
 

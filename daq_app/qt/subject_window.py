@@ -16,9 +16,9 @@ from daq_app.wording import tr, typed_number
 from sessions.plan.plan import Hand
 from sessions.plan.protocols.languages import ENGLISH
 
-LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
+_LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
 SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of it, until a page holds its texts
-WIDEST = 1100  # row of the button
+_WIDEST = 1100  # row of the button
 GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 TEXT_WIDTH = 900  # of a text that is still easily read, before the scale of the fonts
 
@@ -110,8 +110,8 @@ class SubjectWindow(QWidget):
             for widget in (self._title, self._question):
                 _set_type(widget, LARGER * part, bold=True)
             for widget in (self._text, self._hint):
-                _set_type(widget, LARGE * part)
-            self._scale.set_type(LARGE * part)
+                _set_type(widget, _LARGE * part)
+            self._scale.set_type(_LARGE * part)
             layout.invalidate()
             layout.activate()  # a page that is not shown has not yet heard of its new texts
             if layout.totalHeightForWidth(self.width()) <= self.height():
@@ -214,7 +214,7 @@ class SubjectWindow(QWidget):
         self._next_row = hbox(1, self.next, on=place, margins=(4 * GRID, 0, 4 * GRID, 0))
         place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
         place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
-        place.setMaximumWidth(WIDEST)
+        place.setMaximumWidth(_WIDEST)
         row, margins = hbox(1, (place, 1000), 1), (2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
         self._answer_layout = vbox(self._question, 2, self._hint, self._ways, 2, row, on=page, margins=margins)
         return page

@@ -21,9 +21,9 @@ from daq_app.qt.parts import WrappedLabel, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 
-NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
+_NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
 Index = QModelIndex | QPersistentModelIndex
-HEAD = tr_noop(("window", "sequence", "counter", "status", "time [s]", "received [ns]"))
+_HEAD = tr_noop(("window", "sequence", "counter", "status", "time [s]", "received [ns]"))
 
 
 class CopyableTable(QTableView):
@@ -179,12 +179,12 @@ class _Model(QAbstractTableModel):
         return 0 if self._readings is None else len(self._readings.block)
 
     def columnCount(self, parent: Index | None = None) -> int:
-        return len(HEAD) + 8
+        return len(_HEAD) + 8
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: ANN401
         if role != Qt.ItemDataRole.DisplayRole or orientation != Qt.Orientation.Horizontal:
             return None
-        return (*map(tr, HEAD), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
+        return (*map(tr, _HEAD), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
 
     def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
         r = self._readings
@@ -212,7 +212,7 @@ def number_in(text: str) -> float | None:
     >>> number_in("0.440 to 0.453"), number_in("−3.5 %"), number_in("–"), number_in("stroke 3")
     (0.44, -3.5, None, None)
     """
-    match = NUMBER.match(text.strip())
+    match = _NUMBER.match(text.strip())
     return None if match is None else float(match[0].replace("−", "-"))
 
 

@@ -12,7 +12,7 @@ from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-TICK = 33  # between two pictures while it plays [ms]
+_TICK = 33  # between two pictures while it plays [ms]
 
 
 class TransportBar(QWidget):
@@ -46,7 +46,7 @@ class TransportBar(QWidget):
         hbox(self.play, self.back, self.forward, (self.slider, 1), self.place, self.speed, on=self, spacing=GRID)
         self._line = QTimeLine(parent=self)  # from the first instant to the last, at the chosen speed
         self._line.setEasingCurve(QEasingCurve.Type.Linear)
-        self._line.setUpdateInterval(TICK)
+        self._line.setUpdateInterval(_TICK)
         self._line.valueChanged.connect(lambda: self._show(self._place))
         self._line.finished.connect(self._finish)
         self._enable()

@@ -40,7 +40,7 @@ from typing import Self
 from daq_app.child_process import interpreter, use_one_thread
 from daq_app.recorder.messages import REPORTS, REQUESTS, BrokenMessage, Codec, Gone, Report, Request, Shutdown
 
-PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
+_PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
 
 
 class Recorder:
@@ -88,7 +88,7 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close it; where somebody pressed Ctrl-C without waiting."""
-        self.close(0.0 if kind is not None and issubclass(kind, KeyboardInterrupt) else PATIENCE)
+        self.close(0.0 if kind is not None and issubclass(kind, KeyboardInterrupt) else _PATIENCE)
 
     @property
     def pid(self) -> int:
@@ -112,7 +112,7 @@ class Recorder:
         self._news.clear()
         return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
 
-    def close(self, patience: float = PATIENCE) -> None:
+    def close(self, patience: float = _PATIENCE) -> None:
         """End session and recorder, and wait for that; after `patience` [s] it is left to end by itself.
 
         A session that runs is stopped, sealed and over; `leave` cuts it short to be resumed. Harmless when repeated.

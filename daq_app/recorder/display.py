@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 LIVE_EVERY = 1 / 60  # least time between two messages of readings [real s]
 HEALTH_EVERY = 0.1  # between two of health [real s]
 RATE_OVER = 1.0  # stretch the rate is measured over [real s]
-UNLOADED: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_UNLOADED: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Display:
@@ -32,7 +32,7 @@ class Display:
         self._info: TransducerInfo | None = None
         self._stream = 0
         self._waiting: list[ReadingBlock] = []
-        self._zero: Six = UNLOADED
+        self._zero: Six = _UNLOADED
         self._load = self._peak = np.zeros(7)
         self._overload_told = False
         self._saturated_before = self._saturated_now = 0
@@ -51,7 +51,7 @@ class Display:
 
     def forget(self) -> None:
         """Forget the zero and the greatest loads: another transducer will be shown."""
-        self.set_zero(UNLOADED)
+        self.set_zero(_UNLOADED)
         self.acknowledge()
 
     def stream_began(self) -> None:

@@ -208,8 +208,8 @@ REQUESTS: tuple[type, ...] = get_args(Request)
 REPORTS: tuple[type, ...] = get_args(Report)
 
 
-LENGTH = struct.Struct("<I")
-LONGEST = 256 * 2**20  # a longer message is none of ours [bytes]
+LENGTH_PREFIX = struct.Struct("<I")
+_LONGEST = 256 * 2**20  # a longer message is none of ours [bytes]
 
 
 class BrokenMessage(Exception):
@@ -225,9 +225,9 @@ class Codec:
 
     def read(self, file: IO[bytes]) -> Iterator[Any]:
         """Yield each message of a pipe until its other end goes, which may cut the last. Raises BrokenMessage."""
-        while len(head := file.read(LENGTH.size)) == LENGTH.size:
-            (length,) = LENGTH.unpack(head)
-            if length > LONGEST:
+        while len(head := file.read(LENGTH_PREFIX.size)) == LENGTH_PREFIX.size:
+            (length,) = LENGTH_PREFIX.unpack(head)
+            if length > _LONGEST:
                 raise BrokenMessage(f"a message of {length} bytes is none of ours")
             if len(body := file.read(length)) == length:
                 yield self.decode(body)
@@ -235,7 +235,7 @@ class Codec:
     def encode(self, message: object) -> bytes:
         """Return a message as bytes, its length first."""
         body = msgspec.msgpack.encode((type(message).__name__, message), enc_hook=_array_out)
-        return LENGTH.pack(len(body)) + body
+        return LENGTH_PREFIX.pack(len(body)) + body
 
     def decode(self, body: bytes) -> Any:  # noqa: ANN401  one of the types it was given
         """Return the message of these bytes, which are without the length. Raises BrokenMessage."""

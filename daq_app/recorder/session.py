@@ -29,7 +29,7 @@ from sessions.recording.manifest import is_sealed
 from sessions.recording.recovery import fold_log
 from sessions.recording.storage import RESERVE, check_room, need, unsafe
 from sessions.run import resuming
-from sessions.run.runner import STOPPED, Continuation, Ending, Operator, run_session
+from sessions.run.runner import STOPPED_BY_USER, Continuation, Ending, Operator, run_session
 from sessions.run.steps import Command, Event
 
 WHY = "a session is being recorded"
@@ -240,7 +240,7 @@ class _Operator:
     def stop(self) -> Ending | None:
         """Say why the session is to end now: somebody wants it, or the client is gone and no finger touches."""
         if self._inbox.stop_wanted.is_set():
-            return "stopped", STOPPED
+            return "stopped", STOPPED_BY_USER
         if not self._inbox.client_gone.is_set():
             return None
         now_ns = self._clock.now_ns()

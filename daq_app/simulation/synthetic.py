@@ -161,11 +161,11 @@ PEOPLE = SubjectSettings(
     moisture=0.08,
 )
 CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
-LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
-TICK = 0.1  # between two looks at the transducer [s of the session's clock]: five times as seldom as with people
+_LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
+_TICK = 0.1  # between two looks at the transducer [s of the session's clock]: five times as seldom as with people
 
 
-DECISIONS = """# SIMULATED: decisions about a simulated study
+_DECISIONS = """# SIMULATED: decisions about a simulated study
 
 [[exclude]]
 subject = "S07"
@@ -190,7 +190,7 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
     strokes = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
     (out / DAMAGED).mkdir()
     (out / DAMAGED / LIVE_FILE).write_bytes((out / "S01" / LIVE_FILE).read_bytes()[:1000])
-    (out / EXCLUSIONS).write_text(DECISIONS, encoding="utf-8")
+    (out / EXCLUSIONS).write_text(_DECISIONS, encoding="utf-8")
     write_json(
         out / GROUND_TRUTH_FILE,
         {
@@ -230,7 +230,7 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     people = SyntheticPeople(
         SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), session_plan, faults
     )
-    study, run = [_study_seed(seed)], RunnerSettings(tick=TICK)
+    study, run = [_study_seed(seed)], RunnerSettings(tick=_TICK)
     conduct(session_plan, out / subject, people, console, settings=study, run=run, durable=False)
     return [
         {
@@ -283,7 +283,7 @@ class SyntheticPeople(SimulatedPeople):
 
     def _perceived_surface(self, trial: Trial) -> Surface:
         surface = self.subject.perceived_surface(simulated_surface(trial))
-        light = LIGHT / surface.peak_normal_force if trial.number == self._faults.light else 1.0
+        light = _LIGHT / surface.peak_normal_force if trial.number == self._faults.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
 

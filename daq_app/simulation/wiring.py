@@ -22,7 +22,7 @@ from simulators.serving import serve as serve
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
-SIMULATED = "sim"
+_SIMULATED = "sim"
 REPLAY = "replay:"  # and the path of a session folder
 JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
 INPUT = "simulated"
@@ -69,7 +69,7 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
             yield Connection(replayed, recorded_frame=recording.plan.frame)
         return
     address = parse_address(uri)
-    if address.scheme != SIMULATED:
+    if address.scheme != _SIMULATED:
         with closing(open_transducer(uri, clock)) as transducer:
             yield Connection(transducer)
         return

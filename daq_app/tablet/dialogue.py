@@ -19,10 +19,10 @@ PixelsPerMm = Annotated[float, Meta(ge=1.0, le=40.0)]
 
 # ---- from the tablet
 Answered = Scored | MagnitudeEstimate | PairedChoice
-ANSWERS: Mapping[Kind, tuple[type, ...]] = {
+_ANSWERS: Mapping[Kind, tuple[type, ...]] = {
     "read": (), "line": (Scored,), "number": (MagnitudeEstimate,), "choice": (PairedChoice,),
 }  # fmt: skip
-WORDS = (  # of the page itself
+_WORDS = (  # of the page itself
     Text.NEXT, Text.FIRST, Text.SECOND, Text.THANKS, Text.OFFLINE, Text.LINE, Text.UNANSWERED, Text.ANSWERED,
     Text.OWN_NUMBER, Text.TWO_MEANINGS, Text.OF_TWO, Text.PRESSING,
 )  # fmt: skip
@@ -129,7 +129,7 @@ class Dialogue:
         for key in tuple(self._waiting):
             self._acknowledge(key)
         key = _key(session, *view.key) if view.asks and session is not None else ""
-        words = {word.name.lower(): say(word) for word in WORDS}
+        words = {word.name.lower(): say(word) for word in _WORDS}
         page = Page(view, key, "rtl" if mirrored else "ltr", session is None, words)
         if page != self._page:
             self._page = page
@@ -144,7 +144,7 @@ class Dialogue:
         if session is None or session.over or page is None or key in self._waiting or self._acknowledge(key):
             return None
         event = event_of(answer.acts, clock, session.plan.answering_hand)
-        if key == page.key and isinstance(event, ANSWERS[page.view.kind]):
+        if key == page.key and isinstance(event, _ANSWERS[page.view.kind]):
             self._waiting.add(key)
             return event
         self._send(Stored(key))

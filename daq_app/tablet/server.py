@@ -29,12 +29,12 @@ PORT = 8377  # where nothing else listens there; unassigned by IANA
 TRIES = 5  # of wrong codes, before there is a new one
 WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
 ALIVE = 5.0  # a tablet that says nothing for so long is gone [s]
-PATIENCE = 10.0  # for the first message [s]
+_PATIENCE = 10.0  # for the first message [s]
 REPLACED = 4000  # closes the conversation with a tab whose place another one of the same browser takes; see page.html
 OFF = logging.CRITICAL + 1
-PAGE = Path(__file__).with_name("page.html")
+_PAGE = Path(__file__).with_name("page.html")
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
-MISSING = "the subject's page on a tablet needs the packages websockets and segno: pip install 'daq-app[tablet]'"
+_MISSING = "the subject's page on a tablet needs the packages websockets and segno: pip install 'daq-app[tablet]'"
 
 
 class NoTabletServer(Exception):
@@ -56,7 +56,7 @@ class TabletServer:
             import segno  # noqa: F401  # pyright: ignore[reportUnusedImport]  the window draws the link with it
             from websockets.sync.server import serve
         except ImportError as error:
-            raise NoTabletServer(MISSING) from error
+            raise NoTabletServer(_MISSING) from error
         self._received = received
         self._changed = changed
         self._lock = threading.Lock()
@@ -68,7 +68,7 @@ class TabletServer:
         self.code = _new_code()
         listening = _listening(address, port)
         self.url = "http://{}:{}".format(*listening.getsockname()[:2])
-        self._page = PAGE.read_text(encoding="utf-8")
+        self._page = _PAGE.read_text(encoding="utf-8")
         self._server = serve(
             self._talk,
             sock=listening,
@@ -131,7 +131,7 @@ class TabletServer:
         from websockets.exceptions import ConnectionClosed
 
         with suppress(ConnectionClosed, TimeoutError, msgspec.DecodeError):
-            hello = read(connection.recv(PATIENCE))
+            hello = read(connection.recv(_PATIENCE))
             if not isinstance(hello, Hello) or not self._let_in(connection, hello):
                 return
             try:

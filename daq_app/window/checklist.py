@@ -10,7 +10,7 @@ from daq_app.wording import tr, tr_noop
 from sessions.plan.protocols import is_code
 from sessions.plan.study import is_study
 
-FIELDS: Mapping[str, tuple[str, ...]] = {
+CARD_FIELDS: Mapping[str, tuple[str, ...]] = {
     tr_noop("Study and protocol"): ("study", "protocol", "seed"),
     tr_noop("Subject"): ("subject",),
     tr_noop("Transducer"): ("forces", "simulated", "height", "area"),
@@ -39,7 +39,7 @@ def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
         "Subject's screen": screen,
     }
     cards: list[Card] = []
-    for name, fields in FIELDS.items():
+    for name, fields in CARD_FIELDS.items():
         first = next((field for field in fields if field in wrong), "")
         cards.append(Card(name, not first, wrong.get(first, notes.get(name, "")), first))
     return tuple(cards)

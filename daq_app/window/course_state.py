@@ -25,7 +25,7 @@ IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "s
 Outcome = Literal["coming", "done", "skipped"]
 AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]
 PICTURE = {"N": (2, "N"), "T": (2, "N"), "mu": (2, ""), "speed": (0, "mm/s")}  # its rows, with digits and unit
-MARKS = 40  # that are kept for the plots: more than a minute can hold
+_MARKS = 40  # that are kept for the plots: more than a minute can hold
 
 
 class Remark(NamedTuple):
@@ -354,4 +354,4 @@ def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mappin
 def _add_mark(session: SessionState, mark: Mark) -> SessionState:
     """Return the session with another mark; a new steady window replaces the earlier one that it overlaps."""
     kept = [m for m in session.marks if m.kind != "steady" or mark.kind != "steady" or m.stop < mark.start]
-    return replace(session, marks=(*kept, mark)[-MARKS:])
+    return replace(session, marks=(*kept, mark)[-_MARKS:])

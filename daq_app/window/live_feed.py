@@ -14,6 +14,7 @@ from daq_app.recorder.messages import Live, Report
 from daq_app.window.live_trace import CHANNELS, LiveTrace, broken
 from daq_app.wording import tr_noop
 from drivers.calibration import LIMITS, WARNING
+from drivers.calibration_file import AXES
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
@@ -22,13 +23,12 @@ from sessions.strokes.settings import RatioSettings
 
 Array = NDArray[np.float64]
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 LOADS = (*AXES, tr_noop("combined"))
-FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
+_FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
 ARRAYS = ("sequence", "time", "received_ns", "wrench", "status")  # of live readings
-KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
+_KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class LiveFeed:
         time, drawn = broken(live.time, self._channels(live, frame), gaps)
         self._sequence = int(live.sequence[-1])
         self._take.append(live)
-        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > KEPT:
+        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > _KEPT:
             self._take.popleft()
         self.trace.add(time, drawn)
 
@@ -119,7 +119,7 @@ class LiveFeed:
         wrench = in_face_frame(live.wrench, frame)
         normal = -wrench[:, 2]
         tangential = np.hypot(wrench[:, 0], wrench[:, 1])
-        pressed = (normal >= FLOOR) & (live.status == 0)
+        pressed = (normal >= _FLOOR) & (live.status == 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(pressed, tangential / normal, np.nan)
         position = np.where(pressed[:, None], centre_of_pressure(wrench, frame.height), np.nan)

@@ -27,9 +27,9 @@ from solver.response.fields import fields_of
 from solver.response.stepper import LivePicture, Stepper, stepper
 
 TOUCH = 0.05  # less normal force is no touch [N]
-FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
+_FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
 LEAST_MU = 0.05  # before any was measured [-]
-KEPT = 60.0  # predictions that are kept for the difference to the full solve [s]
+_KEPT = 60.0  # predictions that are kept for the difference to the full solve [s]
 SEEN, SEEN_EVERY = 100, 0.1  # states that are kept for a stroke whose full solve fails, and the time between them [s]
 DEFAULT_DEPTH = 2.0  # for which the mesh is made where no plan tells one [mm]
 DEFAULT_AREA = 100.0  # of contact, for the traction bound, likewise [mm2]
@@ -120,7 +120,7 @@ class Follower:
         sed = np.array([said for said, _ in steps])
         instead = np.array([len(self._models) > 1 and not reached for _, reached in steps])
         self._said += zip(forces.time.tolist(), sed.tolist(), strict=True)
-        while self._said and self._said[0][0] < forces.time[-1] - KEPT:
+        while self._said and self._said[0][0] < forces.time[-1] - _KEPT:
             self._said.popleft()
         shown = self._models[1 if self._reached and len(self._models) > 1 else 0]
         row, now, (picture, rest) = shown.stepper.row(), float(forces.time[-1]), shown.picture_and_rest()
@@ -145,7 +145,7 @@ class Follower:
         if normal < TOUCH:
             self._forget_contact()
             return 0.0, True
-        if normal >= FLOOR:
+        if normal >= _FLOOR:
             self._mu = max(self._mu, abs(pull) / normal)
             self._tangential = max(self._tangential, abs(pull))
         normal, pull = normal / self._scene.finger.width, pull / self._scene.finger.width

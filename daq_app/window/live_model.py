@@ -16,10 +16,10 @@ from sessions.strokes.forces import in_face_frame
 Array = NDArray[np.float64]
 Kinematics = Literal["small", "finite"]
 
-STEP = 0.005  # readings within so long are one step of the model [s]: 200 a second
-GAP = 0.1  # predictions further apart have a gap between them [s]
+_STEP = 0.005  # readings within so long are one step of the model [s]: 200 a second
+_GAP = 0.1  # predictions further apart have a gap between them [s]
 MODEL_CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach
-KINEMATICS = {"small": tr_noop("small strain"), "finite": tr_noop("finite strain")}
+_KINEMATICS = {"small": tr_noop("small strain"), "finite": tr_noop("finite strain")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ def forces_of(live: Live, frame: Frame) -> Forces | None:
     wrench = in_face_frame(live.wrench[healthy], frame)
     time = live.time[healthy]
     rows = np.column_stack([time, wrench[:, :3]])
-    starts = np.flatnonzero(np.diff(np.floor(time / STEP), prepend=-np.inf) > 0)
+    starts = np.flatnonzero(np.diff(np.floor(time / _STEP), prepend=-np.inf) > 0)
     mean = np.add.reduceat(rows, starts, axis=0) / np.diff(starts, append=len(rows))[:, None]
     tangential = np.hypot(mean[:, 1], mean[:, 2])
     # The finger pushes the stimulus along Fx; the stimulus pulls it back.
@@ -162,7 +162,7 @@ def model_words(
     if said.beyond:
         return ModelWords(tr("These forces are beyond the reach of the model."), "beyond")
     if said.sed[-1] <= 0.0:
-        words = tr("Model at {kinematics}: nothing touches.", kinematics=tr(KINEMATICS[said.kinematics]))
+        words = tr("Model at {kinematics}: nothing touches.", kinematics=tr(_KINEMATICS[said.kinematics]))
         return ModelWords(words, "none")
     known = tr(
         "PROVISIONAL  SED {kpa}{errors} · at the measured force, {depth:.1f} mm deep · ",
@@ -171,12 +171,12 @@ def model_words(
     if said.instead[-1]:
         words = tr("{known}small strain: these forces are beyond the reach of finite strain", known=known)
         return ModelWords(words, "instead")
-    return ModelWords(known + tr(KINEMATICS[said.kinematics]), "provisional")
+    return ModelWords(known + tr(_KINEMATICS[said.kinematics]), "provisional")
 
 
 def _settled_words(settled: SettledSolve) -> str:
     shown = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
-    how, picture, depth = tr(KINEMATICS[settled.kinematics]), settled.picture, settled.depth
+    how, picture, depth = tr(_KINEMATICS[settled.kinematics]), settled.picture, settled.depth
     if settled.sed is None:
         lost = picture is not None and picture.lost is not None
         marked = tr("; ⊗ marks its most squeezed tissue") if lost else ""
@@ -201,7 +201,7 @@ class ModelTrace(LiveTrace):
     """The SED at the receptor over the last minute [kPa], for a plot."""
 
     def __init__(self) -> None:
-        super().__init__(1.0 / STEP, channels=len(MODEL_CHANNELS), gap=GAP)
+        super().__init__(1.0 / _STEP, channels=len(MODEL_CHANNELS), gap=_GAP)
         self._stream: int | None = None
 
     def add_prediction(self, said: Provisional) -> None:

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
-LONGEST = 60.0  # kept for drawing [s]
-GAP = 5.0  # a step in time longer than so many usual ones is a gap, where no reading was counted as lost [-]
-STEPS = (1.0, 2.0, 5.0, 10.0)
-MARGIN = 0.05  # data may go beyond the scale by this share of it: so much is drawn [-]
+_LONGEST = 60.0  # kept for drawing [s]
+_GAP = 5.0  # a step in time longer than so many usual ones is a gap, where no reading was counted as lost [-]
+_STEPS = (1.0, 2.0, 5.0, 10.0)
+SCALE_MARGIN = 0.05  # data may go beyond the scale by this share of it: so much is drawn [-]
 SHRINK = 0.25  # a scale of which no more than this share is used ...
-PATIENCE = 20.0  # ... for so long is taken back [s]
+_PATIENCE = 20.0  # ... for so long is taken back [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,10 +32,10 @@ class LiveTrace:
     """A ring of readings. The only thing here that changes; nothing is recorded from it."""
 
     def __init__(self, rate: float, channels: int = len(CHANNELS), gap: float | None = None) -> None:
-        """Keep `LONGEST` seconds of readings at `rate` [Hz]; times further apart than `gap` [s] have a gap between."""
+        """Keep `_LONGEST` seconds of readings at `rate` [Hz]; times further apart than `gap` [s] have a gap between."""
         self.rate = rate if np.isfinite(rate) and rate > 0 else 1000.0
-        self._gap = GAP / self.rate if gap is None else gap
-        self._capacity = int(self.rate * LONGEST * 1.05) + 16
+        self._gap = _GAP / self.rate if gap is None else gap
+        self._capacity = int(self.rate * _LONGEST * 1.05) + 16
         self._time = np.full(2 * self._capacity, np.nan)
         self._values = np.full((channels, 2 * self._capacity), np.nan, np.float32)
         self._end = 0  # one behind the newest; the ring is written from left to right and moved when full
@@ -181,7 +181,7 @@ class PlotScale:
         """
         if not (least <= greatest):  # nothing is known
             return self
-        margin = MARGIN * (self.high - self.low)
+        margin = SCALE_MARGIN * (self.high - self.low)
         if greatest > self.high + margin or least < self.low - margin:
             low = self.low if least >= self.low - margin else -_step(-least)
             high = self.high if greatest <= self.high + margin else _step(greatest)
@@ -189,7 +189,7 @@ class PlotScale:
         wide = self.high - self.low > self.least
         if not wide or greatest > SHRINK * self.high or least < SHRINK * self.low:
             return PlotScale(self.low, self.high, self.least, now)
-        if now - self.used < PATIENCE:
+        if now - self.used < _PATIENCE:
             return self
         low = 0.0 if self.low == 0.0 else -max(_step(-least), self.least / 2)
         return PlotScale(low, max(_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
@@ -229,4 +229,4 @@ def _step(value: float) -> float:
     if value <= 0.0:
         return 0.0
     power = 10.0 ** np.floor(np.log10(value))
-    return float(f"{next(step * power for step in STEPS if step * power >= value * (1 - 1e-9)):.6g}")
+    return float(f"{next(step * power for step in _STEPS if step * power >= value * (1 - 1e-9)):.6g}")

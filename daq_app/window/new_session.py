@@ -22,9 +22,9 @@ from sessions.recording.storage import check_room, need
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
-AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+SIGNED_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
-SHOWN = 20  # sessions that were cut short, at most
+_SHOWN = 20  # sessions that were cut short, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ def check_form(
     if form.forces and form.height.strip():
         face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
         planned = replace(planned, frame=face)
-    if form.forces and form.normal in AXES:
+    if form.forces and form.normal in SIGNED_AXES:
         planned = replace(planned, frame=replace(planned.frame, normal=form.normal, normal_origin="set"))
     # In a study the folder's name tells what the visit is for: the protocol is the same in all.
     what = planned.protocol if place is None else "forces" if planned.forces else "scores"
@@ -263,7 +263,7 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
         for place in (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")):
             places[place] = place.stat().st_mtime
     for place in sorted(places, key=lambda place: -places[place]):
-        if len(unfinished) == SHOWN:
+        if len(unfinished) == _SHOWN:
             break
         try:
             if is_sealed(place.parent) or is_in_use(place):

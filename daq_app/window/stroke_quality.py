@@ -31,7 +31,7 @@ FELL = 0.5  # a normal force that falls by this share along the steady window is
 
 # Few words for what an experimenter can do something about, and what to do, as a command to whoever runs the session.
 # The other flaws show their own sentence. Where there is no command, the advice is another stroke.
-FLAWS: Mapping[FlawName, tuple[str, str]] = {
+_FLAWS: Mapping[FlawName, tuple[str, str]] = {
     FlawName.NO_STROKE: tr_noop(("no stroke was found", "Stroke once, firmly, and lift.")),
     FlawName.NO_STEADY_SLIDING: tr_noop(("no steady window", "Slide further, at one speed.")),
     FlawName.ROLLED: tr_noop(("too short a way: the finger may only roll", "Slide further, not roll.")),
@@ -59,12 +59,12 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
     analysis = analyse_blocks([(trial, block)], TrialContext(plan, info, AnalysisSettings()))
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
-    mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in FLAWS]
-    short = {flaw.name: FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), "")) for flaw in mentioned}
+    mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in _FLAWS]
+    short = {flaw.name: _FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), "")) for flaw in mentioned}
     remarks = [Remark(flaw.grade, short[flaw.name][0], flaw.sentence, short[flaw.name][1]) for flaw in mentioned]
     if stroke is None:
-        worst, *milder = remarks or [Remark("refused", FLAWS[FlawName.NO_STROKE][0], "", "")]
-        advice = worst.advice or FLAWS[FlawName.NO_STROKE][1]
+        worst, *milder = remarks or [Remark("refused", _FLAWS[FlawName.NO_STROKE][0], "", "")]
+        advice = worst.advice or _FLAWS[FlawName.NO_STROKE][1]
         return Quality((worst._replace(grade="refused", advice=advice), *milder))
     fell = _fell(stroke)
     if fell is not None and fell >= FELL:

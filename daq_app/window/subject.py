@@ -24,29 +24,29 @@ Owner = Literal["text", "answer", "course"]
 
 # Of a preview: answers, events, and what its pages are called.
 EXAMPLES = {"number": steps.MagnitudeEstimate(1.0), "choice": steps.PairedChoice("first")}
-ALWAYS: Mapping[type, steps.Event] = {  # what brings a session on from a state, whatever the trial
+_ALWAYS: Mapping[type, steps.Event] = {  # what brings a session on from a state, whatever the trial
     states.Idle: steps.Begin(), states.Taring: steps.Zeroed(), states.Stroking: steps.FingerLifted(),
     states.Settling: steps.FingerLifted(), states.Resting: steps.RestOver(),
 }  # fmt: skip
 OF_A_BLOCK = {"ready": tr_noop("stroke"), "scoring": tr_noop("answer")}  # phases whose page is the block's own
-NAMES = {
+_NAMES = {
     "mounting": tr_noop("the surface is changed"), "settling": tr_noop("the finger is still on"),
     "resting": tr_noop("rest"), "paused": tr_noop("pause"), "closing": tr_noop("end"),
 }  # fmt: skip
 
 # Of an answer on the line, and of keys:
 LENGTH = 100.0  # of the line [mm]
-MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
+_MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
 STEP = 1.0  # an arrow moves the mark by so much ...
 LEAP = 10.0  # ... and Page Up or Page Down by this
 PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
 DIGITS = 1  # of a score: a mark can be placed no finer
 GIVES = frozenset({"Enter", "Space"})  # the answer that stands
-PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
+_PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
 TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
 CHOOSES = frozenset({"0", "1", "2", "Left", "Right"})  # one of two; 0, beside them on a keypad, does nothing
 ANSWER_KEYS: dict[Kind, frozenset[str]] = {
-    "read": frozenset(), "line": PLACES | GIVES, "number": TYPES | GIVES, "choice": CHOOSES | GIVES,
+    "read": frozenset(), "line": _PLACES | GIVES, "number": TYPES | GIVES, "choice": CHOOSES | GIVES,
 }  # fmt: skip
 
 
@@ -86,7 +86,7 @@ class SubjectText(StrEnum):
     PRESSING = "How hard you press"
 
 
-PLAIN = {  # title and text of the pages on which nothing is to be done
+_PLAIN = {  # title and text of the pages on which nothing is to be done
     "idle": (SubjectText.WELCOME, SubjectText.BEGINS), "settling": (SubjectText.THANKS, SubjectText.LIFT),
     "resting": (SubjectText.REST, SubjectText.RESTING), "paused": (SubjectText.PAUSE, SubjectText.GOES_ON),
     "resuming": (SubjectText.PAUSE, SubjectText.GOES_ON), "ended": (SubjectText.THANKS, SubjectText.REST_HAND),
@@ -165,7 +165,7 @@ class _Page:
             case "scoring":
                 return self._question()
             case _:
-                title, text = PLAIN["paused" if session.resumable else phase]
+                title, text = _PLAIN["paused" if session.resumable else phase]
                 return self._read(self.say(title), self.say(text))
 
     def _read(self, title: str, text: str = "") -> SubjectView:
@@ -245,17 +245,17 @@ def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
             session = session_after(session, command, 0.0)
         if isinstance(state, states.Settling):
             session = replace(session, phase="settling")
-        if session.phase in OF_A_BLOCK or session.phase in NAMES:
+        if session.phase in OF_A_BLOCK or session.phase in _NAMES:
             pages.setdefault(_name(session), replace(subject_view(session, translate), key=(len(pages) + 1, 1)))
         step = machine.advance(state, _next_event(state))
-    pages[NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
-    pages[NAMES["closing"]] = pages.pop(NAMES["closing"])  # the last one
+    pages[_NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
+    pages[_NAMES["closing"]] = pages.pop(_NAMES["closing"])  # the last one
     return tuple(PreviewPage(tr(name), view) for name, view in pages.items())
 
 
 def _name(session: SessionState) -> str:
-    if session.phase in NAMES or session.block is None:
-        return NAMES.get(session.phase, session.phase)
+    if session.phase in _NAMES or session.block is None:
+        return _NAMES.get(session.phase, session.phase)
     return f"{session.block.name}: {tr(OF_A_BLOCK[session.phase])}"
 
 
@@ -270,7 +270,7 @@ def _next_event(state: states.State) -> steps.Event:
         case states.Settling(touching=False):
             return steps.Settled()
         case _:
-            return ALWAYS.get(type(state), steps.Finish())
+            return _ALWAYS.get(type(state), steps.Finish())
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,7 +303,7 @@ class Answer:
     def step(self, time: float, by: float) -> "Answer":
         """Return the answer after a key moved the mark by `by`; the first key puts the mark in the middle."""
         if not self.positions:
-            return self._move(time, MIDDLE, "keyboard")
+            return self._move(time, _MIDDLE, "keyboard")
         last, before = self.positions[-1]
         again = self.corrections + (time - last > PAUSE or self.device != "keyboard")
         return replace(self._move(time, before + by, "keyboard"), corrections=again)

@@ -7,15 +7,16 @@ from typing import Literal
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
 from daq_app.window.course_state import SessionState
-from daq_app.window.live_feed import AXES, LOADS
+from daq_app.window.live_feed import LOADS
 from daq_app.window.state import AppState, BenchState, Dismissed, Message
 from daq_app.window.subject import SubjectView, Translate, mirror_view, subject_view
 from daq_app.window.view_course import CourseView, course_view
 from daq_app.wording import COUNT_WORDS, number, quantity, sentence, tr, tr_noop
+from drivers.calibration_file import AXES
 from drivers.transducer import TransducerInfo
 
-NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
-UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
+HEALTH_NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
+_UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
 COUNTED = tuple(name for name in COUNT_WORDS if name not in ("received", "off_rate"))  # the rate has its own sentence
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 ENDED = {  # by how far the sealing is
@@ -28,7 +29,7 @@ UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer
 
 
 def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str, str], ...]:
-    """Return a line for each of `NAMES`.
+    """Return a line for each of `HEALTH_NAMES`.
 
     >>> life = Life(12, "2026-03-02", (0.0412, 0, -0.003, 1.26, 0, 0), (0.0042,) * 3 + (0.052,) * 3, 2, "2026-10-01")
     >>> dict(life_rows(None, life))["moved"], dict(life_rows(None, life))["overloads"]
@@ -43,7 +44,7 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
         zeros = tr("{count} since {since}", count=life.zeros, since=life.since)
         noise = tr("{noise} usually", noise=greatest(life.noise))
         moved = "–" if life.zeros == 1 else tr("{drift} since the first", drift=greatest(life.drift))
-    return tuple(zip(NAMES, (zeros, moved, noise, overloads), strict=True))
+    return tuple(zip(HEALTH_NAMES, (zeros, moved, noise, overloads), strict=True))
 
 
 def greatest(six: tuple[float, ...]) -> str:
@@ -185,7 +186,7 @@ def _rate(bench: BenchState) -> str:
 
 def _bars(bench: BenchState) -> tuple[Bar, ...]:
     over = set(bench.peak.over)
-    noise = ["–"] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, UNITS, strict=True)]
+    noise = ["–"] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, _UNITS, strict=True)]
     rows = zip(LOADS, bench.load.shares, bench.peak.shares, (*noise, ""), strict=True)
     return tuple(Bar(name, _share(now), _share(peak), name in over, text) for name, now, peak, text in rows)
 

@@ -17,9 +17,9 @@ NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot say
     steps.AskNumber: steps.MagnitudeEstimate(None),
     steps.AskChoice: steps.PairedChoice(None),
 }
-WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
+_WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
 TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
-KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state without colour, and the state in words
+TILES: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state without colour, and the state in words
     "done": ("✓", tr_noop("done")),
     "redone": ("↻", tr_noop("done again")),
     "flawed": ("!", tr_noop("done, its stroke has a flaw")),
@@ -46,7 +46,7 @@ class Tile:
         >>> Tile(3, "D86", "flawed").words
         'trial 3, D86: done, its stroke has a flaw'
         """
-        return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(KINDS[self.kind][1]))
+        return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(TILES[self.kind][1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +212,7 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
             practice = "" if trial.phase == "main" else f"{trial.phase.capitalize()}: "
             words = tr(
                 "{practice}mount sample {code}, its arrow {way}. Then press Space {then}.",
-                practice=practice, code=code, way=tr(WAYS[trial.direction]), then=then,
+                practice=practice, code=code, way=tr(_WAYS[trial.direction]), then=then,
             )  # fmt: skip
             return words[:1].upper() + words[1:], Button(label, "Space", sends=steps.StimulusMounted(code))
         case "taring":
@@ -334,7 +334,7 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     if trial is None:
         return None
     again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
-    state = tr(KINDS[_kind(session, trial)][1])
+    state = tr(TILES[_kind(session, trial)][1])
     heading = tr("Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=state)
     shown = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in shown:

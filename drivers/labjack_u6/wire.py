@@ -15,11 +15,11 @@ from drivers.arrays import Array
 from drivers.readings import Records
 from drivers.transducer import DeviceFault, StatusBit, StatusTable, bit
 
-GAUGES = 6
+_GAUGES = 6
 SCANS = 4  # in a stream packet: whole scans, so that a lost packet does not mix the gauges up
-STREAM_PACKET = 14 + 2 * GAUGES * SCANS  # bytes
+STREAM_PACKET = 14 + 2 * _GAUGES * SCANS  # bytes
 HIGHEST_RATE = 8000  # scans a second; the converter makes 50 000 readings a second at its lowest resolution
-LIMIT = 10.0  # of a gauge's voltage [V]: beyond, and at the ends of the converter, it is saturated
+_LIMIT = 10.0  # of a gauge's voltage [V]: beyond, and at the ends of the converter, it is saturated
 
 STREAM_IS_OFF = 52  # answer to a stop when nothing streams
 _DRAINING = 59  # error code of packets while an overflow is being recovered from: their scans are sound
@@ -49,7 +49,7 @@ _ERRORS = {
 
 # Bit 8 + i of a status says that gauge i is at its limit; bits 0 to 7 are the error code of its packet.
 STATUS_BITS = StatusTable(
-    tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(GAUGES))
+    tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(_GAUGES))
     + tuple(StatusBit(0xFF, code, f"error {code}: {words}", "doubtful") for code, words in _ERRORS.items())
 )
 
@@ -101,8 +101,8 @@ def read_memory(block: int) -> bytes:
 
 def configure_stream(clock: ScanClock) -> bytes:
     """Return the request that sets six differential gauges, one after the other, to be scanned at the clock's rate."""
-    head = struct.pack("<6BH", GAUGES, 1, GAUGES * SCANS, 0, 0, clock.flags, clock.interval)
-    return _extended_command(0x11, head + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(GAUGES)))
+    head = struct.pack("<6BH", _GAUGES, 1, _GAUGES * SCANS, 0, 0, clock.flags, clock.interval)
+    return _extended_command(0x11, head + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(_GAUGES)))
 
 
 def scan_clock(rate: float) -> ScanClock:
@@ -182,7 +182,7 @@ class StreamDecoder:
         for packet in self._packets():
             self._lost += SCANS * ((packet[10] - self._next) % 256)
             self._next = (packet[10] + 1) % 256
-            for scan in np.frombuffer(packet, "<u2", GAUGES * SCANS, 12).reshape(SCANS, GAUGES):
+            for scan in np.frombuffer(packet, "<u2", _GAUGES * SCANS, 12).reshape(SCANS, _GAUGES):
                 if packet[11] == _RECOVERED and np.all(scan == _DUMMY):
                     # The User's Guide: the number of lost scans includes this one.
                     self._lost += int.from_bytes(packet[6:8], "little")
@@ -191,16 +191,16 @@ class StreamDecoder:
                 errors.append(0 if packet[11] in (_DRAINING, _RECOVERED) else packet[11])
                 damaged.append(self._lost)
                 self._lost = 0
-        codes = np.array(scans, np.uint16).reshape(-1, GAUGES)
+        codes = np.array(scans, np.uint16).reshape(-1, _GAUGES)
         volts = self._constants.volts(codes)
-        full = (codes == 0) | (codes == 0xFFFF) | (np.abs(volts) >= LIMIT)
-        status = np.array(errors, np.int64) + (full * (1 << np.arange(8, 8 + GAUGES))).sum(axis=1)
+        full = (codes == 0) | (codes == 0xFFFF) | (np.abs(volts) >= _LIMIT)
+        status = np.array(errors, np.int64) + (full * (1 << np.arange(8, 8 + _GAUGES))).sum(axis=1)
         return Records(volts, status, np.array(damaged, np.int64))
 
     def _packets(self) -> list[bytes]:
         """Take whole sound packets off the front; bytes that begin none are skipped."""
         packets: list[bytes] = []
-        head = bytes([0xF9, 4 + GAUGES * SCANS, 0xC0])
+        head = bytes([0xF9, 4 + _GAUGES * SCANS, 0xC0])
         while True:
             at = self._bytes.find(head, 1)
             start = at - 1 if at > 0 else max(len(self._bytes) - len(head), 0)

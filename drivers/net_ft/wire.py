@@ -36,7 +36,7 @@ RECORD = np.dtype(
 )
 COUNTER_RATE = 7000.0  # ticks a second, good to 0.5 % [Hz]
 
-SUMMARY = 1 << 31  # some bit is an error
+_SUMMARY = 1 << 31  # some bit is an error
 
 # A monitor condition is latched where a threshold that the user set was crossed. Whether the summary bit comes with it
 # is not agreed on: both forms are a note. All else is doubtful, as in the most careful published client.
@@ -86,7 +86,7 @@ _AXIA = (
 )
 
 
-NET_FT, AXIA = StatusTable(_NET_FT, SUMMARY), StatusTable(_AXIA, SUMMARY)  # the boxes that speak this wire
+NET_FT, AXIA = StatusTable(_NET_FT, _SUMMARY), StatusTable(_AXIA, _SUMMARY)  # the boxes that speak this wire
 
 
 @dataclass(frozen=True, slots=True, eq=False)

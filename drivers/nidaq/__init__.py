@@ -21,11 +21,13 @@ from drivers.readings import Records
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import LinkLost, SetupError, StatusTable, TransducerInfo, bit
 
-GAUGES = 6
+_GAUGES = 6
 RANGE = 10.0  # [V]
-LIMIT = 9.9  # of a gauge's voltage [V]; a converter of 16 bits clips slightly outside of 10 V
+_LIMIT = 9.9  # of a gauge's voltage [V]; a converter of 16 bits clips slightly outside of 10 V
 # Bit 8 + i of a status says that gauge i is at its limit.
-STATUS_BITS = StatusTable(tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(GAUGES)))
+_STATUS_BITS = StatusTable(
+    tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(_GAUGES))
+)
 _BUFFER = 10.0  # readings that the library keeps for a computer that is late [s]
 _NAP = 0.005  # between two looks for readings [real s]
 _OPTIONS = frozenset({"cal", "rate"})
@@ -91,7 +93,7 @@ def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # n
         rate=float("nan"),
         counter_rate=float("nan"),
         calibration=calibration.calibration,
-        status=STATUS_BITS,
+        status=_STATUS_BITS,
         settings={
             "converter": f"{device.product_type}, serial number {device.serial_num:X}",
             "calibration": f"{calibration.calibration.source}, SHA-256 {calibration.sha256}",
@@ -116,7 +118,7 @@ class _TaskLink:
             self._task = library.Task()
             differential = library.constants.TerminalConfiguration.DIFF
             channels = self._task.ai_channels.add_ai_voltage_chan(
-                f"{device}/ai0:{GAUGES - 1}", terminal_config=differential, min_val=-RANGE, max_val=RANGE
+                f"{device}/ai0:{_GAUGES - 1}", terminal_config=differential, min_val=-RANGE, max_val=RANGE
             )
             low, high = float(channels.ai_min), float(channels.ai_max)
             if low > -RANGE or high < RANGE or channels.ai_term_cfg != differential:
@@ -150,7 +152,7 @@ class _TaskLink:
                 volts = self._task.read(number_of_samples_per_channel=self._library.constants.READ_ALL_AVAILABLE)
             except self._library.DaqError as error:
                 raise LinkLost(f"{self._where}: {_sentence(error)}") from None
-            readings = np.asarray(volts, np.float64).reshape(GAUGES, -1).T
+            readings = np.asarray(volts, np.float64).reshape(_GAUGES, -1).T
             if len(readings):
                 return readings.tobytes()
             if time.monotonic() >= deadline:
@@ -170,8 +172,8 @@ class _VoltsDecoder:
 
     def feed(self, data: bytes) -> Records:
         """Take whole readings as bytes of float64 and return them with the status of their gauges."""
-        volts = np.frombuffer(data, np.float64).reshape(-1, GAUGES)
-        status = ((np.abs(volts) >= LIMIT) * (1 << np.arange(8, 8 + GAUGES))).sum(axis=1)
+        volts = np.frombuffer(data, np.float64).reshape(-1, _GAUGES)
+        status = ((np.abs(volts) >= _LIMIT) * (1 << np.arange(8, 8 + _GAUGES))).sum(axis=1)
         return Records(volts, status.astype(np.int64), np.zeros(len(volts), np.int64))
 
 

@@ -26,7 +26,7 @@ _BANNER = 6.0  # for all the controller says when it starts
 _SILENT = 0.02  # behind the prompt after a stream
 _END = 0.08  # for the prompt after a stream
 _TRIES = 3
-BAUDS = (38400, 9600, 115200, 19200, 57600, 4800)  # tried in this order; published drivers disagree on the usual one
+_BAUDS = (38400, 9600, 115200, 19200, 57600, 4800)  # tried in this order; published drivers disagree on the usual one
 _MEASURED = 0.6  # for how long the stream is watched to learn its rate [real s]
 _OPTIONS = frozenset({"baud", "format", "counts_per_N", "counts_per_Nm", "range_N", "range_Nm", "serial", "simulated"})
 
@@ -137,7 +137,7 @@ def _where(address: Address) -> _Where:
         ranges,
         "counts per unit as the address says",
     )
-    return _Where(address, port, (baud,) if baud else BAUDS, form == "binary", calibration)
+    return _Where(address, port, (baud,) if baud else _BAUDS, form == "binary", calibration)
 
 
 @dataclass(eq=False)

@@ -27,7 +27,7 @@ from sessions.file_access import gzip_lines, json_object, read_within_limit, wri
 from sessions.recording import Recording
 from sessions.recording.manifest import description
 
-VERSION = "1.10.0"
+_VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]
 PIPELINE = "daq-app"
 DERIVED = (  # tables that are made of a recording, in their order
@@ -120,7 +120,7 @@ def _dataset(recording: Recording, kind: str, software: Mapping[str, str]) -> di
     return {
         **recording.mark,
         "Name": f"SIMULATED: {name}" if recording.simulated else name,
-        "BIDSVersion": VERSION,
+        "BIDSVersion": _VERSION,
         "DatasetType": kind,
         "GeneratedBy": [by],
         **({"SourceDatasets": [{"URL": "../.."}]} if kind == "derivative" else {}),

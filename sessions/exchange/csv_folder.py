@@ -16,23 +16,23 @@ from sessions.recording import Recording
 from sessions.recording.manifest import description
 from sessions.recording.schema import DESCRIPTION_FILE, SEALED_FILE
 
-READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"
-SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated", ())  # a comment would hide the header
+_READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"
+_SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated", ())  # a comment would hide the header
 
 
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the session into an empty folder."""
     recording = source.recording
     session_tables = [*tables(source), Table("events", EACH_EVENT, event_columns(recording.events))]
-    mark = (SIMULATED,) if recording.simulated_sentence else ()
+    mark = (_SIMULATED,) if recording.simulated_sentence else ()
     for table in session_tables:
         with (folder / f"{table.name}.csv").open("w", encoding="utf-8", newline="") as file:
             _write_rows(file, mark, [[column.heading for column in table.columns]], table.rows)
     contents = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in session_tables]
     if recording.info is not None:
         meaning = "a row for each reading, in the order recorded"
-        contents.append((READINGS, meaning, (*mark, *columns(recording.info.calibration))))
-        _write_readings(recording, mark, folder / READINGS, progress)
+        contents.append((_READINGS, meaning, (*mark, *columns(recording.info.calibration))))
+        _write_readings(recording, mark, folder / _READINGS, progress)
     write_json(folder / DESCRIPTION_FILE, description(recording))
     for name, document in (("analysis.json", source.analysis), ("prediction.json", source.prediction)):
         if document is not None:
@@ -52,7 +52,7 @@ def read(path: Path) -> ExportedSession:
     head = head_of(json_object(read_within_limit(path / DESCRIPTION_FILE)))
     rows_read = csv.DictReader(io.StringIO(read_within_limit(path / EVENTS).decode(), newline=""))
     events = tuple(logged_event({name: plain(cell) for name, cell in row.items()}, "kind") for row in rows_read)
-    return ExportedSession("csv", path, head, events, lambda: _read_readings(path / READINGS), side_files(path))
+    return ExportedSession("csv", path, head, events, lambda: _read_readings(path / _READINGS), side_files(path))
 
 
 def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:

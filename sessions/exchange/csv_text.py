@@ -17,7 +17,7 @@ import numpy as np
 
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
-from sessions.exchange.session_tables import AXES, Column
+from sessions.exchange.session_tables import WRENCH, Column
 from sessions.file_access import LARGEST_TABLE, read_within_limit, remedy
 from sessions.prediction.press_curves import DisplacementLog
 
@@ -121,7 +121,7 @@ def mend_row(*cells: str) -> str:
     return "save the file with decimal points" if commas else "mend or remove the row"
 
 
-PART = 16_384  # rows at once
+_PART = 16_384  # rows at once
 MISSING = "n/a"
 RAW = tuple(f"raw_{axis}" for axis in range(1, 7))
 _EXACT = np.dtype(
@@ -133,7 +133,7 @@ STORED = _EXACT.names or ()  # what a reading is; the wrench is made from it
 
 def columns(calibration: Calibration) -> tuple[Column, ...]:
     """Return what the columns of a row are, without values."""
-    raw_units = [unit for _, unit in AXES] if calibration.raw_unit == "N, N mm" else [calibration.raw_unit] * 6
+    raw_units = [unit for _, unit in WRENCH] if calibration.raw_unit == "N, N mm" else [calibration.raw_unit] * 6
     meanings = [
         ("sequence", "", "record number given by the device; missing numbers are readings that never arrived"),
         ("counter", "", "ticks of the device's clock"),
@@ -141,7 +141,10 @@ def columns(calibration: Calibration) -> tuple[Column, ...]:
         ("time", "s", "device clock, 0 at the first reading"),
         ("received", "ns", "session clock when the reading arrived"),
         *((name, unit, "as the device sent it") for name, unit in zip(RAW, raw_units, strict=True)),
-        *((axis, unit, "the finger's wrench on the stimulus: matrix · raw, nothing subtracted") for axis, unit in AXES),
+        *(
+            (axis, unit, "the finger's wrench on the stimulus: matrix · raw, nothing subtracted")
+            for axis, unit in WRENCH
+        ),
     ]
     return tuple(Column(name, unit, meaning, ()) for name, unit, meaning in meanings)
 
@@ -161,7 +164,7 @@ def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Ite
     """
     places = [_place(name, names) for name in STORED]
     arrived = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
-    while part := list(islice(arrived, PART)):
+    while part := list(islice(arrived, _PART)):
         # usecols picks the columns in the order given, whatever their order in the file.
         table: Any = np.atleast_1d(np.loadtxt(part, _EXACT, delimiter=delimiter, usecols=places, comments=None))
         raw = np.column_stack([table[name] for name in RAW])
@@ -176,8 +179,8 @@ def _place(name: str, names: Sequence[str]) -> int:
     raise ValueError(f"there is no column {name}")
 
 
-DISPLACEMENT = "displacement_mm"
-WIDTH = "contact_width_mm"
+_DISPLACEMENT = "displacement_mm"
+_WIDTH = "contact_width_mm"
 CLOCKS = ("time_s", "received_ns", "sequence")  # as `readings.csv` of an export calls them
 
 
@@ -187,24 +190,24 @@ def displacement_log(path: Path) -> DisplacementLog:
     _, header = next(rows, (0, [""]))
     names = [cell.strip() for cell in header]
     clock = next((name for name in CLOCKS if name in names), None)
-    if clock is None or DISPLACEMENT not in names:
+    if clock is None or _DISPLACEMENT not in names:
         raise ImportRefused(
-            f"{path} needs a header with {DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
+            f"{path} needs a header with {_DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
             f"calls them; it has {', '.join(map(cell_text, names)) or 'none'}"
         )
-    places = [names.index(name) for name in (clock, DISPLACEMENT)]
-    of_width = names.index(WIDTH) if WIDTH in names else None
+    places = [names.index(name) for name in (clock, _DISPLACEMENT)]
+    of_width = names.index(_WIDTH) if _WIDTH in names else None
     values: list[tuple[float, float, float]] = []
     for line, cells in rows:
         at, displacement = (_number(cells, place) for place in places)
         if not np.isfinite([at, displacement]).all():
-            words = f"{clock} or {DISPLACEMENT} is no number; {mend_row(*cells)}"
+            words = f"{clock} or {_DISPLACEMENT} is no number; {mend_row(*cells)}"
             raise ImportRefused(f"{path}, line {line}: {words}")
         if values and at <= values[-1][0]:
             raise ImportRefused(f"{path}, line {line}: {clock} does not grow; mend or remove the row")
         width = np.nan if of_width is None else _number(cells, of_width)
         if width <= 0.0:
-            raise ImportRefused(f"{path}, line {line}: {WIDTH} is not above 0; leave the cell empty without a contact")
+            raise ImportRefused(f"{path}, line {line}: {_WIDTH} is not above 0; leave the cell empty without a contact")
         values.append((at, displacement, width))
     if len(values) < 2:
         raise ImportRefused(f"{path} holds {len(values)} rows: give a log with at least 2")

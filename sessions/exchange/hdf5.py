@@ -25,7 +25,7 @@ from sessions.recording.schema import COLUMNS, SEALED_FILE, check_format
 from sessions.recording.sealed_copy import DataSet, read_texts, texts, write_copy
 from sessions.strokes.decisions import DECISIONS
 
-PART = 65_536  # readings at once
+_PART = 65_536  # readings at once
 SIDE_FILES = {  # data set and meaning of each file that people set beside a recording
     DECISIONS: ("derived/decisions", "decisions.jsonl, what people decided about strokes"),
     GAIN_ERROR: ("derived/calibration_error", "calibration-error.json, as somebody set it"),
@@ -90,9 +90,10 @@ def _array(file: h5py.File, name: str) -> Any:  # noqa: ANN401  h5py brings no t
 def _blocks(path: Path) -> Iterator[ReadingBlock]:
     with h5py.File(path, "r") as file:
         count = len(file["readings/sequence"])
-        for start in range(0, count, PART):
+        for start in range(0, count, _PART):
             arrays: Any = {
-                name: np.asarray(file[f"readings/{name}"][start : start + PART], kind) for name, kind in COLUMNS.items()
+                name: np.asarray(file[f"readings/{name}"][start : start + _PART], kind)
+                for name, kind in COLUMNS.items()
             }
             yield ReadingBlock(**arrays)
 

@@ -147,7 +147,7 @@ RATE_TOLERANCE = 0.01  # a stated rate may differ so much from the one the file'
 UNEVEN = 0.05  # time steps that spread more than this hold no one rate [-]
 NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _FEWEST = 2
-LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
+_LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits
 FASTEST = 1e6  # readings a second [Hz]: ten times those of the fastest device we drive
 GREATEST = 1e18  # of a time, force or torque: a thousand times the microseconds since 1970, and no product overflows
 _SIMULATED = "SIMULATED"  # at the head of whatever came from a simulator
@@ -205,9 +205,9 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
             f"{path}: its times hold {rate:.3g} readings a second, more than any device gives ({FASTEST:.0f}); name "
             f"the time's unit in the header ({', '.join(TIME_UNITS)})"
         )
-    if time[-1] > LONGEST:
+    if time[-1] > _LONGEST:
         raise ImportRefused(
-            f"{path}: its readings span {time[-1]:.3g} s, more than a session can ({LONGEST:g} s); name the time's "
+            f"{path}: its readings span {time[-1]:.3g} s, more than a session can ({_LONGEST:g} s); name the time's "
             f"unit in the header ({', '.join(TIME_UNITS)}), or give a higher --rate"
         )
     block = _block(time, rows[:, list(layout.axes)])

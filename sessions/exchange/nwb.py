@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pynwb import NWBFile
 
 FILE = "session.nwb"
-MISSING = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
+_MISSING = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
 _WHOLE = (
     ("sequence", "n/a", "Record number given by the device; missing numbers are readings that never arrived."),
     ("counter", "ticks", "The device's own clock."),
@@ -48,7 +48,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         import pynwb
         from pynwb.file import Subject
     except ImportError as error:
-        raise ExportError(MISSING) from error
+        raise ExportError(_MISSING) from error
     recording = source.recording
     plan = recording.plan
     mark = f"{recording.simulated_sentence}. " if recording.simulated_sentence else ""

@@ -24,7 +24,7 @@ from sessions.toml_file import from_table, toml_text
 
 Cell = str | int | float | None
 Columns = Mapping[str, tuple[str, str]]  # by name: unit ("" for none) and meaning
-AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
+WRENCH = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 _LISTED: Mapping[str, Any] = tomllib.loads((Path(__file__).parent / "columns.toml").read_text("utf-8"))
 
 
@@ -70,15 +70,15 @@ def _columns(record: type, name: str) -> dict[str, tuple[str, str]]:
 TRIAL = {
     **_columns_of("trial"),
     "outcome": ("", OUTCOMES),
-    **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in AXES},
+    **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in WRENCH},
 }
-STROKE = _columns(Stroke, "stroke")
-FRICTION = _columns(FrictionParameters, "friction")
+_STROKE = _columns(Stroke, "stroke")
+_FRICTION = _columns(FrictionParameters, "friction")
 ALTERNATIVE = {
     "trial": ("", "number of the trial"), **_columns(Variant, "variant"), **_columns(Alternative, "alternative")
 }  # fmt: skip
-PREDICTION = _columns(TrialPrediction, "prediction")
-FLAW, DECISION, ANSWER, POSITION, RESPONSE = map(_columns_of, ("flaw", "decision", "answer", "position", "response"))
+_PREDICTION = _columns(TrialPrediction, "prediction")
+FLAW, DECISION, _ANSWER, POSITION, RESPONSE = map(_columns_of, ("flaw", "decision", "answer", "position", "response"))
 
 _NESTED = ("solver", "alternatives", "interval", "opposite_interval")
 _OF_INTERVALS = (
@@ -151,9 +151,9 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         trials(source.recording),
         answers(source.recording),
         positions(source.recording),
-        _table("strokes", "a row for each stroke", _strokes(analysis), STROKE),
+        _table("strokes", "a row for each stroke", _strokes(analysis), _STROKE),
         _table(
-            "friction", "what the model is given: a row for each trial with a stroke", _friction(analysis), FRICTION
+            "friction", "what the model is given: a row for each trial with a stroke", _friction(analysis), _FRICTION
         ),
         _table("flaws", "what is wrong with the recording or with a stroke", flaws, FLAW),
     )
@@ -175,7 +175,7 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
         }
         for row in prediction["trials"]
     ]
-    yield _table("predictions", "what the finite-element finger predicts for each trial", rows, PREDICTION)
+    yield _table("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
     yield from _responses(prediction)
     variants = [
         {
@@ -239,7 +239,7 @@ def trials(recording: Recording) -> Table:
                 "take": record.take.number if record.take else None,
                 "start": record.start_ns,
                 "stop": record.stop_ns,
-                **{f"zero_{axis}": value for (axis, _), value in zip(AXES, zero, strict=True)},
+                **{f"zero_{axis}": value for (axis, _), value in zip(WRENCH, zero, strict=True)},
             }
         )
     return _table("trials", "a row for each planned trial", rows, TRIAL)
@@ -276,7 +276,7 @@ def answers(recording: Recording) -> Table:
         for event in recording.events
         if event.kind in ANSWERS
     ]
-    return _table("answers", "a row for each answer, those of discarded takes too", rows, ANSWER)
+    return _table("answers", "a row for each answer, those of discarded takes too", rows, _ANSWER)
 
 
 def positions(recording: Recording) -> Table:

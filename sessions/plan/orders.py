@@ -21,7 +21,7 @@ from drivers.arrays import Array
 from sessions.plan.plan import SessionPlan, Stimulus, Trial
 
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"  # no vowels: no label spells a word
-DRAWS = 10_000  # of an order that is to meet constraints
+_DRAWS = 10_000  # of an order that is to meet constraints
 
 Item = TypeVar("Item", int, str)
 
@@ -45,7 +45,7 @@ def draw(
 
     The rule: the order `shuffle` gives for `name`, else "name~1" and so on; all that meet it are equally likely.
     """
-    orders = (shuffle(items, seed, f"{name}~{draw}" if draw else name) for draw in range(DRAWS))
+    orders = (shuffle(items, seed, f"{name}~{draw}" if draw else name) for draw in range(_DRAWS))
     return next(filter(meets, orders), None)
 
 

@@ -190,11 +190,11 @@ def check_code(what: str, code: str) -> None:
 
 STUDY_FILE = "study.sqlite"
 KEY_FILE = "sealed-key.json"
-VERSION = 1
-HEAD = ("version", "protocol", "seed", "key_sha256")  # what the check sum of the head is of, in this order
-PATIENCE = 10.0  # waiting for another program that is enrolling [s]
+_VERSION = 1
+_HEAD = ("version", "protocol", "seed", "key_sha256")  # what the check sum of the head is of, in this order
+_PATIENCE = 10.0  # waiting for another program that is enrolling [s]
 
-TABLES = (
+_TABLES = (
     # protocol (its TOML text), seed, key_sha256; crc32 is that of the other values
     "CREATE TABLE head (name TEXT PRIMARY KEY, value TEXT NOT NULL)",
     """CREATE TABLE events (
@@ -229,11 +229,11 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
     except FileExistsError:
         again = f"{folder} is a study already, and its protocol is fixed: enrol without --protocol"
         raise StudyError(again) from None
-    values = (str(VERSION), protocol_text, str(seed), "" if key is None else key.sha256)
-    head: dict[str, str] = dict(zip(HEAD, values, strict=True))
+    values = (str(_VERSION), protocol_text, str(seed), "" if key is None else key.sha256)
+    head: dict[str, str] = dict(zip(_HEAD, values, strict=True))
     try:
         with _changing(folder) as connection:
-            for table in TABLES:
+            for table in _TABLES:
                 connection.execute(table)
             head["crc32"] = str(_check_sum(*head.values()))
             connection.executemany("INSERT INTO head VALUES (?, ?)", head.items())
@@ -346,12 +346,12 @@ def _event(number: int, utc: str, kind: str, subject: str, text: str) -> StudyEv
 def _study(connection: sqlite3.Connection, folder: Path) -> Study:
     path = folder / STUDY_FILE
     head = dict(connection.execute("SELECT name, value FROM head").fetchall())
-    if head.get("version") != str(VERSION):
-        raise StudyError(f"{path} is of version {head.get('version')}; this program reads {VERSION}")
+    if head.get("version") != str(_VERSION):
+        raise StudyError(f"{path} is of version {head.get('version')}; this program reads {_VERSION}")
     events = connection.execute("SELECT number, utc, kind, subject, data FROM events ORDER BY number").fetchall()
     check_sum = head.pop("crc32", None)  # none in older files
     try:
-        if check_sum not in (None, str(_check_sum(*(head[name] for name in HEAD)))):
+        if check_sum not in (None, str(_check_sum(*(head[name] for name in _HEAD)))):
             raise ValueError("its head is not what it was")
         study = Study(
             name=folder.resolve().name,
@@ -372,7 +372,7 @@ def _reading(folder: Path) -> Generator[sqlite3.Connection]:
     with name_failure(StudyError, f"{path} cannot be read", failures=DATABASE_FAILURES):
         path.open("rb").close()  # says why it cannot be read, which SQLite does not
         address = f"{path.resolve().as_uri()}?mode=rw"  # to undo a change that was cut short; for reading where it must
-        with closing(limit_values(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
+        with closing(limit_values(sqlite3.connect(address, uri=True, timeout=_PATIENCE))) as connection:
             yield connection
 
 
@@ -382,7 +382,7 @@ def _changing(folder: Path) -> Generator[sqlite3.Connection]:
     path = folder / STUDY_FILE
     with (
         name_failure(StudyError, f"{path} cannot be changed", ", and repeat", (sqlite3.Error,)),
-        closing(limit_values(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None))) as connection,
+        closing(limit_values(sqlite3.connect(path, timeout=_PATIENCE, isolation_level=None))) as connection,
     ):
         connection.execute("PRAGMA synchronous=FULL")
         connection.execute("BEGIN IMMEDIATE")

@@ -18,9 +18,9 @@ from sessions.prediction.stored import Ends, SessionPrediction, TrialPrediction
 from sessions.strokes.stroke import Meaning, meanings
 from solver.quantities import NAMES, QUANTITIES, SED
 
-STEP = 1e-3  # [s]
+_STEP = 1e-3  # [s]
 ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"
-SHOWN = 10  # every so many steps the rate is kept
+_SHOWN = 10  # every so many steps the rate is kept
 
 
 _EDIN_2004 = "Edin 2004, J. Neurophysiol. 92:3233"
@@ -87,8 +87,8 @@ class Firing:
             "settled_rate_interval": self.settled_interval,
             "peak_rate": float(self.rate.max()),
             "peak_rate_interval": self.peak_interval,
-            "time": self.time[::SHOWN].tolist(),
-            "rate": self.rate[::SHOWN].tolist(),
+            "time": self.time[::_SHOWN].tolist(),
+            "rate": self.rate[::_SHOWN].tolist(),
             "spikes": self.spikes.tolist(),
         }
 
@@ -98,10 +98,10 @@ def firing_rate(time: Array, size: Array, reference: float, settings: AfferentSe
 
     The quantity's size goes straight between its instants; before the first nothing is adapted. At `reference` x is 1.
     """
-    grid = np.arange(float(time[0]), float(time[-1]) + STEP / 2, STEP)
+    grid = np.arange(float(time[0]), float(time[-1]) + _STEP / 2, _STEP)
     x = _drive(np.interp(grid, time, size), reference, settings)
-    rise = np.diff(x, prepend=x[0]) / STEP
-    kept = float(np.exp(-STEP / settings.adaptation_time))
+    rise = np.diff(x, prepend=x[0]) / _STEP
+    kept = float(np.exp(-_STEP / settings.adaptation_time))
     adapted = np.zeros_like(x)
     for i in range(1, len(x)):
         adapted[i] = kept * adapted[i - 1] + (1.0 - kept) * (x[i] + x[i - 1]) / 2.0

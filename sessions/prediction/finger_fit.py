@@ -20,14 +20,14 @@ from drivers.arrays import Array
 from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, at_depths
 from solver import Scene
 
-POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
+_POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
 # Halving and doubling these moved ends of intervals by so much of their width, over twelve simulated fingers.
-DRAWS = 20_000  # of the posterior: 0.2 % in the median
-FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer tell hardly the noise
-GRID = 25  # contrasts along each axis: 0.5 % with 49, 2 % with 13 in the median
-ROUNDS, SETTLED = 12, 1e-5  # of the search for touches: 0.2 % at most; it ends when sums of squares fall by less
-FINE = 200.0  # nodes that carry the posterior (inverse Simpson index), else the grid is drawn closer: not at all
+_DRAWS = 20_000  # of the posterior: 0.2 % in the median
+_FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer tell hardly the noise
+_GRID = 25  # contrasts along each axis: 0.5 % with 49, 2 % with 13 in the median
+_ROUNDS, SETTLED = 12, 1e-5  # of the search for touches: 0.2 % at most; it ends when sums of squares fall by less
+_FINE = 200.0  # nodes that carry the posterior (inverse Simpson index), else the grid is drawn closer: not at all
 CLOSER = 4  # grids at most
 QUANTILES = (0.025, 0.975)
 NARROW = 0.8  # of the prior's width: a narrower interval says that presses tell something of a layer
@@ -45,11 +45,11 @@ class LoadingCurve(NamedTuple):
     @staticmethod
     def of(displacement: Array, force: Array, width: Array) -> "LoadingCurve":
         """Return the means of readings (m,) over as many equal parts of their travel as a curve has points."""
-        edges: Array = np.linspace(float(displacement[0]), float(displacement[-1]), POINTS + 1)
-        which = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, POINTS - 1)
-        count = np.bincount(which, minlength=POINTS)
+        edges: Array = np.linspace(float(displacement[0]), float(displacement[-1]), _POINTS + 1)
+        which = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, _POINTS - 1)
+        count = np.bincount(which, minlength=_POINTS)
         some = count > 0
-        means = [np.bincount(which, one, POINTS)[some] / count[some] for one in (displacement, force, width)]
+        means = [np.bincount(which, one, _POINTS)[some] / count[some] for one in (displacement, force, width)]
         return LoadingCurve(means[0], means[1], float(displacement[0]), means[2], len(displacement))
 
 
@@ -120,7 +120,7 @@ class Likelihood:
         self.which = np.repeat(np.arange(len(presses)), [len(one.force) for one in presses])
         self.presses = self.which == np.arange(len(presses))[:, None]
         self.free = len(self.force) - 1 - len(presses)
-        if self.free < FEWEST:
+        if self.free < _FEWEST:
             raise FitError(
                 f"{len(self.force)} points of {len(presses)} presses are too few: press deeper, slower, or more often."
             )
@@ -139,7 +139,7 @@ class Likelihood:
         touch = np.tile(start, (len(contrast), 1))
         mean, misfit, residual, jacobian = self._linear(spline, touch)
         damping = np.full(len(contrast), 1e-3)
-        for _ in range(ROUNDS):  # Levenberg and Marquardt, all contrasts at once
+        for _ in range(_ROUNDS):  # Levenberg and Marquardt, all contrasts at once
             moved = touch + _steps(jacobian, residual, damping)[:, 1:]
             spread = self._linear(spline, moved)
             better = spread[1] < misfit
@@ -227,10 +227,10 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
     likely = [first, last, _closer(likelihood, first, "likelihood")]
     at, touch, mean = likelihood.maximum(last)
     rng = np.random.default_rng(seed)
-    chosen = rng.choice(len(last.weight), DRAWS, p=last.weight)
+    chosen = rng.choice(len(last.weight), _DRAWS, p=last.weight)
     scale = np.sqrt((last.misfit + likelihood.floor) / likelihood.free * last.variance)
-    means = last.mean[chosen] + scale[chosen] * rng.standard_t(likelihood.free, DRAWS)
-    means += gain_error * rng.standard_normal(DRAWS)
+    means = last.mean[chosen] + scale[chosen] * rng.standard_t(likelihood.free, _DRAWS)
+    means += gain_error * rng.standard_normal(_DRAWS)
     best = model.stiffnesses(np.array([mean]), at[None])[0]
     draws = model.stiffnesses(means, last.contrast[chosen])
     depth = likelihood.displacement - touch[likelihood.which]
@@ -274,9 +274,9 @@ def _layer(likelihood: Likelihood, grids: Sequence[_Grid], number: int, best: Ar
 
 def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
     """Return contrasts (g, 2) of a grid within the model's reach, and their step; `axes` (2, 2) are its half widths."""
-    line: Array = np.linspace(-1.0, 1.0, GRID)
+    line: Array = np.linspace(-1.0, 1.0, _GRID)
     nodes = centre + np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2) @ axes
-    step = float(np.hypot(*axes.T).max()) * 2.0 / (GRID - 1)
+    step = float(np.hypot(*axes.T).max()) * 2.0 / (_GRID - 1)
     return nodes[(nodes**2).sum(axis=1) <= REACH**2], step
 
 
@@ -284,7 +284,7 @@ def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
     """Return a grid along the main axes of what carries the weights of a `name`, drawn closer until enough do."""
     for _ in range(CLOSER):
         weight: Array = getattr(grid, name)
-        if 1.0 / float((weight**2).sum()) >= FINE:
+        if 1.0 / float((weight**2).sum()) >= _FINE:
             break
         carry = weight > 1e-4 * weight.max()
         nodes = grid.contrast[carry]

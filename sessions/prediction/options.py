@@ -11,7 +11,7 @@ from sessions.plan.plan import SessionPlan
 from sessions.toml_file import SettingsError, from_toml, text_of
 from solver import Friction, Loading, Scene
 from solver.quantities import QUANTITIES, Quantity
-from solver.scene.published import SCALE
+from solver.scene.published import BOUND_SCALE
 from solver.scene.published import Reading as TauReading
 
 BY_NAME: Mapping[str, Quantity] = {quantity.name: quantity for quantity in QUANTITIES}
@@ -54,7 +54,7 @@ def template(options: PredictionOptions) -> Scene:
 
 def tau_scale(options: PredictionOptions) -> float:
     """Return what tau_max as measured is multiplied by in the reading asked for."""
-    return SCALE[options.tau_reading] / SCALE["computed"]
+    return BOUND_SCALE[options.tau_reading] / BOUND_SCALE["computed"]
 
 
 def bound(tau_max: float | None, options: PredictionOptions) -> float | None:

@@ -30,7 +30,7 @@ RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
 DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
 CHECKED = 4  # depths at which a fitted finger is solved
 SHALLOWEST = 0.05  # of the deepest: a contact of few elements is not worth more
-TOLERANCE = 0.0005  # of the SED: forces are off by 0.04 %; at 0.1 % intervals of a simulated finger hold it too rarely
+_TOLERANCE = 0.0005  # of the SED: forces are off by 0.04 %; at 0.1 % intervals of a simulated finger hold it too rarely
 
 
 class FitError(Exception):
@@ -171,7 +171,7 @@ def _solve_presses(finger: Scene, depth: Array, mu: float) -> Sequence[Predictio
     """Return presses with friction; without it those of a slide, which are the same states."""
     slide: Slide = "none" if mu else "+x"
     loads = [Loading(float(one), slide) for one in depth]
-    solving = Solve(tolerance=TOLERANCE, evidence="quick")
+    solving = Solve(tolerance=_TOLERANCE, evidence="quick")
     try:
         scenes = [replace(finger, friction=Friction(mu), loading=one, solve=solving) for one in loads]
     except SceneError as unfit:

@@ -22,13 +22,13 @@ from solver import Relaxation, Scene
 
 BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they hang together for about that [s]
 TRIED = 60  # of each number at once, between bounds that are drawn closer ...
-ROUNDS = 5  # ... so many times at most, until ...
-FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
-TURNS, AGREED = 8, 0.003  # of finger and relaxation at most, and the change of the part that ends them [-]
+_ROUNDS = 5  # ... so many times at most, until ...
+_FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
+TURNS, _AGREED = 8, 0.003  # of finger and relaxation at most, and the change of the part that ends them [-]
 LEAST_PART = 0.01  # a part that may be less cannot be distinguished from none [-]
 LARGEST_PART = 0.95  # a scene allows 0.99 [-]
-LONGEST = 10.0  # relaxation times are tried from a block to so many times the longest hold
-FEWEST = 10  # blocks beyond the numbers that are looked for
+_LONGEST = 10.0  # relaxation times are tried from a block to so many times the longest hold
+_FEWEST = 10  # blocks beyond the numbers that are looked for
 
 
 class HoldCurve(NamedTuple):
@@ -102,7 +102,7 @@ def relaxing_fit(
             calm.append(one._replace(force=binned.force))
         finger_fit = fit(model, calm, gain_error, seed)
         rate = relaxation(model, finger_fit, holds)
-        if abs(rate.part.value - before) < AGREED:
+        if abs(rate.part.value - before) < _AGREED:
             break
     return finger_fit, rate
 
@@ -119,7 +119,7 @@ def relaxation(model: PressModel, finger_fit: FingerFit, presses: Sequence[HoldC
     elastic = [
         model.force(stiffness, one.displacement - touch) for one, touch in zip(presses, finger_fit.touch, strict=True)
     ]
-    limits = (0.0, LARGEST_PART), (BLOCK, LONGEST * max(float(np.ptp(one.time)) for one in presses))
+    limits = (0.0, LARGEST_PART), (BLOCK, _LONGEST * max(float(np.ptp(one.time)) for one in presses))
     bounds, rounds = limits, 0
     while True:
         rounds += 1
@@ -128,7 +128,7 @@ def relaxation(model: PressModel, finger_fit: FingerFit, presses: Sequence[HoldC
         log, at_once = _posterior(presses, elastic, parts, times, model.error)
         weight = np.exp(log - log.max())
         marginal: tuple[Array, Array] = (weight.sum(axis=1), weight.sum(axis=0))
-        if rounds == ROUNDS or min(float(one.sum() ** 2 / (one**2).sum()) for one in marginal) >= FINE:
+        if rounds == _ROUNDS or min(float(one.sum() ** 2 / (one**2).sum()) for one in marginal) >= _FINE:
             break
         bounds = _about(parts, marginal[0]), _about(times, marginal[1])
     at = np.unravel_index(int(log.argmax()), log.shape)
@@ -162,7 +162,7 @@ def _posterior(
         size += np.log(factor) / len(presses)
         count += len(force)
     free = count - len(presses)
-    if free < FEWEST:
+    if free < _FEWEST:
         raise FitError(f"Presses are held for {count * BLOCK:.2g} s in all, which is too short: hold them longer.")
     return -(free * np.log(misfit) + spread) / 2.0, np.exp(size)
 

@@ -24,7 +24,7 @@ from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.progress import Progress, report_part
 from solver.response.nearby import By, Nearby, nearby
-from solver.scene.published import SCALE
+from solver.scene.published import BOUND_SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
 CONTRAST = 0.05  # error of differences between surfaces, by their range: far below what scores tell apart
@@ -148,7 +148,7 @@ def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptio
         scene = _scene(row, replace(options, kinematics=variant.kinematics, course="steady"))
     except SceneError as unfit:  # a finger whose tissues have no law at that strain
         return str(unfit)
-    tau_max = row.tau_max / SCALE[options.tau_reading] * SCALE[variant.tau_reading]
+    tau_max = row.tau_max / BOUND_SCALE[options.tau_reading] * BOUND_SCALE[variant.tau_reading]
     scene = replace(scene, friction=replace(scene.friction, tau_max=tau_max))
     if variant.driven == "other way":
         return opposite(scene)

@@ -16,8 +16,8 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import UNBLINDING, load_derived, store_derived
 
 SEAL = "sealed-prediction.json"
-NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")
-SAME = 1e-12  # numbers made on another machine may differ by so much [-]
+SEAL_NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")
+_SAME = 1e-12  # numbers made on another machine may differ by so much [-]
 
 
 def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
@@ -30,7 +30,7 @@ def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
         raise RecordingError(
             f"{recording.folder / SEAL}: sealed on {before.get('sealed_utc')}, and none is sealed over it"
         )
-    numbers = [{name: row[name] for name in NUMBERS} for row in prediction["trials"]]
+    numbers = [{name: row[name] for name in SEAL_NUMBERS} for row in prediction["trials"]]
     sha256 = digest(numbers)
     document = {
         "sealed_utc": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -54,7 +54,7 @@ def digest(numbers: Sequence[Mapping[str, Any]]) -> str:
 
 
 def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]) -> str:
-    """Return what a report says: whether the predictions it shows (`NUMBERS` of each) were sealed, when and how blind.
+    """Return whether the predictions that a report shows (`SEAL_NUMBERS` of each) were sealed, when and how blind.
 
     A seal that cannot be read proves nothing, and stands in the way of nothing else.
     """
@@ -69,7 +69,7 @@ def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."
     when = f"sealed on {seal.get('sealed_utc')} (SHA-256 {sha256[:16]}…)"
-    now = [{name: row[name] for name in NUMBERS} for row in predicted]
+    now = [{name: row[name] for name in SEAL_NUMBERS} for row in predicted]
     same = _same(numbers, now)
     shown = "the predictions shown are those" if same else "the predictions shown here are others, made since"
     return f"Predictions were {when} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {shown}."
@@ -91,10 +91,12 @@ def _how_blind(recording: Recording, *, blinded: bool) -> str:
 def _same(sealed: Sequence[Any], shown: Sequence[Mapping[str, Any]]) -> bool:
     if len(sealed) != len(shown):
         return False
-    return all(_alike(then.get(name), now[name]) for then, now in zip(sealed, shown, strict=True) for name in NUMBERS)
+    return all(
+        _alike(then.get(name), now[name]) for then, now in zip(sealed, shown, strict=True) for name in SEAL_NUMBERS
+    )
 
 
 def _alike(then: object, now: object) -> bool:
     if isinstance(then, float | int) and isinstance(now, float | int):
-        return math.isclose(then, now, rel_tol=SAME)
+        return math.isclose(then, now, rel_tol=_SAME)
     return then == now

@@ -17,8 +17,8 @@ from solver.scene.published import SLIPPERINESS, STICKINESS, Surface, scene
 from solver.scene.published import scene as published
 
 SERIES: Mapping[str, tuple[Surface, ...]] = {"stickiness": STICKINESS, "slipperiness": SLIPPERINESS}
-SED = NAMES.index("sed")
-LEAST = 3  # surfaces with a settled state that a slope is taken of
+_SED = NAMES.index("sed")
+_LEAST = 3  # surfaces with a settled state that a slope is taken of
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def other_signs(finger: Scene) -> list[str]:
     here, there = series_slopes(finger), series_slopes(base)
     if isinstance(here, str) or isinstance(there, str):
         return []
-    changes = {name: (float(here[name][0].change[SED]), float(there[name][0].change[SED])) for name in SERIES}
+    changes = {name: (float(here[name][0].change[_SED]), float(there[name][0].change[_SED])) for name in SERIES}
     return [
         f"On this finger the SED goes the other way with µ than on the published one, over its surfaces of {name}: by "
         f"{100 * mine:+.0f} % and {100 * published:+.0f} % of the mean from the least to the greatest µ, at the "
@@ -95,7 +95,7 @@ def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
     known = np.isfinite(responses).all(axis=1)
     count = int(known.sum())
     none = np.full(responses.shape[1], np.nan)
-    if count < LEAST:
+    if count < _LEAST:
         return Slopes(count, none, none)
     values = responses[known]
     mu, index = (np.array(column)[known] for column in zip(*((s.mu, float(s.index)) for s in series), strict=True))
@@ -104,8 +104,8 @@ def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
     return Slopes(count, np.corrcoef(index, values, rowvar=False)[0, 1:], change)
 
 
-PERSON, STROKE = 0.08, 0.05  # standard deviation of ln mu between people, and from stroke to stroke [-]
-PRESS = 0.2  # standard deviation of ln N from stroke to stroke [-]
+PERSON, _STROKE = 0.08, 0.05  # standard deviation of ln mu between people, and from stroke to stroke [-]
+_PRESS = 0.2  # standard deviation of ln N from stroke to stroke [-]
 AREA = 100.0  # of the contact [mm2]
 USUAL_SPEED = 20.0  # [mm/s]
 STIFFNESS = 1.2  # normal force by depth^1.5, as of Hertz's sphere: 3.4 N at 2 mm [N/mm^1.5]
@@ -134,9 +134,9 @@ def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generato
     Friction, its bound and the normal force vary by stroke; the model's quantities are of the published finger there.
     """
     shape = (people, len(design.mu) * len(design.depths))
-    moist = PERSON * draw.standard_normal((people, 1)) + STROKE * draw.standard_normal(shape)
+    moist = PERSON * draw.standard_normal((people, 1)) + _STROKE * draw.standard_normal(shape)
     mu = np.tile(design.mu, len(design.depths)) * np.exp(moist)
-    normal = np.array(design.force) * np.exp(PRESS * draw.standard_normal(shape))
+    normal = np.array(design.force) * np.exp(_PRESS * draw.standard_normal(shape))
     tau = mu * normal / AREA
     base = scene(STICKINESS[0])
     settled = replace(base.solve, course="steady")
@@ -146,6 +146,6 @@ def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generato
         for m, t, loading in zip(mu.flat, tau.flat, pressed, strict=True)
     ]
     responses = rough_responses(scenes)[:, :, 0].reshape(*shape, len(NAMES))
-    speed = np.array(design.speed) * np.exp(STROKE * draw.standard_normal(shape))
+    speed = np.array(design.speed) * np.exp(_STROKE * draw.standard_normal(shape))
     own = {"mu": mu, "tau_max": tau, "N": normal, "speed": speed}
     return own | {name: responses[:, :, at] for at, name in enumerate(NAMES)}

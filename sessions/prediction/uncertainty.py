@@ -45,7 +45,7 @@ from solver.response.nearby import Nearby
 
 Drawn = FrictionDraws | str  # what the friction of a trial may have been, or why that is not known
 
-SAMPLES = 60  # draws that are solved where derivatives do not suffice
+_SAMPLES = 60  # draws that are solved where derivatives do not suffice
 MISS = 0.05  # part of the interval's width by which derivatives may miss a draw that is solved [-]
 _FLAT = 1e-5  # a miss below this share of the SED is of no account [-]
 _QUANTILES = (0.025, 0.975)
@@ -143,11 +143,11 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
     if bool((missed <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
         return whole
     # Each stands for an equal share of all: the middle one, by what the derivatives carry.
-    middles = ((np.arange(SAMPLES) + 0.5) / SAMPLES * len(carried)).astype(np.int64)
+    middles = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES * len(carried)).astype(np.int64)
     some = solve_draws(np.argsort(carried, kind="stable")[middles])
     lost = int(np.isnan(some).sum())
     if lost:
-        reason = f"{lost} of {SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
+        reason = f"{lost} of {_SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
         return replace(whole, low=None, high=None, method="sampling", reason=reason)
     low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
     return replace(whole, low=low, high=high, method="sampling")

@@ -72,7 +72,7 @@ def check_replaceable(path: Path, head: str) -> None:
 
 
 GAIN_ERROR = "calibration-error.json"
-LARGEST = 0.2  # that may be set [-]
+_LARGEST = 0.2  # that may be set [-]
 
 
 def gain_error_set(folder: Path) -> float | None:
@@ -99,8 +99,8 @@ def parse_gain_error(stored: object) -> float | None:
     """Return a stored gain error [-], None where none was set. Raises SettingsError where it is no such number."""
     if stored is None:
         return None
-    if not isinstance(stored, int | float) or not 0.0 <= stored <= LARGEST:
-        raise SettingsError(f"gain_error = {stored!r} is not allowed: a number from 0 to {LARGEST:g}")
+    if not isinstance(stored, int | float) or not 0.0 <= stored <= _LARGEST:
+        raise SettingsError(f"gain_error = {stored!r} is not allowed: a number from 0 to {_LARGEST:g}")
     return float(stored)
 
 

@@ -25,7 +25,7 @@ from sessions.file_access import as_type, json_object, read_within_limit, write_
 from sessions.plan.plan import Origin
 from sessions.recording.log import SixNumbers, Whole
 
-LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
+_LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
 OPTIONAL = ("nidaqmx", "distributed")  # named where they are installed
 
 
@@ -92,7 +92,7 @@ def software_versions() -> dict[str, str]:
     `blas` and `simd` too: the last bits of a number depend on who adds, and on what the processor adds at once.
     """
     versions = {"daq-app": _version("daq-app") or "not installed", "python": platform.python_version()}
-    libraries = {name: _version(name) for name in (*LIBRARIES, *OPTIONAL)}
+    libraries = {name: _version(name) for name in (*_LIBRARIES, *OPTIONAL)}
     arithmetic: Any = np.show_config(mode="dicts")
     blas = arithmetic.get("Build Dependencies", {}).get("blas", {})
     simd = arithmetic.get("SIMD Extensions", {})
@@ -113,7 +113,7 @@ def _version(name: str) -> str | None:
 
 
 CERTIFICATE_FILE = "daq-app-selftest.json"
-FORMAT = {"name": "daq-app selftest", "version": 1}
+SELFTEST_FORMAT = {"name": "daq-app selftest", "version": 1}
 
 
 def write_certificate(folder: Path, certificate: dict[str, Any]) -> Path:
@@ -134,7 +134,7 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
         path = place / CERTIFICATE_FILE
         try:
             certificate = json_object(read_within_limit(path))
-            if certificate["format"] != FORMAT or path.stat().st_dev != disk:
+            if certificate["format"] != SELFTEST_FORMAT or path.stat().st_dev != disk:
                 continue
             return {**certificate, "same_program": certificate["software"] == software_versions()}
         except (OSError, ValueError, KeyError, TypeError):

@@ -20,8 +20,8 @@ from sessions.file_access import remedy, sync_folder
 from sessions.recording.log import LoggedEvent
 from sessions.recording.schema import LIVE_FILE, RecordingError, event_row
 
-HEADER = struct.Struct(">8I")  # magic, version, page size, checkpoint number, two salts, two check sums
-FRAME = struct.Struct(">6I")  # page number, pages after a commit (else 0), two salts, two check sums
+_HEADER = struct.Struct(">8I")  # magic, version, page size, checkpoint number, two salts, two check sums
+_FRAME = struct.Struct(">6I")  # page number, pages after a commit (else 0), two salts, two check sums
 BIG_ENDIAN_SUMS = 0x377F0683
 LITTLE_ENDIAN_SUMS = 0x377F0682
 PAGE_SIZES = frozenset(2**power for power in range(9, 17))  # that SQLite knows [bytes]
@@ -40,27 +40,27 @@ class LogTail:
 def log_tail(log: BinaryIO) -> LogTail:
     """Follow the frames of a write-ahead log as SQLite's recovery does, a frame in memory at a time."""
     size = log.seek(0, os.SEEK_END)
-    head = _read(log, 0, HEADER.size)
-    if len(head) < HEADER.size:
+    head = _read(log, 0, _HEADER.size)
+    if len(head) < _HEADER.size:
         return LogTail(0, size)
-    magic, _, page_size, _, salt_1, salt_2, sum_1, sum_2 = HEADER.unpack(head)
+    magic, _, page_size, _, salt_1, salt_2, sum_1, sum_2 = _HEADER.unpack(head)
     order = ">" if magic == BIG_ENDIAN_SUMS else "<"
     sums = _sums(head[:-8], order, (0, 0))
     if magic not in (BIG_ENDIAN_SUMS, LITTLE_ENDIAN_SUMS) or sums != (sum_1, sum_2) or page_size not in PAGE_SIZES:
         return LogTail(0, size)
-    commits, position, end = 0, HEADER.size, HEADER.size
+    commits, position, end = 0, _HEADER.size, _HEADER.size
     mislabelled = None
-    while position + FRAME.size + page_size <= size:
-        frame = _read(log, position, FRAME.size + page_size)
-        _, pages, *salts, frame_1, frame_2 = FRAME.unpack_from(frame)
+    while position + _FRAME.size + page_size <= size:
+        frame = _read(log, position, _FRAME.size + page_size)
+        _, pages, *salts, frame_1, frame_2 = _FRAME.unpack_from(frame)
         sums = _sums(frame[:8], order, sums)
-        sums = _sums(frame[FRAME.size :], order, sums)
+        sums = _sums(frame[_FRAME.size :], order, sums)
         if sums != (frame_1, frame_2):
             break
         if salts != [salt_1, salt_2]:  # the sums, which leave salts out, go on: damaged, and not of an earlier run
             mislabelled = position
             break
-        position += FRAME.size + page_size
+        position += _FRAME.size + page_size
         if pages:
             commits, end = commits + 1, position
     return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2), mislabelled) - end)
@@ -72,10 +72,10 @@ def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, in
     Frames after it were left over from an earlier run of the log: those of one run lie together, at its head.
     """
     size = log.seek(0, os.SEEK_END)
-    step = FRAME.size + page_size
+    step = _FRAME.size + page_size
     position = end = start
-    while position + FRAME.size <= size:
-        frame = FRAME.unpack(_read(log, position, FRAME.size))
+    while position + _FRAME.size <= size:
+        frame = _FRAME.unpack(_read(log, position, _FRAME.size))
         if frame == _HOLE and position != mislabelled:
             position = max(position + step, start + (_next_data(log, position) - start) // step * step)
             continue

@@ -25,7 +25,7 @@ RATE_UNKNOWN = 1000.0  # readings a second assumed of a device that does not tel
 TRIAL_TIME = 90.0  # mounting, zero, stroke and score, with a redo now and then [s]
 BLOCK_TIME = 300.0  # instruction, questions, a rest [s]
 COPIES = 2  # the live file and its sealed copy
-MARGIN = 64 * 2**20  # write-ahead log, events, reports [bytes]
+DISK_MARGIN = 64 * 2**20  # write-ahead log, events, reports [bytes]
 RESERVE_FILE = "session.reserve"
 RESERVE = 16 * 2**20  # enough for the last seconds of readings, the end, and folding the log [bytes]
 
@@ -43,7 +43,7 @@ class Need:
         """Return the arithmetic."""
         return (
             f"{self.duration / 60:.0f} min at {self.rate:g} readings a second of {BYTES_A_READING} bytes, "
-            f"kept twice, and {MARGIN / 1e6:.0f} MB beside: {self.size / 1e6:.0f} MB"
+            f"kept twice, and {DISK_MARGIN / 1e6:.0f} MB beside: {self.size / 1e6:.0f} MB"
         )
 
 
@@ -51,7 +51,7 @@ def need(plan: SessionPlan, rate: float | None) -> Need:
     """Return what a session is expected to take, `rate` [Hz] being nan where unknown, None without a transducer."""
     duration = len(plan.trials) * TRIAL_TIME + len(plan.blocks) * BLOCK_TIME
     rows_a_second = 0.0 if rate is None else rate if isfinite(rate) else RATE_UNKNOWN
-    return Need(duration, rows_a_second, round(COPIES * duration * rows_a_second * BYTES_A_READING) + MARGIN)
+    return Need(duration, rows_a_second, round(COPIES * duration * rows_a_second * BYTES_A_READING) + DISK_MARGIN)
 
 
 def check_room(folder: Path, need: Need) -> None:

@@ -20,7 +20,7 @@ from sessions.report.wording import full_stop
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.pooled import rival_values, subject_function
-from sessions.statistics.rivals import NAMES, rivals_of_means
+from sessions.statistics.rivals import RIVAL_NAMES, rivals_of_means
 from sessions.statistics.scores import ScoreTable, by_key, distinct_sessions, mean_scores, score_matrix, score_table
 from sessions.statistics.visit import TrialRow, Visit, visit_from
 from sessions.strokes import Analysis
@@ -183,7 +183,7 @@ def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
     values = by_key((name, (row.index, value)) for row in trials for name, value in rival_values(row).items())
     return {
         name: {index: float(np.mean(repeats)) for index, repeats in sorted(by_key(values.get(name, [])).items())}
-        for name in NAMES
+        for name in RIVAL_NAMES
     }
 
 

@@ -47,7 +47,7 @@ def template(name: str, package: str = "sessions.report") -> Template:
     return environment.get_template(name)
 
 
-HEAD = "<!DOCTYPE html>"
+_HEAD = "<!DOCTYPE html>"
 BODY = {"table-relation", "table-strokes", "table-predictions", "table-rivals"}  # all others stand in the appendix
 
 
@@ -102,10 +102,10 @@ def check_replaceable(path: Path) -> None:
         return
     try:
         with path.open("rb") as file:
-            start = file.read(len(HEAD))
+            start = file.read(len(_HEAD))
     except OSError as error:
         raise ReportError(f"{path} cannot be written over ({error.strerror}): choose another file") from error
-    if start not in (b"", HEAD.encode()):
+    if start not in (b"", _HEAD.encode()):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
 
 
@@ -182,8 +182,8 @@ def study_page(study: StudyFindings, name: str) -> str:
     )
 
 
-SIMULATED = "SIMULATED"
-TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
+_SIMULATED = "SIMULATED"
+TRIALS, TRIAL_COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
 _MEANING = meanings(TrialRow)  # of each column of the table of trials: all fields of a row but its paths
 _RESPONSES: Mapping[str, tuple[str, str]] = {
     one.name: ("" if one.unit == "-" else one.unit, f"of the model, averaged over the ending: {one.meaning}")
@@ -194,7 +194,7 @@ _RESPONSES: Mapping[str, tuple[str, str]] = {
 
 def _columns(study: StudyFindings) -> Mapping[str, tuple[str, str]]:
     """Return unit and meaning of each column of `trials_csv`, by its name."""
-    simulated = {SIMULATED: ("", "yes where transducer or subject were simulated")} if study.simulated else {}
+    simulated = {_SIMULATED: ("", "yes where transducer or subject were simulated")} if study.simulated else {}
     own = {"session": ("", "folder of the session"), "subject": ("", "code of the subject")}
     excluded = {"excluded": ("", "why the trial is left out of every number of the study; empty where it counts")}
     return {**simulated, **own, **_MEANING, **_RESPONSES, **excluded}
@@ -253,7 +253,7 @@ def trials_csv(study: StudyFindings) -> str:
 def _csv(rows: Sequence[Sequence[object]], *, simulated: bool = False) -> str:
     """Return rows as CSV; a first column says of each of a simulated study that it is."""
     if simulated:
-        rows = [[SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
+        rows = [[_SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
     out = io.StringIO()
     write_rows(out, rows)
     return out.getvalue()

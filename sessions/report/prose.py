@@ -25,7 +25,7 @@ from sessions.report.wording import (
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.scores import by_key
 
-REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
+_REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
 OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."
 _Value = Callable[[PredictionFinding], float | None]
 
@@ -98,7 +98,7 @@ def _by_place(report: Report) -> str:
     for experiment in report.experiments:
         rows = [p.row for p in report.predictions if p.experiment == experiment.name and p.row]
         arcs = rows[0] if rows else ()
-        places = sorted(arc for arc in arcs if abs(arc) <= REACH and all(arc in row for row in rows))
+        places = sorted(arc for arc in arcs if abs(arc) <= _REACH and all(arc in row for row in rows))
         by_place = {arc: _relation(report, experiment, lambda p, arc=arc: p.row.get(arc)) for arc in places}
         known = {arc: related.pearson for arc, related in by_place.items() if related.pearson is not None}
         if 0.0 in known:
@@ -108,7 +108,7 @@ def _by_place(report: Report) -> str:
         return "How the sign of r depends on the place of the ending is not known here."
     return (
         "The sign of r of the SED stays the same if the ending is moved along the skin (tried up to "
-        f"{REACH:g} mm to each side, positive towards the tip): in {' and in '.join(ranges)}."
+        f"{_REACH:g} mm to each side, positive towards the tip): in {' and in '.join(ranges)}."
     )
 
 

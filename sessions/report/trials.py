@@ -32,7 +32,7 @@ from sessions.strokes.forces import in_face_frame
 from sessions.strokes.stroke import AreaLaw, Flaw, Stroke
 
 MOST_INSTANTS = 600  # of a stroke's course that a picture can show
-GAP = 5.0  # usual steps in time [-]; a longer one may show that readings are missing
+_GAP = 5.0  # usual steps in time [-]; a longer one may show that readings are missing
 STRETCHES = 700  # of the whole recording, each drawn by its least and its greatest value
 
 
@@ -92,7 +92,7 @@ def course(recording: Recording) -> Course | None:
         return None
     wrench = in_face_frame(recording.info.calibration.wrench(block.raw, np.zeros(6)), recording.plan.frame)
     steps = np.diff(block.time)
-    shortest = max((block.time[-1] - block.time[0]) / STRETCHES, GAP * np.median(steps)) if len(steps) else 0.0
+    shortest = max((block.time[-1] - block.time[0]) / STRETCHES, _GAP * np.median(steps)) if len(steps) else 0.0
     gaps = np.flatnonzero(steps > shortest)
     forces = -wrench[:, 2], np.hypot(wrench[:, 0], wrench[:, 1])
     kept = np.union1d(np.union1d(*map(_extremes, forces)), [gaps, gaps + 1])

@@ -91,7 +91,7 @@ _EVENTS: dict[str, type[steps.Event]] = {kind_of(event): event for event in get_
 
 
 # What experimenter and subject do. All else that happens comes of readings and clock, and is found in them once more.
-ACTS = frozenset({
+_ACTS = frozenset({
     "begin", "stimulus_mounted", "stroke_done", "scored", "number_given", "chosen", "note", "redo", "undo_redo", "skip",
     "pause", "resume", "abort", "finish",
 })  # fmt: skip
@@ -129,7 +129,7 @@ def steps_of(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
         kind = event.data.get("event") if refused else event.kind
         if event.kind == "ended":
             history.append(Step(*place, end=event.data))
-        elif kind is not None and kind in ACTS:
+        elif kind is not None and kind in _ACTS:
             history.append(Step(*place, act=event_from_data(kind, event.data["given"] if refused else event.data)))
         elif kind in NOTICED:
             history.append(Step(*place))

@@ -22,11 +22,11 @@ from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings
 from sessions.run.event_log import Step, parts, steps_of
 from sessions.run.resuming import Seam, resumption
-from sessions.run.runner import STOPPED, Continuation, Ending, RunnerSettings, run_session
+from sessions.run.runner import STOPPED_BY_USER, Continuation, Ending, RunnerSettings, run_session
 from sessions.run.steps import Command, Event
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
-PART = 16_384  # readings written at once
+_PART = 16_384  # readings written at once
 Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
 
 
@@ -111,7 +111,7 @@ class _Rewriter(FleetingWriter):
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
-        return super().commit() if self._closing or self.waiting >= PART else self.acknowledged
+        return super().commit() if self._closing or self.waiting >= _PART else self.acknowledged
 
     def close(self) -> None:
         """Wait: what ended may have been resumed."""
@@ -181,7 +181,7 @@ class _Player:
         """Take the next step when its time has come, and say why the session is to be ended in it."""
         self._step = None
         if self.done:
-            return "stopped", STOPPED  # the course went another way, and waits for what never comes
+            return "stopped", STOPPED_BY_USER  # the course went another way, and waits for what never comes
         step = self._steps[self._next]
         if self._waiting(step):
             return None
@@ -194,7 +194,7 @@ class _Player:
             case {"cause": "client" | "disk" as cause, "reason": str(reason)}:
                 return cause, reason
             case _:
-                return "stopped", STOPPED
+                return "stopped", STOPPED_BY_USER
 
     # ---- as an operator
 

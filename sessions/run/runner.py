@@ -20,7 +20,7 @@ from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refu
 from sessions.strokes.settings import DetectorSettings
 
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
-STOPPED = "stopped by the user"
+STOPPED_BY_USER = "stopped by the user"
 Ending = tuple[Cause, str]  # why a session ends, for programs and for people
 
 
@@ -137,11 +137,11 @@ class _Run:
             if self.transducer is not None:
                 with interrupted.raise_at_once():  # a device that does not answer may take its time
                     self.transducer.start()
-            cause, reason = self._go_round(lambda: ("stopped", STOPPED) if interrupted.heard else stop())
+            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interrupted.heard else stop())
         except (LinkLost, DeviceFault, SetupError) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:
-            cause, reason = "stopped", STOPPED
+            cause, reason = "stopped", STOPPED_BY_USER
         except RecordingError:
             if self.transducer is not None:
                 self.transducer.stop()

@@ -32,7 +32,7 @@ from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
-from sessions.strokes.stroke import FIXED, HERTZ, AreaLaw, Rule
+from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, AreaLaw, Rule
 
 Pair = tuple[float, float]
 Kinematics = Literal["small", "finite"]
@@ -47,11 +47,11 @@ WINDOWS: Mapping[str, WindowRule] = {
     "whole slide": "whole slide",
 }
 MUS: tuple[Rule, ...] = ("mean over steady window", "maximum")  # the usual one is the paper's for the descriptor
-AREAS: Mapping[str, tuple[AreaLaw, float]] = {  # law of the contact area, and its share of the planned one [-]
+_AREAS: Mapping[str, tuple[AreaLaw, float]] = {  # law of the contact area, and its share of the planned one [-]
     "planned": (FIXED, 1.0),
     "half": (FIXED, 0.5),
     "twice": (FIXED, 2.0),
-    "grows as N^2/3": (AreaLaw("hertz", HERTZ), 1.0),
+    "grows as N^2/3": (AreaLaw("hertz", HERTZ_EXPONENT), 1.0),
 }
 RECEPTORS = ("ending", "its middle")
 SAME = 0.005  # correlations that differ by less are one result: pages print two decimals
@@ -71,7 +71,7 @@ class Path:
     def usual(self, rule: str, kinematics: str, law: AreaLaw = FIXED) -> bool:
         """Say whether it is the way that every other number went, mu computed by `rule` and tau_max by `law`."""
         first = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
-        own = (self.filter, self.window, self.receptor, AREAS[self.area])
+        own = (self.filter, self.window, self.receptor, _AREAS[self.area])
         return own == first and self.mu == rule and self.kinematics == kinematics
 
 
@@ -85,8 +85,8 @@ CHOICE_LABELS: Mapping[str, str] = {  # of the fields of a path
 }
 CHOICES = tuple(CHOICE_LABELS)
 
-_FIRST = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(AREAS)))
-_SMALL = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, AREAS, RECEPTORS))
+_FIRST = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(_AREAS)))
+_SMALL = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, _AREAS, RECEPTORS))
 # Finite strain takes many times as long: filter, window and area are the usual ones there.
 _USUAL = (path for path in _SMALL if (path.filter, path.window, path.area) == _FIRST)
 PATHS = (*_SMALL, *(replace(path, kinematics="finite") for path in _USUAL))
@@ -130,7 +130,7 @@ def trial_paths(
 
 def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
     """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
-    first, *laws = dict.fromkeys(law for law, _ in AREAS.values())
+    first, *laws = dict.fromkeys(law for law, _ in _AREAS.values())
     cases = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], laws)]
 
     def settings(f: str, w: str, law: AreaLaw) -> AnalysisSettings:
@@ -146,8 +146,8 @@ def _analysis_of_path(
     usual: Mapping[int | None, FrictionParameters],
 ) -> Analysis:
     """Return the analysis with the friction that a path gives each trial; no window has a say in tau_max."""
-    (law, share), (window, *_) = AREAS[path.area], WINDOWS
-    analysis = analyses[path.filter, path.window, AREAS[next(iter(AREAS))][0]]
+    (law, share), (window, *_) = _AREAS[path.area], WINDOWS
+    analysis = analyses[path.filter, path.window, _AREAS[next(iter(_AREAS))][0]]
     bounds = analyses[path.filter, window, law].strokes
     friction: list[FrictionParameters] = []
     for one in analysis.friction:

@@ -28,7 +28,7 @@ from sessions.statistics.findings import (
 from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spreads
 from sessions.statistics.multiverse import PathTrial, path_findings
 from sessions.statistics.psychometric import Psychometric, function_of
-from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
+from sessions.statistics.rivals import RESPONSES, STROKE_FIELDS, RivalTrial, rivals_of_surfaces, rivals_within
 from sessions.statistics.scales import (
     MODELS,
     Choice,
@@ -172,7 +172,7 @@ def _descriptor(
 
 def rival_values(row: TrialRow) -> dict[str, float]:
     """Return the quantities of a trial that may go with its score, by their names in `rivals.NAMES`."""
-    numbers = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
+    numbers = {name: getattr(row, attribute) for name, attribute in STROKE_FIELDS.items()}
     numbers |= {label: row.response(name) for label, name in RESPONSES.items()}
     return {name: value for name, value in numbers.items() if value is not None}
 

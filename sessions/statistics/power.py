@@ -15,12 +15,12 @@ import numpy as np
 
 from drivers.arrays import Array
 from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
-from sessions.statistics.scores import SCALE
+from sessions.statistics.scores import SCORE_SCALE
 from sessions.statistics.within_subjects import repeated_correlation
 
 ALPHA = 0.05  # of the study's confirmatory test, two-sided
-_MIDDLE = sum(SCALE) / 2.0
-FRICTION = (0.24, 0.67)  # least and greatest µ of the published surfaces
+_MIDDLE = sum(SCORE_SCALE) / 2.0
+MU_RANGE = (0.24, 0.67)  # least and greatest µ of the published surfaces
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,13 +89,13 @@ def _study(
     effects: AssumedEffects, people: int, count: int, rng: np.random.Generator
 ) -> tuple[list[str], Array, Array]:
     """Return subject, µ as measured and score of each trial."""
-    mu = np.linspace(*FRICTION, count)
+    mu = np.linspace(*MU_RANGE, count)
     own = mu * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
-    slope = effects.effect * (1.0 + effects.slope_sd * rng.standard_normal((people, 1))) / (FRICTION[1] - FRICTION[0])
+    slope = effects.effect * (1.0 + effects.slope_sd * rng.standard_normal((people, 1))) / (MU_RANGE[1] - MU_RANGE[0])
     level = _MIDDLE + effects.level_sd * rng.standard_normal((people, 1))
-    scores = level + slope * (own - np.mean(FRICTION)) + effects.noise * rng.standard_normal((people, count))
+    scores = level + slope * (own - np.mean(MU_RANGE)) + effects.noise * rng.standard_normal((people, count))
     names = [f"P{number}" for number in range(people) for _ in range(count)]
-    return names, own.ravel(), np.clip(scores, *SCALE).ravel()
+    return names, own.ravel(), np.clip(scores, *SCORE_SCALE).ravel()
 
 
 def _verdict(subjects: Sequence[str], mu: Array, scores: Array) -> float:

@@ -25,12 +25,12 @@ from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
 from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 
-MODEL = SED.label  # the published quantity, to which the others are compared where no other is named
+MODEL_SED = SED.label  # the published quantity, to which the others are compared where no other is named
 MODEL_MU = "µ of the model"
 # Name for people, and that of the model's quantities at the receptor.
 RESPONSES: Mapping[str, str] = {one.label: one.name for one in BY_NAME.values()}
 # Name for people, and the field of a stroke or trial that holds it.
-FIELDS: Mapping[str, str] = {
+STROKE_FIELDS: Mapping[str, str] = {
     MODEL_MU: "mu",
     "µ dynamic": "mu_dynamic",
     "µ static": "mu_static",
@@ -39,7 +39,7 @@ FIELDS: Mapping[str, str] = {
     "N": "normal_force",
     "speed": "speed",
 }
-NAMES = (*RESPONSES, *FIELDS)
+RIVAL_NAMES = (*RESPONSES, *STROKE_FIELDS)
 _NO_LINE = "without one of the surfaces the others do not determine a line"
 
 
@@ -75,18 +75,18 @@ class RivalTrial:
 
 
 def rivals_of_means(
-    scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]], model: str = MODEL
+    scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]], model: str = MODEL_SED
 ) -> tuple[Rival, ...]:
     """Return how each quantity of the surfaces goes with their mean scores; () where there is no `model`.
 
-    `scores` and each of `series` (its name is one of `NAMES`) go by index. All are compared to `model`, which is first.
+    `scores` and each of `series`, named as in `RIVAL_NAMES`, go by index. All are compared to `model`, which is first.
     """
     if model not in series:
         return ()
     return tuple(_of_means(name, model, scores, series) for name in _model_first(model) if name in series)
 
 
-def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
+def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
     """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
     counted = [trial for trial in trials if model in trial.values]
 
@@ -94,12 +94,12 @@ def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL) -> tupl
         points = [(t.subject, t.index, v) for t in counted if (v := value(t)) is not None]
         return surface_means(points) or {}
 
-    names = [name for name in NAMES if any(name in trial.values for trial in counted)]
+    names = [name for name in RIVAL_NAMES if any(name in trial.values for trial in counted)]
     series = {name: means(lambda t, name=name: t.values.get(name)) for name in names}
     return rivals_of_means(means(lambda t: t.score), series, model)
 
 
-def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
+def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
     """Return how each quantity goes with the scores within subjects; () where no trial has `model`.
 
     Differences and partial correlations have the jackknife's intervals over subjects: those of other people on these
@@ -122,7 +122,7 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Riv
 
 
 def _model_first(model: str) -> tuple[str, ...]:
-    return (model, *(name for name in NAMES if name != model))
+    return (model, *(name for name in RIVAL_NAMES if name != model))
 
 
 def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:

@@ -15,7 +15,7 @@ from sessions.statistics.correlations import TAILS, pearson, t_quantile
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
-SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
+SCORE_SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
 _ALIKE = 1e-12  # of the greatest value: a spread so small is round-off
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
@@ -197,7 +197,7 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
 
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     of = _average(values)
-    low, high = (None if end is None else min(max(end, SCALE[0]), SCALE[1]) for end in (of.low, of.high))
+    low, high = (None if end is None else min(max(end, SCORE_SCALE[0]), SCORE_SCALE[1]) for end in (of.low, of.high))
     return MeanScore(descriptor, index, of.n, of.mean, of.sd, low, high, no_interval(of))
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from sessions.plan.plan import Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
-from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
+from sessions.prediction.sealed_predictions import SEAL_NUMBERS, sealed_sentence
 from sessions.prediction.stored import model_facts
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
@@ -198,7 +198,7 @@ def visit_from(
         if block.phase == "main"
         for place, trial in enumerate(block.trials)
     )
-    numbers = [{name: getattr(row, name) for name in NUMBERS} for row in (prediction.trials if prediction else ())]
+    numbers = [{name: getattr(row, name) for name in SEAL_NUMBERS} for row in (prediction.trials if prediction else ())]
     end = recording.end
     return Visit(
         session=recording.folder.name,

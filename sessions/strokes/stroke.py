@@ -188,11 +188,11 @@ class Flaw:
 
 
 COEFFICIENTS = ("mu_static", "mu_dynamic", "mu_dynamic_sd", "mu_dynamic_interval", "mu_max", "tau_max", "contact_area")
-LOADS = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
+_LOADS = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 PEAKS = ("mu_static", "mu_max", "tau_max", "contact_area", "peak_normal", "peak_tangential")
 SPEED = ("speed", "speed_error")
 DIRECTION = ("direction", "direction_from", "heading")
-EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "slide_onset")
+EVERYTHING = (*COEFFICIENTS, *_LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "slide_onset")
 
 
 @dataclass
@@ -210,7 +210,7 @@ class Findings:
             self.reasons.setdefault(number, str(name))
 
 
-HERTZ = 2.0 / 3.0
+HERTZ_EXPONENT = 2.0 / 3.0
 PLANNED_AT = 2.0  # normal force at which an area that grows is the planned one, where nobody said another [N]
 
 

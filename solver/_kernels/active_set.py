@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
 from solver._kernels.contact_system import (
-    COLUMNS,
+    RIGHT_SIDES,
     STEEP,
     assemble_contact_system,
     assemble_force_system,
@@ -129,7 +129,7 @@ def solve_active_set(
     answer, unloaded_step = steps, loads
     by_forces = compliance.shape[0] > 0
     if by_forces:
-        answer, unloaded_step = np.zeros((compliance.shape[0], COLUMNS)), np.zeros(compliance.shape[0])
+        answer, unloaded_step = np.zeros((compliance.shape[0], RIGHT_SIDES)), np.zeros(compliance.shape[0])
         unload(body.force, compliance, sums, unloaded_step)
     else:
         sum_stiffness(body, control.kind, sums, loads)
@@ -198,11 +198,11 @@ def scatter_answer(
 ) -> None:
     """Fill `answer` with the unknowns; where these are forces, also with the friction forces of slipping nodes."""
     for r in range(count):
-        for c in range(COLUMNS):
+        for c in range(RIGHT_SIDES):
             answer[system.free[r], c] = system.right[r, c]
     for i in range(states.state.shape[0]):
         if by_forces and states.state[i] == SLIP:
-            for c in range(COLUMNS):
+            for c in range(RIGHT_SIDES):
                 answer[2 * i, c] = states.sense[i] * mu * answer[2 * i + 1, c]
 
 
@@ -321,9 +321,9 @@ def control_forces(
     motion[0] = motion[1] = 0.0
     if control.kind == DEPTH_CONTROL or count_in(state, OPEN) == state.shape[0]:
         return control.kind == DEPTH_CONTROL
-    drag, push = np.zeros(COLUMNS), np.zeros(COLUMNS)
+    drag, push = np.zeros(RIGHT_SIDES), np.zeros(RIGHT_SIDES)
     for c in range(sums.shape[1]):
-        for s in range(COLUMNS):
+        for s in range(RIGHT_SIDES):
             drag[s] += sums[0, c] * answer[c, s]
             push[s] += sums[1, c] * answer[c, s]
     drag_residual, push_residual = control.drag - loads[0] - drag[0], control.push - loads[1] - push[0]

@@ -18,11 +18,11 @@ from solver.arrays import (
     SkinPosition,
 )
 
-COLUMNS = 4  # of the right-hand side
+RIGHT_SIDES = 4  # of the right-hand side
 ZERO = 1e-15  # a pivot below this, relative to the largest diagonal entry, is round-off
 
 # tributary lengths of an edge's first, middle and last node by the positions of the three: Simpson's rule
-LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
+_LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
 STEEP = 1.0  # above this coefficient of friction, a node that comes into contact is first assumed to be shear-limited
 
@@ -37,7 +37,7 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
     for i in range(at.shape[0]):
         if at[i] == 1:
             for n in range(3):
-                row = LENGTHS[n]
+                row = _LENGTHS[n]
                 out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
 
 
@@ -87,7 +87,7 @@ def assemble_contact_system(
             if spot[j] >= 0:
                 square[r, spot[j]] = value
             else:
-                for s in range(COLUMNS):
+                for s in range(RIGHT_SIDES):
                     right[s] -= value * steps[j, s]
         if state[i] == SHEAR_LIMITED:
             add_bound(i, sense[i] * load.tau, skin.middle, spot, system, square[r])
@@ -131,7 +131,7 @@ def add_bound(i: int, drag: float, middle: Narrow, spot: Indices, system: Contac
             continue
         for n in range(3):
             x = 2 * (edge - 1 + n)
-            slope = drag * LENGTHS[i - edge + 1, n]
+            slope = drag * _LENGTHS[i - edge + 1, n]
             if spot[x] >= 0:
                 square[spot[x]] -= slope
             else:
@@ -158,9 +158,9 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
         over[r] = 1.0 / a[r, r]
     for r in range(size - 1, -1, -1):
         for c in range(r + 1, size):
-            for s in range(COLUMNS):
+            for s in range(RIGHT_SIDES):
                 right[r, s] -= a[r, c] * right[c, s]
-        for s in range(COLUMNS):
+        for s in range(RIGHT_SIDES):
             right[r, s] *= over[r]
     return True
 
@@ -180,14 +180,14 @@ def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
         s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
         for c in range(target.shape[0]):
             target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
-        for s in range(COLUMNS):
+        for s in range(RIGHT_SIDES):
             right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
         p += 4
     while p < r:
         factor = row[p] * over[p]
         for c in range(p + 1, row.shape[0]):
             row[c] -= factor * a[p, c]
-        for s in range(COLUMNS):
+        for s in range(RIGHT_SIDES):
             right[r, s] -= factor * right[p, s]
         p += 1
 

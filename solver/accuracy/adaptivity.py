@@ -40,7 +40,7 @@ MOST_PARTS = 4  # of one gap in a round, at most: an error says little about ele
 GROWTH = 1.3  # of the unknowns in a round, at least
 ERROR_AIM = 0.6  # sum of the parts on the next mesh, by the tolerance
 SHARE_ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
-SCALES = 200  # that are tried, each a tenth smaller
+_SCALES = 200  # that are tried, each a tenth smaller
 QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) at the nodes of two elements, by those of the one they divide
 
 
@@ -166,7 +166,7 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     per_line = parts * np.repeat(counts, counts)
     least = GROWTH * _unknowns(np.ones(len(parts)), counts)
     best = None
-    for scale in per_line.max() * np.geomspace(1.0, 1e-9, SCALES):
+    for scale in per_line.max() * np.geomspace(1.0, 1e-9, _SCALES):
         optimum = np.maximum(np.rint((per_line / scale) ** (1.0 / (SHARE_ORDER + 1.0))), 1.0)
         division = np.minimum(optimum, most)
         if (unknowns := _unknowns(division, counts)) > MOST_UNKNOWNS:

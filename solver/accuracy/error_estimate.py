@@ -44,8 +44,8 @@ SECOND_ORDER = {"small": 100.0, "finite": 6.0}
 # Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
 # about the true place, at most half a node away; the width depends on it linearly.
 FROM_EDGES, WIDTH_FROM_EDGES = 1.0 / 3.0, 0.5
-SHIFT, WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
-_PARTS_OF_EDGES = np.where(np.arange(COUNT) == WIDTH, WIDTH_FROM_EDGES, FROM_EDGES)
+SHIFT, _WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
+_PARTS_OF_EDGES = np.where(np.arange(COUNT) == _WIDTH, WIDTH_FROM_EDGES, FROM_EDGES)
 
 
 def half_width(change: Array, edges: Array, order: float = ORDER, part: Array | float = FROM_EDGES) -> Array:
@@ -265,7 +265,7 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
     )
 
 
-ROUND_OFF = 1e-12  # relative, of a stiffness
+_ROUND_OFF = 1e-12  # relative, of a stiffness
 TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
 
 
@@ -289,7 +289,7 @@ def _stiffness_ratio(materials: Materials) -> tuple[float, str, str]:
     stiffness = {name: moduli.engineering[0] for name, moduli in zip(TISSUES, settled_moduli(materials), strict=True)}
     pairs = [pair for one, other in pairwise(TISSUES[:-1]) for pair in ((one, other), (other, one))]
     ratio, stiff, soft = max((stiffness[a] / stiffness[b], a, b) for a, b in pairs)
-    return ratio * (1.0 - ROUND_OFF), stiff, soft
+    return ratio * (1.0 - _ROUND_OFF), stiff, soft
 
 
 COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of all numbers

@@ -22,7 +22,7 @@ from solver.prediction import Prediction, percent
 from solver.scene import Scene
 from solver.scene.tables import Material, Materials, SceneError, Solve
 
-DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
+_DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178). Their weights are
 # not in the abstract; a fifth of the instantaneous stiffness is assumed for each, so that two fifths remain.
 RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
@@ -180,7 +180,7 @@ def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
     pressure = normal / length if length else 0.0
     speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.depth)
     return {
-        "estimate": 2.0 * DENSITY * speed**2 / pressure if pressure else None,
+        "estimate": 2.0 * _DENSITY * speed**2 / pressure if pressure else None,
         "from": {"mean_pressure_MPa": pressure, "speed_mm_s": speed},
         "how": "pressure of moving tissue (density times speed squared, 1.1 g/cm3) by the mean contact pressure, "
         "twice for an energy",

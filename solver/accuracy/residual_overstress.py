@@ -24,12 +24,12 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.scene.tables import Relaxation, SceneError
 
-MARGIN = 4.0  # by the indentation: height of the undeformed skin up to which contact is considered
+_MARGIN = 4.0  # by the indentation: height of the undeformed skin up to which contact is considered
 # Elements to a tip radius, and load steps of the press and as many of the slide. Against 16 steps at a fineness of 5,
 # estimates of 42 scenes at small strain differ by 4 % of the SED at most. Against 8 at a fineness of 4, those of 60 at
 # finite strain differ by 5 % of it or a tenth of themselves, but for four, by a sixth: their weights are assumed.
-FINENESS = 2.0
-STEPS = {"small": 1, "finite": 2}
+_FINENESS = 2.0
+_STEPS = {"small": 1, "finite": 2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     slide = sideways(prediction.displacement, touching) if direction else 0.0
     kind, depth = scene.solve.kinematics, scene.loading.depth
     slide_s = slide / scene.loading.speed if direction else 0.0
-    parts = (np.arange(1, STEPS[kind] + 1) / STEPS[kind]).tolist()
+    parts = (np.arange(1, _STEPS[kind] + 1) / _STEPS[kind]).tolist()
     aims = [Aim(PRESSING_TIME * part, depth * part, 0.0) for part in parts]
     if slide > 0.0:
         aims += [Aim(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in parts]
@@ -119,5 +119,5 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
 def _coarse_finger(scene: Scene, _thread: int) -> LinearFinger | FiniteFinger:
     """Return a finger on a coarse mesh, cached for consecutive surfaces of one finger in one thread."""
     kind = scene.solve.kinematics
-    sizing = Sizing(FINENESS, scene.loading.depth, margin=MARGIN)
+    sizing = Sizing(_FINENESS, scene.loading.depth, margin=_MARGIN)
     return FiniteFinger.of(scene, sizing) if kind == "finite" else LinearFinger.of(scene, sizing)

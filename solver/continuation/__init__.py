@@ -26,7 +26,7 @@ from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadS
 from solver.failures import NotConverged
 from solver.progress import check_stop, report_progress
 
-ROUND_OFF = 1e-12  # relative difference below which a target is reached
+_ROUND_OFF = 1e-12  # relative difference below which a target is reached
 LARGEST_MU = 2.0  # largest coefficient of friction to which a branch is followed
 
 
@@ -154,7 +154,7 @@ def follow(
     def finish(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
         return Branch(tuple(point.state for point in way[: best + 1]), value, limited, lost, length)
 
-    while way[best].value < target * (1.0 - ROUND_OFF):
+    while way[best].value < target * (1.0 - _ROUND_OFF):
         check_stop()
         report_progress(doing, way[best].value / target)
         last = way[-1]
@@ -186,11 +186,11 @@ def follow(
 
 def stop_at(finger: BranchBody, branch: Branch, by: int, target: float) -> Branch:
     """Return a branch up to `target`; the whole branch where it ends before."""
-    if branch.value < target * (1.0 - ROUND_OFF):
+    if branch.value < target * (1.0 - _ROUND_OFF):
         return branch
     values = [value_of(state.load, by) for state in branch.states]
     after = next((number for number, value in enumerate(values) if value >= target), len(values))
-    if after < len(values) and values[after] <= target * (1.0 + ROUND_OFF):
+    if after < len(values) and values[after] <= target * (1.0 + _ROUND_OFF):
         return Branch(branch.states[: after + 1], values[after], limited=False)
     for near in branch.states[max(after - 1, 0) : after + 1]:
         with suppress(NotConverged):
@@ -284,8 +284,8 @@ def _next(
 
 
 Waves = NDArray[np.complex128]
-STEP = 0.01  # step of the stretch in the search for the loss of stability
-LEAST = 0.05  # smallest stretch of that search
+_STEP = 0.01  # step of the stretch in the search for the loss of stability
+_LEAST = 0.05  # smallest stretch of that search
 HALVINGS = 40  # of its last step
 
 
@@ -299,12 +299,12 @@ def folds_at(law: Law) -> float:
     >>> round(folds_at(NeoHooke(1.0, 0.4999999)), 4)
     0.5437
     """
-    high = 1.0 - 5.0 * STEP
-    while high > LEAST and _stable(law, high - STEP):
-        high -= STEP
-    if high <= LEAST:
-        return LEAST
-    low = high - STEP
+    high = 1.0 - 5.0 * _STEP
+    while high > _LEAST and _stable(law, high - _STEP):
+        high -= _STEP
+    if high <= _LEAST:
+        return _LEAST
+    low = high - _STEP
     for _ in range(HALVINGS):
         middle = (low + high) / 2.0
         low, high = (low, middle) if _stable(law, middle) else (middle, high)

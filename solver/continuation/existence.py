@@ -25,7 +25,7 @@ from solver.scene import Scene
 from solver.scene.tables import SHALLOW
 
 FINENESS = 7.0  # elements to a tip radius of both meshes, except at a fold
-MARGIN = 6.0  # by the indentation: height of the undeformed skin up to which contact is considered
+_MARGIN = 6.0  # by the indentation: height of the undeformed skin up to which contact is considered
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class _Search:
 
     def finger(self, fold: float | None = None) -> FiniteFinger:
         """Return the finger on a coarse mesh, or on one that is fine at the arc position of a `fold` [mm]."""
-        return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=MARGIN, fold=fold))
+        return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=_MARGIN, fold=fold))
 
     @property
     def last(self) -> float:
@@ -212,7 +212,7 @@ def _place_of_least_stretch(finger: FiniteFinger, state: EquilibriumState) -> fl
     return float(finger.geometry.arcs[place : place + 2].mean())
 
 
-APART = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
+BEYOND_LIMIT = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
 
 
 def steady(
@@ -330,7 +330,7 @@ def _reach_towards(scene: Scene, load: LoadState) -> Reach:
 def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | NotConverged:
     """Return the failure with both limits, each only where no state lies a little beyond it."""
     largest, depth = proof.value, None
-    if not _none_at(scene, load._replace(mu=(1.0 + APART) * largest), load):
+    if not _none_at(scene, load._replace(mu=(1.0 + BEYOND_LIMIT) * largest), load):
         return _undecided(load, largest)
     ends = (
         "the skin behind the contact folds"
@@ -340,7 +340,7 @@ def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | Not
     beyond = ""
     with suppress(NotConverged):
         deepest = of_depth(scene, load)
-        further = load._replace(depth=(1.0 + APART) * deepest.value)
+        further = load._replace(depth=(1.0 + BEYOND_LIMIT) * deepest.value)
         if deepest.limited and not deepest.lost and _none_at(scene, further, load):
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"

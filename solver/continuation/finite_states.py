@@ -12,7 +12,7 @@ from solver.body.skin import SkinCompression, crosses_itself
 from solver.body.validation import check_loads
 from solver.constitutive import Law
 from solver.continuation import LARGEST_MU, continue_branch, folds_at, jumped_branch
-from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
+from solver.continuation.existence import BEYOND_LIMIT, Reach, all_at_the_bound, of_depth, stands, steady, steep
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
@@ -199,7 +199,7 @@ def _slide_reaching_force(
     while most < force:
         report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            state = steady(finger, state.load._replace(depth=(1.0 + APART) * depth), start=state)
+            state = steady(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
         except NoSteadyState as failure:
             raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
         depth, most = state.load.depth, float(state.force[1])

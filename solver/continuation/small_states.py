@@ -26,7 +26,7 @@ from solver.scene import Scene
 from solver.scene.tables import SHALLOW, Friction, SceneError
 
 WIDE = 16.0  # margin with which nearly all the palmar skin may touch
-FINENESS = 7.0  # of the meshes for limits of depth and force, which hardly depend on the mesh
+_FINENESS = 7.0  # of the meshes for limits of depth and force, which hardly depend on the mesh
 ROUGH = 6.0  # of the mesh for depths under a force, accurate to some tenths of a per cent
 COVERED = 0.9  # ratio of the depth a mesh is made for to the highest skin in contact: it covers 1.25 times its depth
 NEARLY = 0.5  # ratio of drag to friction limit from which a dragged finger is about as deep as a sliding one
@@ -92,7 +92,7 @@ class Bodies:
         """Return a body whose mesh is made for a depth within a factor of 1.4 of `depth` [mm]."""
         power = round(log2(depth))
         if power not in self._by_power:
-            self._by_power[power] = self.build_for(2.0**power, FINENESS)
+            self._by_power[power] = self.build_for(2.0**power, _FINENESS)
         return self._by_power[power]
 
     def build_for(self, depth: float, fineness: float) -> Newton:
@@ -129,7 +129,7 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
             return None
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     deepest = _largest(slides, low, high)
-    finer = bodies.build_for(deepest, LIMIT_SEARCH.finer * FINENESS)
+    finer = bodies.build_for(deepest, LIMIT_SEARCH.finer * _FINENESS)
     ends = [continue_in_friction(finer, load._replace(depth=part * deepest))[0] is None for part in (0.97, 1.03)]
     return deepest if ends == [False, True] else None
 
@@ -159,7 +159,7 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
     if not slides(LIMIT_SEARCH.least * force):
         return None
     most = _largest(slides, LIMIT_SEARCH.least * force, force)
-    finer = bodies.build_for(rubless(most), LIMIT_SEARCH.finer * FINENESS)
+    finer = bodies.build_for(rubless(most), LIMIT_SEARCH.finer * _FINENESS)
     ends = [slide_at(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 

@@ -100,7 +100,7 @@ class LoadState(NamedTuple):
         return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
 
 
-UNLOADED = LoadState(0.0, 0.0)
+_UNLOADED = LoadState(0.0, 0.0)
 
 
 class ForceLoad(NamedTuple):
@@ -138,7 +138,7 @@ class EquilibriumState:
     iterations: int  # linear systems solved since the undeformed state
 
     @staticmethod
-    def undeformed(body: CondensedBody, load: LoadState = UNLOADED) -> "EquilibriumState":
+    def undeformed(body: CondensedBody, load: LoadState = _UNLOADED) -> "EquilibriumState":
         """Return the undeformed body without contact, with the friction of `load`."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)

@@ -29,7 +29,7 @@ PRESSING_TIME = 1.0  # duration of the press [s]
 DRAGGING_TIME = 1.0  # duration of the growth of a given tangential force [s]
 ALL_SLIPS = 1e-6  # relative difference of a given drag from the friction limit at which all slips
 SED_STILL = 1e-10  # relative change of the ending's SED per step below which a slide at finite strain is settled
-CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
+_CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
 Report = Callable[[str, float], None]  # called with a text and the fraction of the load path that is done
 
 
@@ -52,8 +52,8 @@ class CourseSteps:
         return replace(self, press=press, first=self.first / times, largest=self.largest / times)
 
 
-SMALL = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, plateau=4)
-FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7, by_depth=1e-7)
+SMALL_STEPS = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, plateau=4)
+_FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7, by_depth=1e-7)
 RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8, by_depth=1e-7)
 LONG = 25.0  # slide by the indentation within which states settle, except near the wedging limit
 
@@ -109,7 +109,7 @@ class Way:
         newton: Newton,
         friction: LoadState,
         loading: Loading,
-        tolerance: float = SMALL.tolerance,
+        tolerance: float = SMALL_STEPS.tolerance,
         tissue: Tissue | None = None,
     ) -> None:
         """Start undeformed, with mu and bound of `friction`; `loading` prescribes depth or forces.
@@ -142,7 +142,7 @@ class Way:
             self.instants.append(Instant(there.time, self.solve_step(self.last, there)))
             self.aim = there
 
-        advance(step, self._refusal, CONTROL)
+        advance(step, self._refusal, _CONTROL)
 
     def _refusal(self, _fraction: float, _part: float, reason: NotConverged) -> NotConverged:
         return at_end_of_path(self.last.load.depth, self.last.load.travel, reason)
@@ -216,7 +216,7 @@ def slide_or_hold(
 
 def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
     """Return the usual load steps of a finger."""
-    return SMALL if isinstance(finger, LinearFinger) else RELAXING if relaxing else FINITE
+    return SMALL_STEPS if isinstance(finger, LinearFinger) else RELAXING if relaxing else _FINITE
 
 
 def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> Way:

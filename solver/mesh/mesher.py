@@ -147,7 +147,7 @@ class ElementSizes:
     held_distance: float = 0.1  # skin closer to held skin is compressed without bound, by tip radius
 
 
-SIZES = ElementSizes()
+_SIZES = ElementSizes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,18 +233,18 @@ def _lines(outline: Outline, receptor: Receptor, sizing: Sizing) -> Lines:
     fine, size = _finest_size(outline, sizing.indentation, fineness), finger.tip_radius / fineness
     row = _Row.of(outline, fine, receptor, sizing, 1.0 / fineness)
     arcs = row.lines(row.gaps(), shift=sizing.shift)
-    thin = np.inf if sizing.fold is None else SIZES.fold_aspect * _fold_size(finger)
+    thin = np.inf if sizing.fold is None else _SIZES.fold_aspect * _fold_size(finger)
     skin, fat = _layers(finger, fine, size, receptor, thin)
     bone = np.empty(0)
     if finger.bone == "meshed":
-        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (SIZES.bulk * size)))
+        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (_SIZES.bulk * size)))
         bone = np.linspace(CORE, 1.0, count + 1)
     return Lines(*(tuple(part.tolist()) for part in (arcs, bone, fat, skin)))
 
 
 def _clear_of_held(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
     """Return the elements (a,) between the lines at `arcs` that are apart from skin held between `start` and `stop`."""
-    apart = SIZES.held_distance * finger.tip_radius
+    apart = _SIZES.held_distance * finger.tip_radius
     return (arcs[1:] < start - apart) | (arcs[:-1] > stop + apart)
 
 
@@ -276,8 +276,8 @@ def _finest_size(outline: Outline, indentation: float, fineness: float) -> float
     """Return the size of the smallest elements along the skin [mm]."""
     low, high = _arcs_below(outline, indentation)
     radius = outline.finger.tip_radius
-    overlap = min(1.0, (high - low) / 2.0 / (SIZES.short_overlap * radius))
-    return max(radius / fineness * SIZES.in_contact * overlap, FINEST * radius)
+    overlap = min(1.0, (high - low) / 2.0 / (_SIZES.short_overlap * radius))
+    return max(radius / fineness * _SIZES.in_contact * overlap, FINEST * radius)
 
 
 def _cumulative_count(place: Array, size: Array) -> Array:
@@ -311,15 +311,15 @@ class _Row:
             arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
         arc = distinct(arc)
         sizes = fine + scale * (
-            SIZES.palmar_growth * np.maximum(low - arc, 0.0) + SIZES.dorsal_growth * np.maximum(arc - high, 0.0)
+            _SIZES.palmar_growth * np.maximum(low - arc, 0.0) + _SIZES.dorsal_growth * np.maximum(arc - high, 0.0)
         )
         if sizing.fold is not None:
             least = _fold_size(outline.finger)
-            from_fold = np.maximum(np.abs(arc - sizing.fold) - SIZES.fold_elements * least, 0.0)
-            sizes = np.minimum(sizes, least + SIZES.from_fold * from_fold)
+            from_fold = np.maximum(np.abs(arc - sizing.fold) - _SIZES.fold_elements * least, 0.0)
+            sizes = np.minimum(sizes, least + _SIZES.from_fold * from_fold)
         near, far = outline.along(0.0, receptor.depth, receptor.ending[1] * np.array([-0.5, 0.5])).tolist()
-        if receptor.ending[1] < SIZES.point_along * outline.finger.tip_radius:
-            near, far, largest = _around_point(arc, near, far, SIZES.at_point * outline.finger.tip_radius * scale)
+        if receptor.ending[1] < _SIZES.point_along * outline.finger.tip_radius:
+            near, far, largest = _around_point(arc, near, far, _SIZES.at_point * outline.finger.tip_radius * scale)
             sizes = np.minimum(sizes, largest)
         ends = [outline.palmar_cut, outline.palmar, outline.dorsal, outline.dorsal_cut]
         if outline.finger.nail_length > 0.0:
@@ -358,16 +358,16 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     skin = finger.epidermis + finger.dermis
     thick = finger.pulp_thickness() - skin
     depth = _DEPTH * (skin + thick)
-    of_bone = SIZES.at_bone + SIZES.from_bone * (skin + thick - depth) / finger.tip_radius
-    of_ending = SIZES.at_ending + SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
+    of_bone = _SIZES.at_bone + _SIZES.from_bone * (skin + thick - depth) / finger.tip_radius
+    of_ending = _SIZES.at_ending + _SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
     sizes = np.minimum(
-        size * np.minimum(SIZES.bulk, np.minimum(of_bone, of_ending)), SIZES.aspect * (fine + SIZES.growth * depth)
+        size * np.minimum(_SIZES.bulk, np.minimum(of_bone, of_ending)), _SIZES.aspect * (fine + _SIZES.growth * depth)
     )
-    sizes = np.minimum(sizes, thin + SIZES.from_fold * depth)
+    sizes = np.minimum(sizes, thin + _SIZES.from_fold * depth)
     near, far = receptor.depth - receptor.ending[0] / 2.0, receptor.depth + receptor.ending[0] / 2.0
-    if receptor.ending[0] < SIZES.point_across * finger.tip_radius:
+    if receptor.ending[0] < _SIZES.point_across * finger.tip_radius:
         top, bottom = (0.0, finger.epidermis) if receptor.depth < finger.epidermis else (finger.epidermis, skin)
-        above, below, largest = _around_point(depth, near, far, SIZES.at_point * size)
+        above, below, largest = _around_point(depth, near, far, _SIZES.at_point * size)
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
         sizes = np.minimum(sizes, largest)
     ends = _framed([0.0, finger.epidermis, skin, skin + thick], near, far)
@@ -387,7 +387,7 @@ def _around_point(place: Array, near: float, far: float, size: float) -> tuple[f
     element of `size`, where strains are more accurate than at its ends. Elements grow from there.
     """
     middle, size = (near + far) / 2.0, max(far - near, size)
-    largest = size + SIZES.from_point * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)
+    largest = size + _SIZES.from_point * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)
     return middle - size / 2.0, middle + size / 2.0, largest
 
 

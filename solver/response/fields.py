@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
-from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
+from solver.equilibrium.load_path import SMALL_STEPS, Instant, follow, way_of
 from solver.failures import SolveFailure
 from solver.mesh import Q2P1, Mesh, local_coordinates
 from solver.mesh.mesher import Outline
@@ -211,7 +211,7 @@ def way_until(
     """
     way = way_of(scene, finger)
     try:
-        follow(way, finger, scene.loading_per_mm, SMALL, 1.0, lambda _, part: report_part(progress, part))
+        follow(way, finger, scene.loading_per_mm, SMALL_STEPS, 1.0, lambda _, part: report_part(progress, part))
     except SolveFailure as failure:
         return _before_folding(finger, way.instants), failure
     return tuple(way.instants), None

@@ -38,7 +38,7 @@ from solver.response.answer import (
 from solver.scene import Scene
 
 NEAR_SLIDE = 0.98  # of the friction limit, from which contact is where it is when the finger slides
-MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
+CONTACT_MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
 
 
@@ -113,7 +113,7 @@ def coarse_solution(scene: Scene, guess: float, fineness: float | Lines, meshes:
     """
     depth = guess if scene.normal_force is not None else scene.loading.depth
     sizing = Sizing(
-        FIRST_FINENESS if isinstance(fineness, Lines) else min(FIRST_FINENESS, fineness), depth, margin=MARGIN
+        FIRST_FINENESS if isinstance(fineness, Lines) else min(FIRST_FINENESS, fineness), depth, margin=CONTACT_MARGIN
     )
     beyond_limit = False
     try:

@@ -30,7 +30,7 @@ from solver.quantities import NAMES, SED
 from solver.scene import Scene
 from solver.scene.tables import TISSUES
 
-MU, TAU_MAX, DEPTH = range(3)
+_MU, TAU_MAX, _DEPTH = range(3)
 
 
 class By(NamedTuple):
@@ -95,12 +95,12 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
         position, system,
     )  # fmt: skip
     free, by = system.free[:count], np.zeros((count, 3))
-    by[:, MU], by[:, DEPTH] = system.right[:count, BY_FRICTION], system.right[:count, BY_DEPTH]
+    by[:, _MU], by[:, _DEPTH] = system.right[:count, BY_FRICTION], system.right[:count, BY_DEPTH]
     at, along = np.divmod(free, 2)
     at_bound = (state.state[at] == SHEAR_LIMITED) & (along == 0)
     by[:, TAU_MAX] = np.where(at_bound, state.sense[at] * system.length[at], 0.0)
     out = np.zeros((2 * size, 3))
-    out[:, DEPTH] = newton.steps[:, BY_DEPTH]
+    out[:, _DEPTH] = newton.steps[:, BY_DEPTH]
     out[free] = np.linalg.solve(system.matrix[: count * count].reshape(count, count), by)
     return out
 
@@ -115,7 +115,7 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
     if state.load.mu != 0.0:
         raise ValueError("with friction the normal force is no derivative of an energy")
     mesh = finger.geometry.mesh
-    by_depth = finger.body.following(of_skin(finger.newton, state)[:, DEPTH, None])[:, :, 0]
+    by_depth = finger.body.following(of_skin(finger.newton, state)[:, _DEPTH, None])[:, :, 0]
     forces = finger.body.elastic.forces(mesh.local(finger.displacement(state)))
     work = np.sum(mesh.local(by_depth) * forces, axis=(1, 2))
     return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
@@ -136,7 +136,7 @@ def drag_along(scene: Scene) -> int:
 
 
 GOOD = 1e-8  # tolerance of the displacements [mm], far below the effect of any measurable difference of friction
-NUMBERS = {name: state for state, name in STATE_NAMES.items()}
+_NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,7 +230,7 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
 
 def states(skin: Skin) -> NDArray[np.int64]:
     """Return the contact states (k,) of sliding skin, with slip in place of stick."""
-    return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
+    return np.array([SLIP if state == "stick" else _NUMBERS[state] for state in skin.state])
 
 
 def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:

@@ -63,7 +63,13 @@ def _mean(time: Array, values: Array, begin: int, end: int) -> Array:
 
 
 INSTANTS = ("press", "break_away", "slide")  # whose ends they are
-NUMBERS = ("sed_ending", "sed_point", "normal_force", "tangential_force", "contact_width")  # before the quantities
+COURSE_NUMBERS = (
+    "sed_ending",
+    "sed_point",
+    "normal_force",
+    "tangential_force",
+    "contact_width",
+)  # before the quantities
 _PLACES = [0, 6, 1, 2, 5]  # of those among `Finger.all_numbers`, which quantities follow from the seventh on
 
 
@@ -77,7 +83,7 @@ class CourseNumbers:
 
 def course_numbers(course: History) -> CourseNumbers:
     """Return the numbers of a load path."""
-    table = np.column_stack([*(getattr(course, name) for name in NUMBERS), course.responses])
+    table = np.column_stack([*(getattr(course, name) for name in COURSE_NUMBERS), course.responses])
     ends = instants(course)
     at = np.array(
         [table[end - 1] if end > begin else table[0] * np.nan for begin, end in zip((0, *ends), ends, strict=False)]
@@ -109,7 +115,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     if not scene.materials.relax:
         edges += [_of_edges(scene, nested, state) for state in states]
     times = np.concatenate([[0.0], course.time])[[0, *ends]]
-    of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(NUMBERS) :]])
+    of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(COURSE_NUMBERS) :]])
     with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is not there
         rate_edges = (of_quantities[1:] + of_quantities[:-1]) / np.diff(times)[:, None]
 

@@ -103,7 +103,7 @@ def _row_patches(prediction: Prediction, arcs: Array, receptor: Receptor) -> Pat
     return FinitePatches(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)
 
 
-FINENESS = 6.0  # elements to a tip radius, at small strain
+_FINENESS = 6.0  # elements to a tip radius, at small strain
 
 
 def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> Array:
@@ -120,7 +120,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     for _, numbers in groupby(order, lambda n: scenes[n].loading_group if finite else None):
         group = list(numbers)
         depth = max(expected_depth(scenes[number]) for number in group)
-        sizing = Sizing(FIRST_FINENESS, depth, margin=WIDER) if finite else Sizing(FINENESS, depth, margin=WIDE)
+        sizing = Sizing(FIRST_FINENESS, depth, margin=WIDER) if finite else Sizing(_FINENESS, depth, margin=WIDE)
         finger = KINDS[scenes[0].solve.kinematics].of(scenes[group[0]], sizing)
         states: dict[int, EquilibriumState] = {}
         near: EquilibriumState | None = None

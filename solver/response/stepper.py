@@ -24,7 +24,7 @@ from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
 SLIDING = 0.995  # fraction of the friction limit beyond which the tangential force means sliding
-LIGHT = 1e-7  # normal force below which there is no contact [N/mm]
+_LIGHT = 1e-7  # normal force below which there is no contact [N/mm]
 
 
 class Stepper(ABC):
@@ -65,7 +65,7 @@ class Stepper(ABC):
         normal, tangential = float(normal), float(tangential)  # the kernels take floats
         if not isfinite(normal + tangential):
             return float("nan")
-        if normal < LIGHT:
+        if normal < _LIGHT:
             self.forget()
             return 0.0
         return self.advance(normal, min(max(tangential, -self.mu * normal), self.mu * normal))
@@ -158,7 +158,7 @@ class FollowControl:
     furthest: float = 5.0  # displacement in an iteration beyond which the state is lost [mm]
 
 
-CONTROL = FollowControl()
+_CONTROL = FollowControl()
 
 
 class FiniteStepper(Stepper):
@@ -188,7 +188,7 @@ class FiniteStepper(Stepper):
         """
         if self._lost_at is None:
             return self._follow(normal, tangential)
-        if self._hopeless and normal >= CONTROL.relief * self._lost_at:
+        if self._hopeless and normal >= _CONTROL.relief * self._lost_at:
             return float("nan")
         return self._lead(normal, tangential)
 
@@ -196,9 +196,9 @@ class FiniteStepper(Stepper):
         """Return the result of `step` by load steps from the undeformed finger."""
         self.forget()
         sed = float("nan")
-        for part in np.linspace(1.0 / CONTROL.stairs, 1.0, CONTROL.stairs).tolist():
+        for part in np.linspace(1.0 / _CONTROL.stairs, 1.0, _CONTROL.stairs).tolist():
             self._behind = part == 1.0
-            sed = self._follow(part * normal, part * tangential, CONTROL.leading)
+            sed = self._follow(part * normal, part * tangential, _CONTROL.leading)
             if self.lost:
                 self._lost_at, self._hopeless = normal, True
                 break
@@ -215,28 +215,28 @@ class FiniteStepper(Stepper):
         state = self._ready(normal, tangential)
         origin, before = state.place(newton.condensed)[:, 0], state.load.travel
         forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
-        far, turns = (CONTROL.near, CONTROL.arriving) if self._behind else (CONTROL.far, CONTROL.further)
+        far, turns = (_CONTROL.near, _CONTROL.arriving) if self._behind else (_CONTROL.far, _CONTROL.further)
         for number in range(1, max(iterations, turns) + 1):
             reuse = goes_far and number == 1
             correction = correct(newton, state, forces, origin, before, reuse=reuse)
-            if reuse and (correction is None or correction[1] > CONTROL.furthest):
+            if reuse and (correction is None or correction[1] > _CONTROL.furthest):
                 continue
-            if correction is None or correction[1] > CONTROL.furthest or correction[0].reaches_end:
+            if correction is None or correction[1] > _CONTROL.furthest or correction[0].reaches_end:
                 return self._lose(normal)
             state = correction[0]
             if number >= iterations and not reuse and correction[1] < far:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         compression = self.finger.skin_compression(state)
-        if compression.least < CONTROL.least_stretch:
+        if compression.least < _CONTROL.least_stretch:
             return self._lose(normal)
         self.state = state
         x, y = state.force
         behind = max(abs(y - normal), abs(x - tangential) if (state.state == STICK).any() else 0.0)
-        self._behind = behind > CONTROL.force_error * normal
+        self._behind = behind > _CONTROL.force_error * normal
         if self._behind:
             return float("nan")
-        if compression.lowest < CONTROL.least_stretch or compression.kink > CONTROL.largest_kink:
+        if compression.lowest < _CONTROL.least_stretch or compression.kink > _CONTROL.largest_kink:
             return self._lose(normal)
         return self.finger.sed_ending(state.u)
 
@@ -246,8 +246,8 @@ class FiniteStepper(Stepper):
         Such an iteration takes a third of the time, and a new tangent is of more use at its end.
         """
         missing = abs(normal - float(self.state.force[1]))
-        far = self.state.touching.any() and 0.0 < CONTROL.far * self._stiffness < missing
-        return bool(far) and self.newton.bulk < CONTROL.stiff
+        far = self.state.touching.any() and 0.0 < _CONTROL.far * self._stiffness < missing
+        return bool(far) and self.newton.bulk < _CONTROL.stiff
 
     def _lose(self, normal: float) -> float:
         self.forget()
@@ -265,7 +265,7 @@ class FiniteStepper(Stepper):
         return state
 
 
-FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
+_FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
 MARGIN = {
     "small": 4.0,
     "finite": 6.0,
@@ -302,7 +302,7 @@ def stepper(scene: Scene) -> Stepper:
     Much larger forces lose the state. Raises SceneError where the finger cannot be meshed.
     """
     kind = scene.solve.kinematics
-    sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
+    sizing = Sizing(_FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
     mu, tau = float(scene.friction.mu), scene.friction.cap
     follower: Stepper
     if kind == "finite":

@@ -10,7 +10,7 @@ from solver.scene.tables import LAWS_OF, TISSUES, Finger, Friction, Loading, Mat
 
 STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond it, round-off swamps the softer one
 
-TABLES = {
+_TABLES = {
     "finger": Finger, "materials": Materials, "friction": Friction, "loading": Loading, "receptor": Receptor,
     "solve": Solve,
 }  # fmt: skip
@@ -30,7 +30,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check the types of tables and combinations of them. Raises SceneError."""
-        for name, table in TABLES.items():
+        for name, table in _TABLES.items():
             if not isinstance(getattr(self, name), table):
                 raise SceneError(name, getattr(self, name), f"it must be a {table.__name__}")
         self._check_laws()

@@ -12,7 +12,7 @@ from solver.scene import Scene
 from solver.scene.tables import Friction, Loading
 
 Reading = Literal["computed", "as-printed"]
-SCALE: dict[Reading, float] = {"computed": 1e-2, "as-printed": 1e-4}  # of the printed number, to MPa
+BOUND_SCALE: dict[Reading, float] = {"computed": 1e-2, "as-printed": 1e-4}  # of the printed number, to MPa
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def scene(surface: Surface, reading: Reading = "computed") -> Scene:
     """
     return Scene(
         title=f"{surface.descriptor} {surface.index}",
-        friction=Friction(surface.mu, round(surface.printed_bound * SCALE[reading], 12)),
+        friction=Friction(surface.mu, round(surface.printed_bound * BOUND_SCALE[reading], 12)),
         loading=Loading(
             INDENTATION[surface.descriptor], "+x" if surface.descriptor == "stickiness" else "-x", surface.speed
         ),

@@ -53,7 +53,7 @@ def _row(value: object) -> tuple[object, ...]:
     return cast("tuple[object, ...]", value) if isinstance(value, tuple) else ()
 
 
-LARGEST = sys.float_info.max
+_LARGEST = sys.float_info.max
 
 
 def _lies_within(value: object, low: float, high: float) -> bool:
@@ -97,7 +97,7 @@ class Finger(Table):
             _within(f"finger.{name}", getattr(self, name), 0.01 * self.tip_radius, 0.8 * self.tip_radius, "mm")
         _within("finger.shaft_length", self.shaft_length, self.tip_radius, 20.0 * self.tip_radius, "mm")
         _within("finger.bone_radius", self.bone_radius, 0.05 * self.tip_radius, 0.9 * self.tip_radius, "mm")
-        if not _are_two_within(self.bone_centre, -LARGEST, LARGEST):
+        if not _are_two_within(self.bone_centre, -_LARGEST, _LARGEST):
             raise SceneError("finger.bone_centre", self.bone_centre, "it must be two finite lengths in mm")
         _within("finger.bone_centre[0]", self.bone_centre[0], -0.8 * self.shaft_length, self.tip_radius, "mm")
         _within("finger.contact_angle", self.contact_angle, 10.0, 90.0, "degrees")

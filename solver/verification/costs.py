@@ -21,7 +21,7 @@ from solver.verification.request import LeftOut, Request, clock, median_time, ro
 from solver.verification.truth import KINEMATICS, cases
 
 # Part of a solve by folder of the solver, or by file or compiled loop where that differs from the folder's.
-PARTS = {
+COST_PARTS = {
     "mesh": "mesh and tables", "body": "assembly", "constitutive": "assembly", "linalg": "factorisation",
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
     "accuracy": "audits", "body.receptor": "receptor", "body.linear.average": "receptor",
@@ -118,4 +118,4 @@ def _part(function: Function) -> str | None:
         place = [*names[len(names) - names[::-1].index("solver") :], name]
     else:
         return None
-    return next((PARTS[key] for n in (3, 2, 1) if (key := ".".join(place[:n])) in PARTS), None)
+    return next((COST_PARTS[key] for n in (3, 2, 1) if (key := ".".join(place[:n])) in COST_PARTS), None)

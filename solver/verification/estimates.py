@@ -19,13 +19,13 @@ from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES, random_scene
 from solver.verification.request import LeftOut, Request, median_time, rows_within
-from solver.verification.truth import KINEMATICS, NUMBERS, cases, known_truths, mean_and_doubt
+from solver.verification.truth import KINEMATICS, TRUE_NUMBERS, cases, known_truths, mean_and_doubt
 
-TOLERANCES = (0.01, 0.003, 0.001)
-SMALL = 2e-4  # relative error below which an estimate may be any factor too large
-MOST = 10.0  # largest ratio of estimate to true error
+_TOLERANCES = (0.01, 0.003, 0.001)
+_SMALL = 2e-4  # relative error below which an estimate may be any factor too large
+_MOST = 10.0  # largest ratio of estimate to true error
 CORRECTED = "corrected SED of the ending"
-GOALS = (NUMBERS[0], CORRECTED, *NUMBERS[1:])
+GOALS = (TRUE_NUMBERS[0], CORRECTED, *TRUE_NUMBERS[1:])
 RANDOM: dict[Kinematics, int] = {"small": 12, "finite": 6}  # scenes, as far as time allows
 
 
@@ -53,7 +53,7 @@ class Estimate:
     @property
     def near(self) -> bool | None:
         """Whether the estimate lies below ten times max(true error, 0.02 %); None where the truth is too uncertain."""
-        bound = MOST * max(self.error, SMALL)
+        bound = _MOST * max(self.error, _SMALL)
         return self.estimate < bound if self.doubt <= bound / 3.0 else None
 
     @property
@@ -106,7 +106,7 @@ def _estimate_published(request: Request, kinematics: Kinematics) -> Iterator[Es
             rows += compare(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
         yield from rows
         if answers:
-            sed = [row for row in rows if row.number == NUMBERS[0]]
+            sed = [row for row in rows if row.number == TRUE_NUMBERS[0]]
             yield GuaranteedCost(
                 kinematics, tolerance, len(answers), max(a.dofs for a in answers), took_s,
                 sum(a.wall_s for a in answers), answers[0].setup_s, sum(a.estimate_s for a in answers),
@@ -114,7 +114,7 @@ def _estimate_published(request: Request, kinematics: Kinematics) -> Iterator[Es
                 None if any(row.meets_tolerance is None for row in sed) else max(row.error for row in sed),
             )  # fmt: skip
 
-    tolerances = request.pick(TOLERANCES, TOLERANCES[:1])
+    tolerances = request.pick(_TOLERANCES, _TOLERANCES[:1])
     return rows_within(request, tolerances, f"tolerances at {kinematics} strain", rows_at)
 
 
@@ -122,8 +122,8 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
     def rows_of(number: int) -> Iterator[Estimate | LeftOut]:
         scene = random_scene(list(FAMILIES)[number % len(FAMILIES)], number, kinematics)
         try:
-            answer = solve(replace(scene, solve=replace(scene.solve, tolerance=TOLERANCES[0])))
-            yield from compare(answer, TOLERANCES[0], *mean_and_doubt(fine_numbers([scene])[:, 0]))
+            answer = solve(replace(scene, solve=replace(scene.solve, tolerance=_TOLERANCES[0])))
+            yield from compare(answer, _TOLERANCES[0], *mean_and_doubt(fine_numbers([scene])[:, 0]))
         except SolveFailure:
             yield LeftOut(f"The random scene {scene.title} has no settled state at {kinematics} strain to compare.")
 
@@ -151,7 +151,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
         if estimate is None or not true > 0.0:
             continue
         error, off = abs(value) / true - 1.0, best / true - 1.0
-        better = (abs(off), error * (error - off) > 0.0) if name == NUMBERS[0] else (None, False)
+        better = (abs(off), error * (error - off) > 0.0) if name == TRUE_NUMBERS[0] else (None, False)
         row = Estimate(
             answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
             float(doubt[place]), *better, warned or bool(stiffness_warning(answer.scene)),

@@ -20,14 +20,14 @@ from solver.scene import Scene
 from solver.verification.methods import Kinematics
 
 # fineness, shift by half an element, and number of load steps by the usual; the first with a solution are used
-MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by kinematics, `depends_on_way`
+_MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by kinematics, `depends_on_way`
     ("small", False): ((26.0, False, 1), (26.0, True, 1), (23.0, False, 1), (23.0, True, 1), (29.0, False, 1)),
     ("small", True): ((16.0, False, 12), (16.0, True, 14), (14.0, False, 16), (14.0, True, 13)),
     ("finite", False): ((15.0, False, 1), (15.0, True, 1), (13.0, False, 1), (13.0, True, 1), (17.0, False, 1)),
     ("finite", True): ((10.0, False, 4), (10.0, True, 5), (9.0, False, 6), (9.0, True, 4)),
 }
 ENOUGH = 2  # number of meshes used
-REFINED = {"small": 2e-4, "finite": 1e-3}  # tolerance that refines the third
+_REFINED = {"small": 2e-4, "finite": 1e-3}  # tolerance that refines the third
 
 
 def fine_numbers(scenes: Sequence[Scene]) -> Array:
@@ -36,7 +36,7 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
     Raises SolveFailure where fewer meshes have a solution.
     """
     solves: list[Array] = []
-    for mesh in MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]:
+    for mesh in _MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]:
         with suppress(SolveFailure):
             solves.append(numbers_on_mesh(scenes, *mesh))
         if len(solves) == ENOUGH:
@@ -46,7 +46,7 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
 
 def _solve_refined(scenes: Sequence[Scene]) -> Array:
     """Return the numbers (n, 3) of the nested mesh of answers with a tight tolerance."""
-    tolerance = REFINED[scenes[0].solve.kinematics]
+    tolerance = _REFINED[scenes[0].solve.kinematics]
     tight = {"tolerance": tolerance, "contrast_tolerance": tolerance if len(scenes) > 1 else None, "evidence": "quick"}
     answers = solve_many([replace(scene, solve=replace(scene.solve, **tight)) for scene in scenes])
     numbers = [one.nested.numbers[:3] for one in answers if isinstance(one, Prediction) and one.nested is not None]

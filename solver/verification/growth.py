@@ -9,8 +9,8 @@ from solver.verification.orders import slope
 from solver.verification.request import LeftOut, Request, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
-MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
-QUICK = (8.0, 11.0, 16.0)
+_MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
+_QUICK = (8.0, 11.0, 16.0)
 FEWEST = 3000  # fewest unknowns in the fit of the exponent: below, arithmetic does not dominate the time
 
 
@@ -28,7 +28,7 @@ class Growth:
 def measure(request: Request) -> Iterator[Growth | LeftOut]:
     """Return an iterator over rows, one for each mesh and kinematics, coarse meshes first."""
     works: list[tuple[float, Kinematics]] = [
-        (fineness, kind) for fineness in request.pick(MESHES, QUICK) for kind in KINEMATICS
+        (fineness, kind) for fineness in request.pick(_MESHES, _QUICK) for kind in KINEMATICS
     ]
     return rows_within(request, works, "meshes whose growth is measured", lambda work: [_row(*work)])
 

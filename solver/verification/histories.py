@@ -10,8 +10,8 @@ from solver.verification.methods import MESHED, Kinematics
 from solver.verification.request import LeftOut, Request, clock, median_time, rows_within
 from solver.verification.truth import JUDGED, KINEMATICS, cases
 
-PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and its distance [mm]
-FINENESS: dict[Kinematics, float] = {"small": 4.0, "finite": 3.0}
+_PRESS, _SLIDES, _DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and its distance [mm]
+_FINENESS: dict[Kinematics, float] = {"small": 4.0, "finite": 3.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +49,11 @@ def press_and_slide(
 
 def _march(scene: Scene) -> March:
     kind = scene.solve.kinematics
-    mesh = MESHED[kind](scene, FINENESS[kind], False)
+    mesh = MESHED[kind](scene, _FINENESS[kind], False)
     friction, loading = scene.friction, scene.loading
     course = press_and_slide(
         loading.depth, float(friction.mu), friction.cap, loading.direction,
-        press=PRESS, slides=SLIDES, distance=DISTANCE,
+        press=_PRESS, slides=_SLIDES, distance=_DISTANCE,
     )  # fmt: skip
     span = median_time(lambda: mesh.numbers(mesh.solve(scene)), 5)
     start = clock()

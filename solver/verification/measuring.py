@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 FULL_S, QUICK_S = 140.0, 12.5  # time for the subjects; a running item is finished, and drawing takes more
-ALWAYS = ("machine", "targets")  # run even after a stop, since they take no time
+_ALWAYS = ("machine", "targets")  # run even after a stop, since they take no time
 Progress = Callable[[float, str], None]
 R = TypeVar("R")
 
@@ -52,7 +52,7 @@ class Subject:
 
 
 # In order: a later subject may use the rows of an earlier one, and processes take their time whatever is left.
-SUBJECTS = (
+_SUBJECTS = (
     Subject("machine", "machine", 0.0, 0.0, machine.measure, (machine.Machine,)),
     Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure, (truth.Truth,)),
     Subject("speed", "time against true error", 38.0, 3.5, speed.measure, (speed.Speed,)),
@@ -70,7 +70,7 @@ SUBJECTS = (
     Subject("processes", "cold starts and memory", 15.0, 2.5, processes.measure, (processes.Cold, processes.Memory)),
     Subject("targets", "targets of speed", 0.0, 0.0, targets.measure, (targets.Target,)),
 )  # fmt: skip
-KINDS = {kind.__name__: kind for subject in SUBJECTS for kind in subject.kinds}  # by their names in the JSON file
+_KINDS = {kind.__name__: kind for subject in _SUBJECTS for kind in subject.kinds}  # by their names in the JSON file
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class RunResults:
 
 def restore(document: dict[str, Any]) -> RunResults:
     """Return the results from the data of `to_dict`. Raises msgspec.ValidationError for data of another form."""
-    names = [subject.name for subject in SUBJECTS if subject.name in document]
+    names = [subject.name for subject in _SUBJECTS if subject.name in document]
     rows = {name: tuple(map(_restore_row, document[name])) for name in names}
     return RunResults(
         document["begun"], document["quick"], document["stopped"], document["took_s"], rows, tuple(document["left_out"])
@@ -112,14 +112,14 @@ def restore(document: dict[str, Any]) -> RunResults:
 
 def _restore_row(row: dict[str, Any]) -> "DataclassInstance":
     """Return a row from its data, where the null of a field that is always a number is nan."""
-    kind = KINDS[row["kind"]]
+    kind = _KINDS[row["kind"]]
     numbers = {field.name for field in fields(kind) if field.type is float}
     data = {name: nan if value is None and name in numbers else value for name, value in row.items() if name != "kind"}
     return msgspec.convert(data, kind)
 
 
 def measure(
-    quick: bool, progress: Progress, host: Host, subjects: Sequence[Subject] = SUBJECTS,
+    quick: bool, progress: Progress, host: Host, subjects: Sequence[Subject] = _SUBJECTS,
     seconds: float | None = None, clock: Callable[[], float] = perf_counter,
 ) -> RunResults:  # fmt: skip
     """Run the subjects and return their results. Ctrl-C ends the run and keeps the rows so far.
@@ -135,7 +135,7 @@ def measure(
     left_out: list[str] = []
     stopped = False
     for number, subject in enumerate(subjects):
-        if stopped and subject.name not in ALWAYS:
+        if stopped and subject.name not in _ALWAYS:
             left_out.append(f"Stopped before: {subject.doing}.")
             continue
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)

@@ -19,7 +19,7 @@ from solver.equilibrium.load_stepping import sliding_load
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.response.answer import FIRST_FINENESS
-from solver.response.finite_answers import MARGIN
+from solver.response.finite_answers import CONTACT_MARGIN
 from solver.scene import Scene
 from solver.verification.request import clock
 
@@ -88,9 +88,11 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh the finger of `scene`."""
-        start, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=MARGIN)
+        start, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=CONTACT_MARGIN)
         self.finger = FiniteFinger.of(scene, sizing)
-        self._coarse = FiniteFinger.of(scene, Sizing(min(FIRST_FINENESS, fineness), scene.loading.depth, margin=MARGIN))
+        self._coarse = FiniteFinger.of(
+            scene, Sizing(min(FIRST_FINENESS, fineness), scene.loading.depth, margin=CONTACT_MARGIN)
+        )
         self.setup_s = clock() - start
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:

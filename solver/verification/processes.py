@@ -24,7 +24,7 @@ slide = "-x"
 kinematics = "{kinematics}"
 """
 TOLERANCE = 0.0015  # of the solve whose memory is measured
-LONGEST = 60.0  # seconds after which a process is stopped
+_LONGEST = 60.0  # seconds after which a process is stopped
 # Code of a process of its own: idle memory is measured with loops loaded, and the peak restarts there (Linux only).
 MEMORY = """
 import json
@@ -101,7 +101,7 @@ def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str
 def _run(command: list[str]) -> tuple[float, float]:
     """Return processor time and elapsed time of a process; elapsed time twice where the system reports no first."""
     start, before = perf_counter(), _of_children()
-    subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
+    subprocess.run(command, check=True, capture_output=True, timeout=_LONGEST)
     wall_s, spent = perf_counter() - start, _of_children() - before
     return (spent if spent > 0.0 else wall_s), wall_s
 
@@ -115,7 +115,7 @@ def _of_children() -> float:
 def _memory(kinematics: Kinematics, python: tuple[str, ...]) -> Memory | LeftOut:
     code = MEMORY.format(kinematics=kinematics, tolerance=TOLERANCE)
     try:
-        process = subprocess.run([*python, "-c", code], check=True, capture_output=True, text=True, timeout=LONGEST)
+        process = subprocess.run([*python, "-c", code], check=True, capture_output=True, text=True, timeout=_LONGEST)
     except (subprocess.SubprocessError, OSError) as bad:
         return LeftOut(f"Memory of a solve at {kinematics} strain could not be measured here: {bad}.")
     idle, solving, dofs, estimate = json.loads(process.stdout)

@@ -20,7 +20,7 @@ from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallM
 from solver.verification.request import LeftOut, Request, clock
 
 KINEMATICS = tuple(MESHED)
-NUMBERS = ("SED of the ending", "normal force", "drag")
+TRUE_NUMBERS = ("SED of the ending", "normal force", "drag")
 # fineness of three meshes, finer than all whose speed is measured, and whether they are moved by half an element
 SHIFTED = {
     "small": ((26.0, False), (26.0, True), (23.0, False)),

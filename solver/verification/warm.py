@@ -22,11 +22,11 @@ from solver.verification.request import LeftOut, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
 PASSES, QUICK_PASSES = 5, 3
-PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and its distance [mm]
+_PRESS, _SLIDES, _DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and its distance [mm]
 LIFTS = 8  # readings of the lift-off: 40 ms at 200 Hz
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
-SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
-QUICK: dict[Kinematics, tuple[str, ...]] = {"finite": SURFACES[:1], "small": SURFACES[::3]}
+WARM = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
+_QUICK: dict[Kinematics, tuple[str, ...]] = {"finite": WARM[:1], "small": WARM[::3]}
 Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED [MPa]
 
 
@@ -46,7 +46,7 @@ class Warm:
 
 def measure(request: Request) -> Iterator[Warm | LeftOut]:
     """Return an iterator over rows, one for each kinematics and surface."""
-    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (QUICK[kind] if request.quick else SURFACES)]
+    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (_QUICK[kind] if request.quick else WARM)]
     unbounded = [replace(scene, friction=Friction(scene.friction.mu)) for scene in scenes]
     passes = QUICK_PASSES if request.quick else PASSES
     return rows_within(request, unbounded, "surfaces followed reading by reading", lambda scene: [_row(scene, passes)])
@@ -85,7 +85,7 @@ def _readings(scene: Scene) -> Iterator[Reading]:
     kind, loading, mu = scene.solve.kinematics, scene.loading, float(scene.friction.mu)
     finger = MESHED[kind](scene, FINER[kind], False).finger
     course = press_and_slide(
-        loading.depth, mu, np.inf, loading.direction, press=PRESS, slides=SLIDES, distance=DISTANCE
+        loading.depth, mu, np.inf, loading.direction, press=_PRESS, slides=_SLIDES, distance=_DISTANCE
     )
     states = [*march(finger.newton, course, tolerance=1e-6)]
     state: EquilibriumState | None = None

@@ -10,7 +10,7 @@ from daq_app.accuracy_page.page import page, write
 from daq_app.child_process import interpreter
 from daq_app.cli.main import run
 from solver.verification import estimates
-from solver.verification.costs import ENTIRE, PARTS, shares
+from solver.verification.costs import COST_PARTS, ENTIRE, shares
 from solver.verification.growth import Growth
 from solver.verification.measuring import Subject, measure
 from solver.verification.random_scenes import random_scene
@@ -103,7 +103,7 @@ def test_every_part_of_the_solver_whose_time_is_counted_is_there():
         if isinstance(node, ast.FunctionDef)
     }
     places = {".".join(name.split(".")[:n]) for name in defined for n in (1, 2, 3, 4)}
-    assert set(PARTS) - places == set()
+    assert set(COST_PARTS) - places == set()
     assert set(ENTIRE) - {name.split(".")[-1] for name in defined} == set()
 
 

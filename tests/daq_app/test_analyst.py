@@ -20,7 +20,7 @@ from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_words, session_pictures, words_of
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
-from daq_app.analyst.stroke import APART, EDGES, RawFile, decision_of, edges_of, history, reversal, within
+from daq_app.analyst.stroke import EDGE_DISTANCE, EDGES, RawFile, decision_of, edges_of, history, reversal, within
 from daq_app.analyst.work import Work, sentence_of
 from sessions.recording import Recording
 from sessions.recording.derived import set_gain_error
@@ -206,7 +206,7 @@ def test_an_edge_never_passes_its_neighbours(steady, at, time):
     limit = within(steady, at, time)
     times = {one.edge: one.time for one in edges_of(steady)} | {at: limit}
     ordered = [times[edge] for edge in EDGES]
-    assert all(b - a >= APART * (1 - 1e-6) for a, b in itertools.pairwise(ordered))
+    assert all(b - a >= EDGE_DISTANCE * (1 - 1e-6) for a, b in itertools.pairwise(ordered))
 
 
 def test_a_moved_edge_is_a_decision_with_who_why_and_what_stood_there(steady):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from stand_ins import INFO
 
 from daq_app.recorder.messages import (
-    LENGTH,
+    LENGTH_PREFIX,
     REPORTS,
     REQUESTS,
     BrokenMessage,
@@ -88,16 +88,16 @@ def test_bytes_that_are_no_message_are_refused_and_nothing_else(garbage):
     with pytest.raises(BrokenMessage):
         Codec([Connect]).decode(b"\x92\xa7Connect\xc0" + garbage)
     with pytest.raises(BrokenMessage):
-        Codec([Connect]).decode(Codec([Zeroed]).encode(Zeroed())[LENGTH.size :])
+        Codec([Connect]).decode(Codec([Zeroed]).encode(Zeroed())[LENGTH_PREFIX.size :])
 
 
 def test_a_length_beyond_all_reason_is_refused_before_anything_is_gathered():
     with pytest.raises(BrokenMessage):
-        next(Codec([Connect]).read(io.BytesIO(LENGTH.pack(2**31) + b"x")))
+        next(Codec([Connect]).read(io.BytesIO(LENGTH_PREFIX.pack(2**31) + b"x")))
 
 
 def test_an_array_of_objects_is_refused():
-    body = Codec([Live]).encode(REPORT_EXAMPLES[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
+    body = Codec([Live]).encode(REPORT_EXAMPLES[2])[LENGTH_PREFIX.size :].replace(b"\xa3<i8", b"\xa3|O8")
     with pytest.raises(BrokenMessage):
         Codec([Live]).decode(body)
 

@@ -18,7 +18,7 @@ from sessions.statistics.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED
 from sessions.statistics.multiverse import PATHS
 from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import Exclusion, Visit, VisitOptions, exclusions_in
-from sessions.strokes.stroke import HERTZ, AreaLaw
+from sessions.strokes.stroke import HERTZ_EXPONENT, AreaLaw
 from sessions.toml_file import SettingsError
 
 VISITS = [visit(number) for number in range(1, 11)]
@@ -34,7 +34,7 @@ def test_a_visit_survives_its_way_through_plain_data():
 
 def test_a_study_says_what_to_type_for_its_numbers():
     model = PredictionOptions("as-printed", course="steady", kinematics="finite", intervals=True)
-    visit_options = VisitOptions(model, AreaLaw("hertz", HERTZ, 1.234567891), "finite", 0.003)
+    visit_options = VisitOptions(model, AreaLaw("hertz", HERTZ_EXPONENT, 1.234567891), "finite", 0.003)
     options = "--kinematics finite --tau as-printed --area hertz --area-force 1.234567891 --calibration-error 0.3"
     expected = f"daq-app study 'my study' {options} --intervals --paths finite"
     assert command(pool_visits(VISITS, options=visit_options), "my study") == expected

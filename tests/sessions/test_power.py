@@ -7,13 +7,13 @@ import pytest
 from scipy import stats
 
 from daq_app.cli.main import run
-from sessions.statistics.power import FRICTION, AssumedEffects, power
+from sessions.statistics.power import MU_RANGE, AssumedEffects, power
 
 PLAIN = AssumedEffects(effect=10.0, noise=12.0, level_sd=12.0, slope_sd=0.0, friction_sd=0.0)
 
 
 def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_test_of_their_slopes():
-    mu = np.linspace(*FRICTION, 5)
+    mu = np.linspace(*MU_RANGE, 5)
     slope = PLAIN.effect / np.ptp(mu)
     error = PLAIN.noise / np.sqrt(np.sum((mu - mu.mean()) ** 2))
     for design in power(PLAIN, (8, 16), (5,), 400, 1):

@@ -6,15 +6,15 @@ import pytest
 from recordings import PLAN, new_writer, readings
 
 from sessions.recording import RecordingError
-from sessions.recording.storage import MARGIN, check_room, need, release_reserve, take_reserve
+from sessions.recording.storage import DISK_MARGIN, check_room, need, release_reserve, take_reserve
 
 Usage = namedtuple("Usage", "total used free")
 
 
 def test_the_room_a_session_needs_is_its_rate_times_its_time_twice():
     # One trial of 90 s and one block's 300 s at 7000 Hz, six columns of which one holds six numbers: 11 x 8 bytes.
-    assert need(PLAN, 7000.0).size == 2 * 390 * 7000 * 88 + MARGIN
-    assert need(PLAN, None).size == MARGIN
+    assert need(PLAN, 7000.0).size == 2 * 390 * 7000 * 88 + DISK_MARGIN
+    assert need(PLAN, None).size == DISK_MARGIN
     assert need(PLAN, math.nan).rate == 1000.0
 
 

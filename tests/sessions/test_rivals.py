@@ -24,7 +24,15 @@ from sessions.statistics.correlations import (
     steiger_z,
 )
 from sessions.statistics.mixed_model import crossed_deviance
-from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, Rival, RivalTrial, rivals_of_means, rivals_within
+from sessions.statistics.rivals import (
+    MODEL_MU,
+    MODEL_SED,
+    STROKE_FIELDS,
+    Rival,
+    RivalTrial,
+    rivals_of_means,
+    rivals_within,
+)
 from sessions.statistics.within_subjects import repeated_correlation
 from solver import Finger, solve_many
 from solver.scene.published import scenes as published_scenes
@@ -100,7 +108,7 @@ def test_friction_follows_the_published_indices_as_closely_as_the_sed_does(descr
 def published(descriptor):
     """Return how the numbers of the published tables go with the index of each surface."""
     rows = TABLES[descriptor]
-    names = (MODEL_MU, "τ max", "speed", MODEL)
+    names = (MODEL_MU, "τ max", "speed", MODEL_SED)
     series = {name: {index: row[at] for index, row in rows.items()} for at, name in enumerate(names)}
     return rivals_of_means({index: float(index) for index in rows}, series)
 
@@ -116,7 +124,7 @@ def test_a_tip_of_seven_millimetres_turns_the_published_signs_round(radius, stic
 
 def test_scores_that_no_subject_varies_are_compared_with_nothing_and_the_reason_is_said():
     trials = [
-        RivalTrial(subject, index, level, {MODEL: mu**2, MODEL_MU: mu, "N": 1.0 + 0.1 * mu + level / 50.0 * mu**3})
+        RivalTrial(subject, index, level, {MODEL_SED: mu**2, MODEL_MU: mu, "N": 1.0 + 0.1 * mu + level / 50.0 * mu**3})
         for subject, level in (("a", 20.1), ("b", 50.3), ("c", 80.7))
         for index, mu in zip((0, 20, 50, 80, 100), (0.28, 0.44, 0.48, 0.64, 0.67), strict=True)
     ]
@@ -127,11 +135,15 @@ def test_scores_that_no_subject_varies_are_compared_with_nothing_and_the_reason_
 
 
 def test_what_has_no_number_has_a_reason_instead():
-    series = {MODEL: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}, "µ static": {0: 1.0}, MODEL_MU: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}}
+    series = {
+        MODEL_SED: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0},
+        "µ static": {0: 1.0},
+        MODEL_MU: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0},
+    }
     rivals = {rival.name: rival for rival in rivals_of_means({0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0}, series)}
     assert rivals["µ static"].r is None
     assert set(rivals["µ static"].reasons) == {"r", "contrast", "partial", "left_out_error"}
-    assert "µ determines it" in rivals[MODEL].reasons["partial"]
+    assert "µ determines it" in rivals[MODEL_SED].reasons["partial"]
     assert rivals[MODEL_MU].contrast is None  # the two are one variable
     assert rivals_of_means({0: 1.0}, {MODEL_MU: {0: 1.0}}) == ()
 
@@ -146,7 +158,7 @@ def people(draw, judge, subjects=10):
             sed = 0.0086 + 0.002 * (own - 0.5) ** 2 + 0.001 * draw.normal(0.0, 0.3)
             score = level + judge(own, sed) + draw.normal(0.0, 4.0)
             trials.append(
-                RivalTrial(f"S{subject}", index, score, {MODEL: sed, MODEL_MU: own, "N": draw.normal(1.0, 0.1)})
+                RivalTrial(f"S{subject}", index, score, {MODEL_SED: sed, MODEL_MU: own, "N": draw.normal(1.0, 0.1)})
             )
     return trials
 
@@ -156,11 +168,11 @@ def test_the_quantity_that_people_judge_by_is_told_from_its_rivals():
     by_mu = {rival.name: rival for rival in rivals_within(people(draw, lambda mu, _: 120.0 * (mu - 0.5)))}
     by_sed = {rival.name: rival for rival in rivals_within(people(draw, lambda _, sed: 4e4 * (sed - 0.0086)))}
     assert by_mu[MODEL_MU].contrast.high < 0.0 < by_sed[MODEL_MU].contrast.low
-    assert by_mu[MODEL].partial_low < 0.0 < by_mu[MODEL].partial_high
-    assert by_sed[MODEL].partial_low > 0.5
+    assert by_mu[MODEL_SED].partial_low < 0.0 < by_mu[MODEL_SED].partial_high
+    assert by_sed[MODEL_SED].partial_low > 0.5
     assert by_mu[MODEL_MU].weight > 0.95
-    assert by_sed[MODEL].weight > 0.95
-    assert by_mu[MODEL_MU].left_out_error < by_mu[MODEL].left_out_error
+    assert by_sed[MODEL_SED].weight > 0.95
+    assert by_mu[MODEL_MU].left_out_error < by_mu[MODEL_SED].left_out_error
     assert sum(rival.weight for rival in by_mu.values()) == pytest.approx(1.0)
 
 
@@ -168,21 +180,21 @@ def test_numbers_within_subjects_are_those_of_trials_without_each_subjects_mean(
     trials = people(np.random.default_rng(8), lambda mu, _: 90.0 * mu, subjects=4)
     rivals = {rival.name: rival for rival in rivals_within(trials)}
     who = [trial.subject for trial in trials]
-    columns = {name: np.array([trial.values[name] for trial in trials]) for name in (MODEL, MODEL_MU)}
+    columns = {name: np.array([trial.values[name] for trial in trials]) for name in (MODEL_SED, MODEL_MU)}
     columns["score"] = np.array([trial.score for trial in trials])
     centred = {
         name: (v.reshape(4, 5) - v.reshape(4, 5).mean(axis=1, keepdims=True)).ravel() for name, v in columns.items()
     }
-    expected = repeated_correlation(who, columns[MODEL], columns["score"])
-    assert (rivals[MODEL].r, rivals[MODEL].low) == (expected.r, expected.people[0])
-    steps = [abs(np.corrcoef(centred["score"], centred[name])[0, 1]) for name in (MODEL, MODEL_MU)]
+    expected = repeated_correlation(who, columns[MODEL_SED], columns["score"])
+    assert (rivals[MODEL_SED].r, rivals[MODEL_SED].low) == (expected.r, expected.people[0])
+    steps = [abs(np.corrcoef(centred["score"], centred[name])[0, 1]) for name in (MODEL_SED, MODEL_MU)]
     assert rivals[MODEL_MU].contrast.difference == pytest.approx(steps[0] - steps[1])
     leftover = [
         centred[name]
         - centred[MODEL_MU] * (centred[name] @ centred[MODEL_MU]) / (centred[MODEL_MU] @ centred[MODEL_MU])
-        for name in (MODEL, "score")
+        for name in (MODEL_SED, "score")
     ]
-    assert rivals[MODEL].partial == pytest.approx(np.corrcoef(leftover)[0, 1])
+    assert rivals[MODEL_SED].partial == pytest.approx(np.corrcoef(leftover)[0, 1])
 
 
 def test_intervals_over_four_subjects_hold_the_differences_of_very_many():
@@ -204,13 +216,16 @@ def test_intervals_over_four_subjects_hold_the_differences_of_very_many():
         score, *columns = cases(4)
         trials = [
             RivalTrial(
-                str(i), j, score[i, j], {MODEL: columns[0][i, j], "N": columns[1][i, j], MODEL_MU: columns[2][i, j]}
+                str(i),
+                j,
+                score[i, j],
+                {MODEL_SED: columns[0][i, j], "N": columns[1][i, j], MODEL_MU: columns[2][i, j]},
             )
             for i in range(4)
             for j in range(5)
         ]
         rivals = {name.name: name for name in rivals_within(trials)}
-        step, partial_model = rivals["N"].contrast, rivals[MODEL]
+        step, partial_model = rivals["N"].contrast, rivals[MODEL_SED]
         holds = step.low <= r[0, 1] - r[0, 2] <= step.high
         coverage.append((holds, partial_model.partial_low <= partial <= partial_model.partial_high))
     assert (np.mean(coverage, axis=0) >= 0.90).all()  # two standard errors of 100 below 95 %
@@ -226,8 +241,8 @@ def test_a_quantity_that_trials_lack_gets_no_weight_and_the_others_keep_theirs()
     rivals = {rival.name: rival for rival in rivals_within(some)}
     assert rivals["N"].weight is None
     assert "10 of 50 trials" in rivals["N"].reasons["weight"]
-    ratio = rivals[MODEL].weight / rivals[MODEL_MU].weight
-    assert ratio == pytest.approx(complete[MODEL].weight / complete[MODEL_MU].weight)
+    ratio = rivals[MODEL_SED].weight / rivals[MODEL_MU].weight
+    assert ratio == pytest.approx(complete[MODEL_SED].weight / complete[MODEL_MU].weight)
 
 
 def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
@@ -296,7 +311,7 @@ def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
     report = example()
     rivals_table = next(table for table in tables(report)["rivals"] if table.name == "table-rivals")
-    assert [row[0].text for row in rivals_table.groups[0].rows] == [MODEL, *FIELDS]
+    assert [row[0].text for row in rivals_table.groups[0].rows] == [MODEL_SED, *STROKE_FIELDS]
     assert len(rivals_table.caption.split()) <= 60
     picture_text = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
     assert "τ max +0.95" in picture_text
@@ -334,7 +349,7 @@ def test_a_sentence_names_those_rivals_whose_p_allows_for_all_of_them():
     rivals = [
         Rival(name, 50, 0.5, 0.1, 0.8, Contrast(50, step, None, None, None, p)) for name, (step, p) in steps.items()
     ]
-    (sentence,) = rivals_sentences("roughness", [Rival(MODEL, 50, 0.9, 0.8, 0.95), *rivals])
+    (sentence,) = rivals_sentences("roughness", [Rival(MODEL_SED, 50, 0.9, 0.8, 0.95), *rivals])
     assert sentence == (
         "On roughness, the scores follow N less closely than the SED (p < 0.05 by Holm over 3 rivals); they tell no "
         "difference between the SED and T and speed."
@@ -352,6 +367,6 @@ def test_equal_rivals_are_said_to_be_told_apart_by_no_number_of_surfaces():
     score = {0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0, 4: 6.0}
     same = {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0, 4: 5.0}
     twice = {index: 2.0 * value for index, value in same.items()}
-    sentences = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, MODEL_MU: twice}))
+    sentences = rivals_sentences("roughness", rivals_of_means(score, {MODEL_SED: same, MODEL_MU: twice}))
     assert sentences[0].startswith("Roughness: µ of the model orders these 5 surfaces as the SED does")
     assert sentences[0].endswith("no number of surfaces would.")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from ledger import Ledger
 
 from simulators.bench import Bench, BenchSettings
-from simulators.faults import KINDS, Fault, Faults
+from simulators.faults import FAULT_KINDS, Fault, Faults
 
 ONES = BenchSettings(noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_torque=0.0, offset=(1.0,) * 6)
 
@@ -69,7 +69,7 @@ def test_the_share_is_kept_and_the_same_seed_hurts_the_same(share, seed):
 
 @given(
     st.lists(
-        st.builds(Fault, st.sampled_from(KINDS[:6]), st.floats(0, 0.5), st.floats(0.6, 1), st.floats(0.1, 1)),
+        st.builds(Fault, st.sampled_from(FAULT_KINDS[:6]), st.floats(0, 0.5), st.floats(0.6, 1), st.floats(0.1, 1)),
         max_size=4,
     )
 )
@@ -83,7 +83,7 @@ def test_whatever_the_timetable_nothing_is_made_up_and_the_ledger_knows_all(time
     assert len(leaving) <= 200
 
 
-@pytest.mark.parametrize("kind", KINDS[:6])
+@pytest.mark.parametrize("kind", FAULT_KINDS[:6])
 def test_the_same_happens_however_many_datagrams_are_sent_at_one_go(kind):
     timetable = [Fault(kind, 0.2, 0.8, share=0.5, delay=0.024)]
     leaving = Faults(timetable, seed=1).route(50.0, [(i / 100, bytes([i]) * 36) for i in range(100)])

@@ -10,7 +10,7 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.contact import FrictionLaw
 from solver.verification.published import contacts, problems
 from solver.verification.published.contacts import ELEMENT
-from solver.verification.published.problems import BELOW, CAPPED, HERTZ, PARTS
+from solver.verification.published.problems import BELOW, CAPPED, HERTZ_PROBLEMS, LOADS_BY
 from solver.verification.request import Request
 
 
@@ -19,7 +19,7 @@ def light():
     return contacts.light()
 
 
-@pytest.mark.parametrize("case", HERTZ, ids=lambda case: case[0])
+@pytest.mark.parametrize("case", HERTZ_PROBLEMS, ids=lambda case: case[0])
 def test_half_width_and_pressure_are_those_of_hertz(case):
     """With a/R up to 0.4 the theory is one of a half-plane under the gap of a parabola: so is the body here."""
     _, young, nu, radius, load, half_width, peak = case
@@ -102,7 +102,7 @@ def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_
     np.testing.assert_allclose(shear, mu, atol=0.005)  # all along the contact: from 0.3 on the largest there is
 
 
-@pytest.mark.parametrize("part", PARTS["small"])
+@pytest.mark.parametrize("part", LOADS_BY["small"])
 @pytest.mark.parametrize("mu", [0.01, 0.3])
 def test_partial_slip_is_that_of_cattaneo_and_mindlin(light, mu, part):
     """Stick for |x| < c = sqrt(1 - Q/(mu P)); q = mu p less mu p0 c sqrt(1 - x^2/c^2) inside."""

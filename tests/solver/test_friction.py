@@ -13,7 +13,7 @@ from solver.arrays import ContactStates, LoadArguments, StateChanges
 from solver.body import CondensedLinear
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
-from solver.contact import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
+from solver.contact import FRICTION_LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
 from solver.equilibrium import (
     BY_DEPTH,
     BY_FRICTION,
@@ -153,7 +153,7 @@ def points_by_law(request, cushion):
 
 
 def test_every_law_of_the_list_is_tested_here():
-    assert {type(law) for law in MEMBERS} == set(LAWS)
+    assert {type(law) for law in MEMBERS} == set(FRICTION_LAWS)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)

@@ -13,11 +13,11 @@ from solver.verification.random_scenes import FAMILIES, random_scene, surface_se
 from solver.verification.survey import answers
 from solver.verification.survey.__main__ import main, rows
 from solver.verification.survey.statistics import HEADER, judgement, misses
-from solver.verification.truth import NUMBERS
+from solver.verification.truth import TRUE_NUMBERS
 
 
 def estimate(value, error, doubt=0.0, tolerance=0.01, **corrected):
-    return Estimate("small", "axis 7", NUMBERS[0], tolerance, 900, value, error, doubt, **corrected)
+    return Estimate("small", "axis 7", TRUE_NUMBERS[0], tolerance, 900, value, error, doubt, **corrected)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

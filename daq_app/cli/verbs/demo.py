@@ -23,13 +23,13 @@ from sessions.statistics.scores import mean_scores
 from sessions.strokes import Analysis
 
 EXAMPLE = "daq-app demo --seed 7"
-PACE = 20.0  # simulated seconds a real second
+_PACE = 20.0  # simulated seconds a real second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
     add_seed(parser, "of surfaces' noise, subjects and orders (1)", 1)
-    add_flag(parser, "--real-time", f"keep the clock; otherwise time runs {PACE:g} times faster")
+    add_flag(parser, "--real-time", f"keep the clock; otherwise time runs {_PACE:g} times faster")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> int:
     began = time.monotonic()
-    clock = clock_at(1.0 if options.real_time else PACE, LONGEST_STEP)
+    clock = clock_at(1.0 if options.real_time else _PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:
         study = simulated_study(out, options.seed, clock, console)

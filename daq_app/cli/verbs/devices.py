@@ -23,7 +23,7 @@ from drivers.transducer import Transducer, flagged_words
 from sessions.recording.head import identity
 
 EXAMPLE = "daq-app devices probe sim:"
-FLAWS = ("lost", "malformed", "stalled", "saturated", "doubtful", "off_rate", "off_units")  # counts of Health
+_FLAWS = ("lost", "malformed", "stalled", "saturated", "doubtful", "off_rate", "off_units")  # counts of Health
 PROBED = 3.0  # how long a probe listens [s]
 
 
@@ -120,7 +120,7 @@ def _probe(uri: str, console: Console) -> int:
         columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
         rows = [[axis, number(m), number(sd, 2), unit] for axis, m, sd, unit in columns]
         console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
-    flawed = any(getattr(health, name) for name in FLAWS) or not len(readings)
+    flawed = any(getattr(health, name) for name in _FLAWS) or not len(readings)
     return FLAWED if flawed else DONE
 
 

@@ -20,7 +20,7 @@ from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"
 LABELS = "For whoever puts the labels on."  # the first line of their file
-HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
+_HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,7 +95,7 @@ def _show(study: Study, member: Member | None, console: Console) -> None:
     blind = "" if study.key_sha256 is None else ", unblinded" if study.unblinded else ", blinded"
     console.say(f"{study.name}: {study.protocol.name}, {design}{blind}")
     cells = [[row["subject"], str(row["row"]), row["own"] or "–", row["withdrawn"] or "–"] for row in rows]
-    console.say(table(cells, head=HEAD) if cells else "nobody is enrolled")
+    console.say(table(cells, head=_HEAD) if cells else "nobody is enrolled")
 
 
 def _row(study: Study, member: Member) -> dict[str, Any]:

@@ -34,7 +34,7 @@ from solver import Scene
 
 EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
 SCENE_HEAD = "# A finger found by 'daq-app fit-finger'"  # at the head of its scene file
-MU, FACTOR = 0.5, 2.0  # usual ones
+_MU, FACTOR = 0.5, 2.0  # usual ones
 DEEPER = 1.1  # the model goes so much deeper than the stage, should the finger be touched before its onset is seen [-]
 FALL = 0.05  # of the force in a hold, from which on relaxing is named [-]
 AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones before that is a flaw [-]
@@ -46,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     meaning = "scene file with the finger's dimensions (else the session's own)"
     parser.add_argument("--finger", type=Path, metavar="FILE", help=meaning)
     add_number(parser, "--shift", float, (-1e9, 1e9), "added to the log's times (0)", 0.0, "S")
-    meaning = f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly changes)"
-    add_number(parser, "--mu", float, (0.0, 5.0), meaning, MU, "MU")
+    meaning = f"friction of the surface pressed ({_MU:g}, assumed; from 0.3 on the force hardly changes)"
+    add_number(parser, "--mu", float, (0.0, 5.0), meaning, _MU, "MU")
     meaning = f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)"
     add_number(parser, "--prior", float, (1.1, 4.0), meaning, FACTOR, "FACTOR")
     add_flag(parser, "--relaxation", "also how the finger relaxes while the stage stands; --scene gets it")

@@ -20,7 +20,7 @@ from sessions.report.trials import afferent_facts
 from sessions.statistics.multiverse import trial_paths
 from sessions.statistics.scores import score_table
 
-PAGE = "report.html"
+_PAGE = "report.html"
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
 
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
-        page = store_page(recording.folder, PAGE, pages.page(report, drawings))
+        page = store_page(recording.folder, _PAGE, pages.page(report, drawings))
     else:
         page = options.out
         pages.write_report(report, page, drawings)

@@ -26,7 +26,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
-from sessions.recording.head import FORMAT, machine, software_versions, write_certificate
+from sessions.recording.head import SELFTEST_FORMAT, machine, software_versions, write_certificate
 from sessions.recording.schema import LIVE_FILE, event_row
 from sessions.recording.storage import RESERVE, file_system, unsafe
 from sessions.run.runner import Status
@@ -35,12 +35,12 @@ EXAMPLE = "daq-app selftest --out recordings"
 KILLS = 6
 STOPS = 3
 CUTS = 20
-PACE = 20.0  # simulated seconds a real second
+_PACE = 20.0  # simulated seconds a real second
 RUNNING = (0.2, 1.0)  # how long a session runs until it is killed [s]
 DEADLINE = 40.0  # for a recorder that does not answer [s]
 QUOTA = 4 * 2**20  # [bytes]
-RATE = 7000  # of the made-up readings that fill it [Hz]
-PLAN = plan(protocol("sensotact-friction"), "SELFTEST", 1)
+_RATE = 7000  # of the made-up readings that fill it [Hz]
+_PLAN = plan(protocol("sensotact-friction"), "SELFTEST", 1)
 Progress = Callable[[float, str], None]
 AReport = TypeVar("AReport", bound=m.Report)
 
@@ -92,7 +92,7 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
     progress(0.9, "filling the room a session has")
     quota = _try_quota(room / "full")
     return {
-        "format": FORMAT,
+        "format": SELFTEST_FORMAT,
         "utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "sentence": (
             f"On this computer and disk the recorder was killed {KILLS} times, the end of its log was cut off "
@@ -116,7 +116,7 @@ class _WatchedRecorder:
     """A recorder on the simulated bench, and what it sent."""
 
     def __init__(self) -> None:
-        self.recorder = Recorder.start(PACE)
+        self.recorder = Recorder.start(_PACE)
         self.events: list[LoggedEvent] = []
         self.safe = 0  # readings acknowledged
         self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
@@ -198,7 +198,7 @@ def _begin_or_resume(watched: _WatchedRecorder, folder: Path) -> int | None:
     if not folder.exists():
         watched.recorder.send(m.Connect("sim:?seed=1"))
         watched.until(m.Device)
-        watched.recorder.send(m.StartSession(PLAN, str(folder), m.People("simulated people", 1), any_folder=True))
+        watched.recorder.send(m.StartSession(_PLAN, str(folder), m.People("simulated people", 1), any_folder=True))
         watched.until(m.SessionBegun)
         return None
     watched.recorder.send(m.ResumeSession(str(folder)))
@@ -274,16 +274,18 @@ def _try_quota(folder: Path) -> dict[str, Any]:
     """
     clock = RealClock()
     calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
-    info = TransducerInfo("selftest:", "selftest", "SIMULATED", "SELFTEST", True, float(RATE), float(RATE), calibration)
-    writer = _QuotaWriter.create(folder, PLAN, info, provenance(clock), clock=clock, reserve=RESERVE)
+    info = TransducerInfo(
+        "selftest:", "selftest", "SIMULATED", "SELFTEST", True, float(_RATE), float(_RATE), calibration
+    )
+    writer = _QuotaWriter.create(folder, _PLAN, info, provenance(clock), clock=clock, reserve=RESERVE)
     writer.limit(QUOTA)
     took: list[float] = []
     position = 0
     while writer.must_end is None:
-        if position > 100 * RATE:
+        if position > 100 * _RATE:
             raise SelfTestFailed("a session that had no more room went on without a word")
         writer.readings(_numbered_readings(position, clock.now_ns()))
-        position += RATE
+        position += _RATE
         began = time.monotonic()
         writer.commit()
         took.append(time.monotonic() - began)
@@ -301,8 +303,8 @@ def _try_quota(folder: Path) -> dict[str, Any]:
     return {"bytes": QUOTA, "readings": safe, "commit_ms": round(float(np.median(took)) * 1e3, 2)}
 
 
-def _numbered_readings(first: int, received_ns: int, count: int = RATE) -> ReadingBlock:
+def _numbered_readings(first: int, received_ns: int, count: int = _RATE) -> ReadingBlock:
     """Return readings whose numbers follow from their place."""
     i = np.arange(first, first + count, dtype=np.int64)
     raw = np.outer(i, np.arange(1.0, 7.0))
-    return ReadingBlock(i, i, i * 0, i / RATE, np.full(count, received_ns, np.int64), raw)
+    return ReadingBlock(i, i, i * 0, i / _RATE, np.full(count, received_ns, np.int64), raw)

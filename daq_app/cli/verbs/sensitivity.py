@@ -40,8 +40,8 @@ from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
 
 EXAMPLE = "daq-app sensitivity scene.toml --samples 64"
-NAMES = [quantity.name for quantity in QUANTITIES]
-SAMPLES, OF_FINGERS = 32, 64  # usual ones
+_NAMES = [quantity.name for quantity in QUANTITIES]
+_SAMPLES, OF_FINGERS = 32, 64  # usual ones
 # Options that say nothing of a single scene, and their usual values.
 _OF_FINGERS = {"quantity": "sed", "kinematics": "small", "keep": None, "workers": None, "scheduler": None}
 
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="without it: many fingers")
     parser.add_argument("--design", type=Path, metavar="FILE", help="which numbers are varied, and how far")
     fingers = f"{len(sign_map.DESIGN) + 2} N fingers ({OF_FINGERS})"
-    meaning = f"a power of two; N (numbers + 2) solves ({SAMPLES}), or {fingers}"
+    meaning = f"a power of two; N (numbers + 2) solves ({_SAMPLES}), or {fingers}"
     parser.add_argument("--samples", type=int, metavar="N", help=meaning)
     add_seed(parser, "of the samples (0)", largest=math.inf)
     meaning = "answers of many fingers, written as they come: another run goes on"
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    usual = OF_FINGERS if options.scene is None else SAMPLES
+    usual = OF_FINGERS if options.scene is None else _SAMPLES
     samples: int = usual if options.samples is None else options.samples
     if not 2 <= samples <= 4096 or samples & (samples - 1):
         raise WrongValue(f"--samples {samples} is not allowed: a power of two from 2 to 4096")
@@ -105,7 +105,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     """Ask all fingers and print the signs of the slope of one quantity, and the shares of all."""
-    at = NAMES.index(options.quantity)
+    at = _NAMES.index(options.quantity)
     label = QUANTITIES[at].label
     changes = sign_map.single_changes(options.kinematics)
     mapped = sign_map.map_trials(options.kinematics)
@@ -126,14 +126,14 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     published = single["as published"]
     assert not isinstance(published, str)  # a finger that can be
     kept = sign_map.kept_signs(random, published)
-    shares = {name: sign_map.share(column) for name, column in zip(NAMES, kept.T, strict=True)}
+    shares = {name: sign_map.share(column) for name, column in zip(_NAMES, kept.T, strict=True)}
     indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
     without_answer = int(np.isnan(kept[:, at]).sum())
     console.result(
         {
             "quantity": options.quantity,
             "kinematics": options.kinematics,
-            "quantities": NAMES,
+            "quantities": _NAMES,
             "changes": single,
             "map": {"places": sign_map.PLACES, "radii": {f"{radius:g}": one for radius, one in radii.items()}},
             "design": sign_map.DESIGN,

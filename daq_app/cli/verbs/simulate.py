@@ -16,7 +16,7 @@ from daq_app.simulation.wiring import WIRES, load_timetable, serve
 from sessions.plan.protocols.protocol import LARGEST_SEED
 
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
-BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
+_BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
 PORTS = {"rdt_port": 49152, "tcp_port": 49151, "http_port": None}  # of net-ft, where none are given
 OF_ONE_WIRE = {**dict.fromkeys((*PORTS, "rate"), "net-ft"), "baud": "serial-ft"}
 
@@ -39,8 +39,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for name in settings:
         if OF_ONE_WIRE[name] != options.wire:
             raise WrongValue(f"--{name.replace('_', '-')} belongs to {OF_ONE_WIRE[name]}, not to {options.wire}")
-    if settings.get("baud", 9600) not in BAUDS:
-        raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, BAUDS))}")
+    if settings.get("baud", 9600) not in _BAUDS:
+        raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, _BAUDS))}")
     if options.wire == "net-ft":
         settings["ports"] = tuple(settings.pop(name, usual) for name, usual in PORTS.items())
     timetable = None if options.script is None else load_timetable(options.script)

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
-UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (one.shown_unit for one in QUANTITIES)]
+_UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (one.shown_unit for one in QUANTITIES)]
 # What a course tells beside the quantities, and the units of both.
-COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
-COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *UNITS]
+_COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
+COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *_UNITS]
 AUDITS = {
     "equilibrium_x": "forces along the surface are out of balance by",
     "equilibrium_y": "forces across the surface are out of balance by",
@@ -114,7 +114,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
     responses = [
         [one.label, _with_error(*prediction.responses[one.name], factor), unit]
-        for one, (unit, factor) in zip(QUANTITIES, UNITS, strict=True)
+        for one, (unit, factor) in zip(QUANTITIES, _UNITS, strict=True)
     ]
     console.say(table(responses, head=["", "", ""]).lstrip("\n"))
     if course is not None:
@@ -122,7 +122,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     if row is not None and deep is not None:
         console.say(f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; kPa, shares):")
         cells = [
-            [_with_error(*pair, factor) for pair, (_, factor) in zip(zip(*pairs, strict=True), UNITS, strict=True)]
+            [_with_error(*pair, factor) for pair, (_, factor) in zip(zip(*pairs, strict=True), _UNITS, strict=True)]
             for pairs in zip(row.values.T, row.errors.T, strict=True)
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
@@ -141,7 +141,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
 
 
 def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
-    from solver.response.rates import INSTANTS, NUMBERS
+    from solver.response.rates import COURSE_NUMBERS, INSTANTS
 
     parts = zip(INSTANTS, _plain(numbers.at), _plain(errors.at), strict=True)
     rates = zip(NAMES, _plain(numbers.rate.T), _plain(errors.rate.T), strict=True)
@@ -149,7 +149,7 @@ def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[s
         "instants": {
             part: {
                 name: {"value": value, "error": error}
-                for name, value, error in zip((*NUMBERS, *NAMES), values, off, strict=True)
+                for name, value, error in zip((*COURSE_NUMBERS, *NAMES), values, off, strict=True)
             }
             for part, values, off in parts
         },
@@ -161,12 +161,12 @@ def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[s
 
 
 def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
-    labels = [*COURSE, *(one.label for one in QUANTITIES)]
+    labels = [*_COURSE, *(one.label for one in QUANTITIES)]
     ends = "At the ends of the press, of the break-away (full slip) and of the slide:"
     paces = "Mean rates in the press, the break-away and the slide:"
     parts = (
         (ends, numbers.at, errors.at, labels, ""),
-        (paces, numbers.rate, errors.rate, labels[len(COURSE) :], "/s"),
+        (paces, numbers.rate, errors.rate, labels[len(_COURSE) :], "/s"),
     )
     for title, values, off, names, per in parts:
         lines = [

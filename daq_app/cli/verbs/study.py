@@ -19,7 +19,7 @@ import numpy as np
 
 from daq_app.batch.pool import Shelf, visits
 from daq_app.cli.options import (
-    LARGEST_SEED,
+    STUDY_SEED_END,
     add_analysis,
     add_number,
     add_seed,
@@ -41,7 +41,7 @@ from sessions.statistics.power import TWIN, AssumedEffects, Recovery, power, rec
 from sessions.statistics.visit import VisitOptions, exclusions_in
 from sessions.strokes.stroke import FIXED
 
-SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # of the designs whose power is simulated
+_SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # of the designs whose power is simulated
 # Likewise of those that tell quantities apart, or do not: one such study takes a thousand times as long.
 RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
 
@@ -65,14 +65,14 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
     effects = _assumed_effects(options.power)
     powers = power(
-        effects, SUBJECTS, SURFACES, options.studies, options.seed, lambda part: console.progress(part, "designs")
+        effects, _SUBJECTS, SURFACES, options.studies, options.seed, lambda part: console.progress(part, "designs")
     )
     recoveries = _recovery(options, effects, console)
     designs = [{**asdict(one), "power": one.share} for one in powers]
     console.result({"planted": asdict(effects), "designs": designs, "recovery": msgspec.to_builtins(recoveries)})
     rows = [
         [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in powers if one.subjects == people)]
-        for people in SUBJECTS
+        for people in _SUBJECTS
     ]
     values = ", ".join(f"{one.name} = {getattr(effects, one.name):g}" for one in fields(effects))
     console.say(f"Assumed: {values}. The usual values are not measured.")
@@ -144,7 +144,7 @@ EXAMPLE = "daq-app study recordings --out results"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
     meaning = "make a study of ten simulated subjects instead"
-    add_number(parser, "--synthetic", int, (0, LARGEST_SEED), meaning, metavar="SEED")
+    add_number(parser, "--synthetic", int, (0, STUDY_SEED_END), meaning, metavar="SEED")
     meaning = "page, table and results (FOLDER/pooled); with --synthetic the study too"
     parser.add_argument("--out", type=Path, metavar="DIR", help=meaning)
     add_shared(
@@ -224,7 +224,7 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     files = {
         "page": ("study.html", pages.study_page(study, name)),
         "table": (pages.TRIALS, pages.trials_csv(study)),
-        "columns": (pages.COLUMNS, pages.columns_csv(study)),
+        "columns": (pages.TRIAL_COLUMNS, pages.columns_csv(study)),
         "numbers": ("study.json", json_text(study.to_dict())),
         "rivals": ("rivals.csv", pages.rivals_csv(study)),
     }

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from sessions.report.contents import PredictionFinding, Report
 from sessions.report.figures.courses import (
-    MU,
+    MU_COURSE,
     NORMAL,
-    SPEED,
+    SPEED_COURSE,
     TANGENTIAL,
     StrokeQuantity,
     course_panel,
@@ -76,8 +76,8 @@ _OF_THE_MODEL = {"finger", "response", "relation"}
 _PANELS: Mapping[str, Callable[[Report], Panels]] = {
     "course": lambda report: () if report.course is None else (course_panel(report.course, report.strokes),),
     "scores": lambda report: map(score_panel, report.experiments),
-    "friction": _of_strokes(MU),
-    "speed": _of_strokes(SPEED),
+    "friction": _of_strokes(MU_COURSE),
+    "speed": _of_strokes(SPEED_COURSE),
     "forces": _of_strokes(NORMAL, TANGENTIAL),
     "finger": _fingers,
     "response": lambda report: (response_panel(own, name) for name, own in _predictions_of(report).items()),

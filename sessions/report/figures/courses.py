@@ -97,15 +97,15 @@ NORMAL = StrokeQuantity("normal-force", "normal", "normal_force", "N [N]", "norm
 TANGENTIAL = StrokeQuantity(
     "tangential-force", "tangential", "tangential_force", "T [N]", "tangential force T [N]", "T", VERMILLION
 )
-MU = StrokeQuantity("friction", "mu", "mu_dynamic", "mu [-]", "µ = T / N [–]", "µ", PURPLE)
-SPEED = StrokeQuantity(
+MU_COURSE = StrokeQuantity("friction", "mu", "mu_dynamic", "mu [-]", "µ = T / N [–]", "µ", PURPLE)
+SPEED_COURSE = StrokeQuantity(
     "speed", "speed", "speed", "speed [mm/s]", "speed of the centre of pressure [mm/s]", "speed", GREY
 )
 
 
 def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str) -> Panel | None:
     """Return a quantity of an experiment's strokes since contact, None without curves; refused speeds stay out."""
-    if of is SPEED:
+    if of is SPEED_COURSE:
         strokes = [stroke for stroke in strokes if stroke.speed is not None]
     drawn = sheet(328, 290)
     (axes,) = drawn.axes
@@ -113,7 +113,7 @@ def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experimen
     rows = _draw(drawn, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
     if not rows:
         return None
-    if of is SPEED:
+    if of is SPEED_COURSE:
         fastest = max(stroke.speed for stroke in strokes if stroke.speed is not None and stroke.trace is not None)
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))

@@ -17,9 +17,9 @@ from sessions.report.contents import Field
 from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, rows_of, sheet
 
 # Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.
-COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
+_COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
 LONGEST_ARROW = 1.5  # of the tractions in the picture [mm]
-ARROWS = 22  # at most
+_ARROWS = 22  # at most
 NO_SED = "No node of this finger has a finite SED."
 HALF_WIDTH = 4.6  # of the close view [mm]
 _ARROW: dict[str, Any] = {
@@ -108,7 +108,7 @@ def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourS
         return None
     known = np.where(np.isfinite(sed), sed, 0.0)  # a node without an SED lies in no triangle that is drawn
     mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=missing)
-    filled = axes.tricontourf(mesh, known, levels=levels, cmap=COLOURS, extend="max")
+    filled = axes.tricontourf(mesh, known, levels=levels, cmap=_COLOURS, extend="max")
     filled.set_edgecolor("face")  # else hairlines of the page show between the levels
     filled.set_linewidth(0.3)
     return filled
@@ -147,7 +147,7 @@ def _tractions(drawn: Sheet, field: Field) -> None:
     if strongest == 0.0:  # it touches, and nothing presses yet
         return
     scale = LONGEST_ARROW / strongest
-    for i in touching[:: max(1, -(-len(touching) // ARROWS))]:
+    for i in touching[:: max(1, -(-len(touching) // _ARROWS))]:
         vector = (scale * skin.traction[i], scale * skin.pressure[i])
         text = f"pressure {1e3 * skin.pressure[i]:.1f} kPa, traction {1e3 * skin.traction[i]:.1f} kPa"
         start = (skin.x[i] - vector[0], -0.08 - vector[1])

@@ -87,13 +87,13 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     return tuple(plate for plate in plates if plate.panels)
 
 
-MOST = 400  # points that tell their values each on their own
+_MOST = 400  # points that tell their values each on their own
 
 
 def _relation(one: DescriptorFindings, shown: ShownResponse) -> Panel:
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
-    each = len(one.points) <= MOST  # of more points only hovering names the subject
+    each = len(one.points) <= _MOST  # of more points only hovering names the subject
     for subject in dict.fromkeys(point[0] for point in one.points):
         own = sorted((shown.factor * value, score, index) for of, index, value, score in one.points if of == subject)
         axes.plot([x for x, _, _ in own], [y for _, y, _ in own], "-", color=GREY, alpha=0.35, linewidth=0.7)
@@ -274,7 +274,7 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
     return max(-1.0, float(low)), min(1.0, float(high if high > low else low + 0.1))
 
 
-COLOURS = (PURPLE, GREEN, VERMILLION)
+_COLOURS = (PURPLE, GREEN, VERMILLION)
 Value = float | None
 
 
@@ -292,7 +292,7 @@ def comparison_panel(
                 axes.plot([place, place], [first, second], color=GREY, linewidth=1.0)
             for value, filled, session in ((first, False, sessions[0]), (second, True, sessions[1])):
                 if value is not None:
-                    face = COLOURS[at % len(COLOURS)] if filled else "white"
+                    face = _COLOURS[at % len(_COLOURS)] if filled else "white"
                     note = drawn.note(f"{stimulus}, {session}: {name} {value:.4g}")
                     axes.plot([place], [value], "s" if filled else "o", ms=5.0, mfc=face, mec=INK, mew=0.7, gid=note)
         axes.set_ylabel(name)

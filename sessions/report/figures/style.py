@@ -31,8 +31,8 @@ INK = "#1a1a1a"
 GREY = "#767676"
 PALE = "#d9d9d9"
 
-TEXT = 8.5  # [pt]
-POINTS = 72.0  # in an inch: SVG is laid out in them
+_TEXT = 8.5  # [pt]
+_POINTS = 72.0  # in an inch: SVG is laid out in them
 DOTS = 220  # of a picture in pixels, in an inch
 _PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
 _NOTE: ContextVar[str] = ContextVar("note", default="")  # likewise
@@ -45,13 +45,13 @@ _LOOK: dict[Any, Any] = {
     "svg.fonttype": "none",
     "text.parse_math": False,  # a name may hold dollar signs
     "text.hinting": "no_hinting",  # a reader's letters are no narrower for a coarse screen, as those laid out would be
-    "font.size": TEXT,
-    "axes.titlesize": TEXT,
+    "font.size": _TEXT,
+    "axes.titlesize": _TEXT,
     "axes.titlelocation": "left",
     "axes.titlepad": 5.0,
-    "axes.labelsize": TEXT,
-    "xtick.labelsize": TEXT - 0.5,
-    "ytick.labelsize": TEXT - 0.5,
+    "axes.labelsize": _TEXT,
+    "xtick.labelsize": _TEXT - 0.5,
+    "ytick.labelsize": _TEXT - 0.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
@@ -140,7 +140,7 @@ def sheet(
     share_x: bool = False,
 ) -> Sheet:
     """Return an empty picture of that size [CSS px, 96 an inch] with axes in rows and columns; call inside `look`."""
-    figure = Figure(figsize=(width / 96, height / 96), dpi=POINTS, layout="constrained")
+    figure = Figure(figsize=(width / 96, height / 96), dpi=_POINTS, layout="constrained")
     grid = figure.add_gridspec(len(heights), len(widths), height_ratios=heights, width_ratios=widths)
     return Sheet(figure, tuple(grid.subplots(sharex=share_x, squeeze=False).flat))
 
@@ -263,7 +263,7 @@ def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "
     def place() -> None:
         height = axes.get_window_extent().height / drawn.figure.dpi * 72  # [pt]
         (low, high), (left, right) = axes.get_ylim(), axes.get_xlim()
-        gap = 1.3 * TEXT * (high - low) / height
+        gap = 1.3 * _TEXT * (high - low) / height
         places = spread([label.y for label in labels], gap, low, high - (gap if head else 0.0))
         end = left + (AT - 0.01) * (right - left)
         for label, name, line, y in zip(labels, names, lines, places, strict=True):

@@ -20,9 +20,9 @@ from solver.verification.hard_cases.outcome import Outcome, agree, power
 from solver.verification.methods import Kinematics
 from solver.verification.published.bodies import distort
 
-DEPTH = 1.5  # [mm]
+_DEPTH = 1.5  # [mm]
 STIFF_LAYERS = 2  # of elements
-TISSUES = ((0.136, 0.48), (0.08, 0.48), (0.034, 0.48))  # Young's modulus [MPa] and Poisson's ratio
+_TISSUES = ((0.136, 0.48), (0.08, 0.48), (0.034, 0.48))  # Young's modulus [MPa] and Poisson's ratio
 Finger = LinearFinger | FiniteFinger
 
 
@@ -57,31 +57,31 @@ def _sed(finger: Finger, state: EquilibriumState) -> float:
 
 def _whole_path(count: int) -> list[LoadState]:
     """Return a press of `count` even steps and a slide of as many, at least ten."""
-    press = [LoadState(depth, 0.3, 0.01) for depth in np.linspace(0.0, DEPTH, count + 1)[1:].tolist()]
+    press = [LoadState(depth, 0.3, 0.01) for depth in np.linspace(0.0, _DEPTH, count + 1)[1:].tolist()]
     slide = [
-        LoadState(DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()
+        LoadState(_DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()
     ]
     return press + slide
 
 
 def _beginning(count: int) -> list[LoadState]:
     """Return a press and a slide with up to twenty first steps of 1/`count` of the way, then long ones."""
-    down = [DEPTH * (i + 1) / count for i in range(min(count, 20))]
+    down = [_DEPTH * (i + 1) / count for i in range(min(count, 20))]
     along = [8.0 * (i + 1) / count for i in range(min(count, 20))]
-    down += [DEPTH * part for part in (0.25, 0.5, 0.75, 1.0) if DEPTH * part > down[-1]]
+    down += [_DEPTH * part for part in (0.25, 0.5, 0.75, 1.0) if _DEPTH * part > down[-1]]
     along += [8.0 * part for part in np.linspace(0.05, 1.0, 20).tolist() if 8.0 * part > along[-1]]
     return [LoadState(depth, 0.3, 0.01) for depth in down] + [
-        LoadState(DEPTH, 0.3, 0.01, travel=travel) for travel in along
+        LoadState(_DEPTH, 0.3, 0.01, travel=travel) for travel in along
     ]
 
 
 BODIES: dict[Kinematics, Bodies] = {
     "small": Bodies(
-        _linear, lambda fineness: LinearFinger.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=4.0)),
+        _linear, lambda fineness: LinearFinger.of(scene(STICKINESS[0]), Sizing(fineness, _DEPTH, margin=4.0)),
         8.0, -1, (0.005, 25, 200, 0.05), _whole_path, "1 to 10,000 steps", 5, 1e-10, 1e-9, 1e-12,
     ),
     "finite": Bodies(
-        _finite, lambda fineness: FiniteFinger.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=3.0)),
+        _finite, lambda fineness: FiniteFinger.of(scene(STICKINESS[0]), Sizing(fineness, _DEPTH, margin=3.0)),
         6.0, 1, (0.03009, 8, 24, 0.4), _beginning, "steps of 1 to 1/10,000 of the way", 3, 1e-8, 1e-7, 1e-4,
     ),
 }  # fmt: skip
@@ -99,9 +99,9 @@ def _force(newton: Newton, depth: float, sense: int = -1) -> float:
 def reversal(bodies: Bodies) -> Outcome:
     """Slide forth, back and forth again: full slip must recur, and occur in the other direction."""
     tau, press, leg, step = bodies.back_and_forth
-    finger, load = bodies.finger(bodies.fineness), LoadState(DEPTH, 0.44, tau)
+    finger, load = bodies.finger(bodies.fineness), LoadState(_DEPTH, 0.44, tau)
     senses = [bodies.sense, -bodies.sense, bodies.sense]
-    down = [load._replace(depth=DEPTH * (i + 1) / press) for i in range(press)]
+    down = [load._replace(depth=_DEPTH * (i + 1) / press) for i in range(press)]
     travels = np.cumsum(np.repeat(step * np.array(senses), leg)).tolist()
     states = list(march(finger.newton, down + [load._replace(travel=travel) for travel in travels]))
     seds = [_sed(finger, state) for state in states[press + leg - 1 :: leg]]
@@ -142,7 +142,7 @@ def distorted_finger(bodies: Bodies) -> Outcome:
     """Move every free inner node of the finger's mesh by 0.45 of its distance to the next, at random."""
     geometry = bodies.finger(8.0).geometry
     meshes = [distort(geometry.mesh, 0.45, seed, geometry.whole) for seed in range(bodies.meshes)]
-    forces = [_force(bodies.newton(mesh, TISSUES), DEPTH, bodies.sense) for mesh in (geometry.mesh, *meshes)]
+    forces = [_force(bodies.newton(mesh, _TISSUES), _DEPTH, bodies.sense) for mesh in (geometry.mesh, *meshes)]
     spread = max(abs(f / forces[0] - 1) for f in forces)
     flaw = "" if spread < 0.01 else f"the force changes by {spread:.1g}"
     summary = f"N {forces[0]:.4g} undistorted; {len(meshes)} distorted meshes differ by {percent(spread)} at most"

@@ -11,7 +11,7 @@ from solver.scene import Scene
 from solver.verification.hard_cases.outcome import Outcome, of_answer
 
 RESOLVABLE = 1e-3  # indentation with many elements in contact, which is still far smaller than the epidermis [mm]
-MODEL = 0.005  # change of both laws by the rest of the finger, from there to lighter touches
+_MODEL = 0.005  # change of both laws by the rest of the finger, from there to lighter touches
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ def of_light_touch(scene: Scene) -> Outcome:
     far = [
         f"{name} {abs(number / exact - 1.0):.1%} from Hertz's"
         for name, number, exact, off in pairs
-        if abs(number - exact) > off * number + MODEL * exact
+        if abs(number - exact) > off * number + _MODEL * exact
     ]
     flaws = ", ".join(filter(None, [outcome.flaw, *far]))
     summary = (

@@ -12,9 +12,9 @@ from solver.response.solution import ERROR_UNKNOWN, solve_many
 from solver.scene import Scene
 
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # audits of balance
-LIMITS = ("penetration", "tension", "cone_violation")
+_LIMITS = ("penetration", "tension", "cone_violation")
 UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest residual, by the forces; largest excess over a law, by its limit
-NOTHING = 1.0  # estimated error of an answer without any accuracy
+_NOTHING = 1.0  # estimated error of an answer without any accuracy
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +46,12 @@ def _of_refusal(failure: SolveFailure) -> Outcome:
 def _of_answer(answer: Prediction) -> Outcome:
     checks = answer.audits
     flaws = [name for name in BALANCE if name in checks and not checks[name] < UNBALANCED]
-    flaws += [name for name in LIMITS if not checks[name] < EXCEEDED]
+    flaws += [name for name in _LIMITS if not checks[name] < EXCEEDED]
     if answer.scene.solve.kinematics == "finite" and not checks["smallest_det_F"] > 0.0:
         flaws.append("smallest_det_F")
     if not answer.sed_ending > 0.0:
         flaws.append("sed_ending")
-    if not 0.0 < answer.error_estimate < NOTHING and ERROR_UNKNOWN not in answer.warnings:
+    if not 0.0 < answer.error_estimate < _NOTHING and ERROR_UNKNOWN not in answer.warnings:
         flaws.append("error_estimate")
     numbers = (answer.sed_ending, answer.sed_point, answer.normal_force, answer.tangential_force, answer.error_estimate)
     balance = max(checks[name] for name in BALANCE if name in checks)

@@ -13,7 +13,7 @@ from solver.contact import OPEN, SLIP, last_edge
 from solver.equilibrium import Newton
 from solver.mesh import Q2P1, Mesh, grid_mesh, local_coordinates, with_middles
 
-NONE: Indices = np.zeros(0, np.int64)
+_NONE: Indices = np.zeros(0, np.int64)
 
 
 def grade(finest: float, growth: float, zone: float, end: float) -> Array:
@@ -35,13 +35,13 @@ def join(grids: Sequence[Array]) -> Mesh:
     No node is held and none may touch.
     """
     clockwise = [g if _clockwise(g) else g[::-1] for g in grids]
-    meshes = [grid_mesh(g, _one_region(g), slice(0, 1), NONE) for g in clockwise]
+    meshes = [grid_mesh(g, _one_region(g), slice(0, 1), _NONE) for g in clockwise]
     nodes = np.concatenate([m.nodes for m in meshes])
     starts = np.cumsum([0, *(len(m.nodes) for m in meshes[:-1])])
     elements = np.concatenate([m.elements + s for m, s in zip(meshes, starts, strict=True)])
     _, first, place = np.unique(np.round(nodes, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
     elements = place.ravel()[elements]
-    return Mesh(nodes[first], elements, np.zeros(len(elements), np.int64), NONE, NONE)
+    return Mesh(nodes[first], elements, np.zeros(len(elements), np.int64), _NONE, _NONE)
 
 
 def chain(on: NDArray[np.bool_], along: Array) -> Indices:

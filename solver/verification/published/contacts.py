@@ -31,11 +31,11 @@ from solver.verification.published.bodies import (
 )
 
 ELEMENT: dict[Kinematics, float] = {"small": 1 / 30, "finite": 1 / 10}  # of the half-width
-WIDE: dict[Kinematics, float] = {"small": 100.0, "finite": 30.0}  # of the block to each side, in half-widths
+_WIDE: dict[Kinematics, float] = {"small": 100.0, "finite": 30.0}  # of the block to each side, in half-widths
 RADIUS = 1000.0  # in half-widths: the theory's limit of light loads
 DEPTH = 2.3e-3  # of the light contact at finite strain, whose half-width is then 1.1
-YOUNG = 0.08  # [MPa]
-NONE = LoadState(0.0, 0.0, sense=-1)
+_YOUNG = 0.08  # [MPa]
+_NONE = LoadState(0.0, 0.0, sense=-1)
 
 
 def _half_plane(finest: float, wide: float, radius: float, unit: float = 1.0) -> Mesh:
@@ -46,8 +46,8 @@ def _half_plane(finest: float, wide: float, radius: float, unit: float = 1.0) ->
 
 def press(finest: float, nu: float) -> float:
     """Return the force [N/mm] on a half-plane with elements of size `finest`, pressed lightly, by 1e-3 half-widths."""
-    body = LinearBody.of(_half_plane(finest, 20.0, RADIUS), [Hooke(YOUNG, nu)])
-    return float(solve_full_slip(Newton(body.condensed), NONE._replace(depth=1e-3)).force[1])
+    body = LinearBody.of(_half_plane(finest, 20.0, RADIUS), [Hooke(_YOUNG, nu)])
+    return float(solve_full_slip(Newton(body.condensed), _NONE._replace(depth=1e-3)).force[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +76,11 @@ def _compare(body: LinearBody, slide: EquilibriumState, half_width: float, peak:
 
 def hertz(young: float, nu: float, radius: float, load: float, half_width: float, peak: float) -> Hertz:
     """Return the results for a load whose closed form has `half_width` [mm] and `peak` [MPa]."""
-    mesh = _half_plane(ELEMENT["small"], WIDE["small"], np.inf, half_width)
+    mesh = _half_plane(ELEMENT["small"], _WIDE["small"], np.inf, half_width)
     body = LinearBody.of(mesh, [Hooke(young, nu)])
     body.condensed.rest[:, 1] = mesh.nodes[mesh.skin, 0] ** 2 / (2 * radius)
     newton = Newton(body.condensed)
-    slide = slide_from_guess(newton, NONE, touching_within(newton, 1.05 * half_width), load)
+    slide = slide_from_guess(newton, _NONE, touching_within(newton, 1.05 * half_width), load)
     return _compare(body, slide, half_width, peak)
 
 
@@ -92,9 +92,9 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Hertz:
     traction = np.zeros((len(top), 2))
     traction[:, 1] = -peak * np.sqrt(np.clip(1 - (mesh.nodes[top, 0] / half_width) ** 2, 0, None))
     loads = edge_load(mesh, top, traction)
-    body = LinearBody.of(mesh, [Hooke(YOUNG, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
+    body = LinearBody.of(mesh, [Hooke(_YOUNG, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
     newton = Newton(body.condensed)
-    slide = slide_from_guess(newton, NONE, touching_within(newton, 0.9 * half_width))
+    slide = slide_from_guess(newton, _NONE, touching_within(newton, 0.9 * half_width))
     approach = -float(body.displacement(slide.u)[np.argmin(np.hypot(x, y)), 1])
     return replace(_compare(body, slide, half_width, peak), approach=approach)
 
@@ -154,14 +154,14 @@ class LightContact:
 @cache
 def light(kinematics: Kinematics = "small", nu: float = 0.4999, wide: float | None = None) -> LightContact:
     """Return the light contact; `wide` half-widths of body to each side."""
-    mesh = _half_plane(ELEMENT[kinematics], wide or WIDE[kinematics], RADIUS)
-    x, plane = mesh.nodes[mesh.skin, 0], YOUNG / (1 - nu**2)
+    mesh = _half_plane(ELEMENT[kinematics], wide or _WIDE[kinematics], RADIUS)
+    x, plane = mesh.nodes[mesh.skin, 0], _YOUNG / (1 - nu**2)
     if kinematics == "small":
-        body = LinearBody.of(mesh, [Hooke(YOUNG, nu)])
+        body = LinearBody.of(mesh, [Hooke(_YOUNG, nu)])
         newton = Newton(body.condensed)
-        state = slide_from_guess(newton, NONE, touching_within(newton, 1.05), np.pi * plane / (4 * RADIUS))
+        state = slide_from_guess(newton, _NONE, touching_within(newton, 1.05), np.pi * plane / (4 * RADIUS))
     else:
-        body = FiniteBody.of(mesh, [NeoHooke(YOUNG, nu)])
+        body = FiniteBody.of(mesh, [NeoHooke(_YOUNG, nu)])
         newton = Newton(body.condensed)
         state = solve_full_slip(newton, LoadState(DEPTH, 0.0, sense=1), tolerance=1e-12)
     load, length = float(state.normal.sum()), np.zeros(len(x))

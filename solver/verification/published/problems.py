@@ -34,7 +34,7 @@ class Problem:
 
 
 # E, nu [MPa], R [mm], P [N/mm], and the closed form's a [mm] and p0 [MPa]
-HERTZ = (
+HERTZ_PROBLEMS = (
     ("Hertz, R 5, P 0.01", 0.08, 0.48, 5.0, 0.01, 0.782578, 0.008135),
     ("Hertz, R 5, P 0.05", 0.08, 0.48, 5.0, 0.05, 1.749897, 0.018190),
     ("Hertz, fat, P 0.02", 0.034, 0.48, 5.0, 0.02, 1.697650, 0.007500),
@@ -45,11 +45,11 @@ JOHNSON, KONTER = "Johnson 1985, ch. 4", "Konter 2005, FENET-UNOTT-DLE-09"
 MINDLIN = "Cattaneo 1938, Mindlin 1949"
 # E, nu, F, and u_y at the right edge's middle and upper end; plane stress as the equivalent plane strain. Published
 # numbers have too few digits for our tolerance: these are from another code's meshes up to 128 x 128
-REFINED = "another code, 128 x 128"
+_REFINED = "another code, 128 x 128"
 COOK = (
-    ("Cook's membrane, plane stress", f"{REFINED}; 23.96 in Cook 1989", 0.9375, 0.25, 1.0, 23.967, 25.18),
-    ("Cook's membrane, nu 0.4999", f"{REFINED}; 7.7 and 8.1 published", 240.565, 0.4999, 100.0, 7.693, 8.072),
-    ("Cook's membrane, nu 0.499999975", f"{REFINED}; 16.442 published", 1.12499998, 0.499999975, 1.0, 16.447, None),
+    ("Cook's membrane, plane stress", f"{_REFINED}; 23.96 in Cook 1989", 0.9375, 0.25, 1.0, 23.967, 25.18),
+    ("Cook's membrane, nu 0.4999", f"{_REFINED}; 7.7 and 8.1 published", 240.565, 0.4999, 100.0, 7.693, 8.072),
+    ("Cook's membrane, nu 0.499999975", f"{_REFINED}; 16.442 published", 1.12499998, 0.499999975, 1.0, 16.447, None),
 )
 # x, z, sigma_x, sigma_z, tau_xz by p0 in units of a (quadrature of the Flamant kernels)
 BELOW = {
@@ -68,7 +68,10 @@ BELOW = {
 }
 CAPPED = ((1.0, 1.0), (0.8, 0.895912), (0.6, 0.715243), (0.4, 0.495368))  # k, Q/(mu P)
 # Q/(mu P) of partial slip; elements at finite strain are three times as long
-PARTS: dict[Kinematics, tuple[float, ...]] = {"small": (0.1, 0.25, 0.5, 0.75, 0.9, 0.99), "finite": (0.25, 0.5, 0.75)}
+LOADS_BY: dict[Kinematics, tuple[float, ...]] = {
+    "small": (0.1, 0.25, 0.5, 0.75, 0.9, 0.99),
+    "finite": (0.25, 0.5, 0.75),
+}
 WHERE: dict[Kinematics, str] = {"small": "", "finite": " at finite strain"}
 SECOND_MOMENT = "half-width a, from <x^2> of the pressure [mm]"
 
@@ -112,7 +115,7 @@ def membranes() -> Iterator[Problem]:
 
 def hertz() -> Iterator[Problem]:
     """Yield half-width and peak pressure under the gap of a parabola."""
-    for problem, young, nu, radius, load, half_width, peak in HERTZ:
+    for problem, young, nu, radius, load, half_width, peak in HERTZ_PROBLEMS:
         numbers = contacts.hertz(young, nu, radius, load, half_width, peak)
         source = KONTER if radius == 50.0 else JOHNSON
         yield _row(problem, source, SECOND_MOMENT, half_width, numbers.half_width, 0.001)
@@ -151,7 +154,7 @@ def light_finite() -> Iterator[Problem]:
 def partial_slip(kinematics: Kinematics = "small") -> Iterator[Problem]:
     """Yield half the width of the stick zone and the traction in its middle, under the pressure of nu = 0.4999."""
     light, mu = contacts.light(kinematics), 0.3
-    for part in PARTS[kinematics]:
+    for part in LOADS_BY[kinematics]:
         state = light.shear(mu, part)
         problem, half = f"partial slip{WHERE[kinematics]}, Q/(mu P) {part:g}", math.sqrt(1 - part)
         traction = -light.at_middle(state.tangential) / (mu * light.peak)

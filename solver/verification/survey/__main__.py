@@ -13,7 +13,7 @@ import msgspec
 from solver.verification.marked_page import fill_marks
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES
-from solver.verification.survey.answers import SURFACES, Row, report, solve, table
+from solver.verification.survey.answers import SURFACE_SET, Row, report, solve, table
 
 Key = tuple[str, int, Kinematics]
 CAPTION = (
@@ -46,7 +46,7 @@ def rows(keys: Sequence[Key], keep: Path | None, solve: Callable[[str, int, Kine
 def main() -> None:
     """Solve and print."""
     parser = ArgumentParser(prog="python -m solver.verification.survey", description="Judge error estimates.")
-    parser.add_argument("--family", choices=(*FAMILIES, SURFACES), default="axis", help="of scenes")
+    parser.add_argument("--family", choices=(*FAMILIES, SURFACE_SET), default="axis", help="of scenes")
     parser.add_argument("--kinematics", choices=("small", "finite"), default="small")
     parser.add_argument("--scenes", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")

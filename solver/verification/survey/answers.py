@@ -16,9 +16,9 @@ from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import random_scene, surface_set
 from solver.verification.survey.statistics import HEADER, TOLERANCES, judgement, misses
-from solver.verification.truth import NUMBERS, mean_and_doubt
+from solver.verification.truth import TRUE_NUMBERS, mean_and_doubt
 
-SURFACES = "surfaces"  # the set of three surfaces solved together, whose differences are relative to their range
+SURFACE_SET = "surfaces"  # the set of three surfaces solved together, whose differences are relative to their range
 BY_TOLERANCE = 5.0  # tolerance of a difference by that of a number
 
 
@@ -35,7 +35,7 @@ class Row:
 
 def solve(family: str, number: int, kinematics: Kinematics) -> Row:
     """Return the answers of one scene with their estimates and true errors."""
-    together = family == SURFACES
+    together = family == SURFACE_SET
     scenes = surface_set(number, kinematics) if together else [random_scene(family, number, kinematics)]
     estimates: list[Estimate] = []
     refusals: list[str] = []
@@ -68,7 +68,7 @@ def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) 
     error, doubt = apart(sed, solves[:, :, 0])
     first = answers[0]
     title, estimate = first.scene.title, contrast_error(answers).share
-    return Estimate(first.scene.solve.kinematics, title, NUMBERS[0], tolerance, first.dofs, estimate, error, doubt)
+    return Estimate(first.scene.solve.kinematics, title, TRUE_NUMBERS[0], tolerance, first.dofs, estimate, error, doubt)
 
 
 def apart(numbers: Array, solves: Array) -> tuple[float, float]:

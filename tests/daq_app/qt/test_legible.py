@@ -27,7 +27,7 @@ from daq_app.analyst.state import selected_row
 from daq_app.qt import tokens
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.finger_canvas import FingerCanvas
-from daq_app.qt.live_panel import AXES, PLOTS
+from daq_app.qt.live_panel import AXIS_PLOTS, PLOTS
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.main_window import MainWindow
 from daq_app.qt.plots import ZoomedPlot
@@ -378,7 +378,7 @@ def test_the_words_of_a_lift_and_of_the_next_onset_never_lie_on_each_other():
 @pytest.mark.usefixtures("application")
 @pytest.mark.parametrize("height", [90, 160])
 def test_the_names_of_a_plot_hide_nothing_of_its_curves(height):
-    plot = LivePlot(*AXES[1])  # three dashed torques, named at the left end
+    plot = LivePlot(*AXIS_PLOTS[1])  # three dashed torques, named at the left end
     plot.resize(240, height)
     time = np.linspace(0.0, 10.0, 200)
     values = np.zeros((len(CHANNELS), 200))

@@ -24,7 +24,7 @@ from session_messages import (
 from daq_app.recorder import messages as m
 from daq_app.window.course_state import Judged, Quality
 from daq_app.window.state import BenchState
-from daq_app.window.view_course import KINDS, course_view, inspection, tiles, verdict
+from daq_app.window.view_course import TILES, course_view, inspection, tiles, verdict
 from sessions.plan.plan import Visibility
 from sessions.run import steps
 
@@ -47,7 +47,7 @@ def test_each_trial_is_one_tile_with_a_state_of_its_own():
 
 
 def test_no_two_states_share_a_shape_or_words():
-    assert len({mark for mark, _ in KINDS.values()}) == len(KINDS)
+    assert len({mark for mark, _ in TILES.values()}) == len(TILES)
     view = tiles(after(*SCORE, Judged(1, 1, GOOD), *KEPT).session)
     assert [tile.words for tile in view[:3]] == [
         f"trial 1, {FIRST.stimulus.code}: done",

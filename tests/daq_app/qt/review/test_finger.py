@@ -17,7 +17,7 @@ from qt_events import wheel
 from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import rows, selected_row
-from daq_app.qt.plots import ALL_TRIALS, FIXED, OWN, FieldBar
+from daq_app.qt.plots import ALL_TRIALS, FIXED_RANGE, OWN, FieldBar
 from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame
 from tests.sessions.report_example import example
 
@@ -126,7 +126,7 @@ def test_a_line_that_is_drawn_with_shift_plots_the_field_along_it(application, w
 def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees_them(application, window):
     canvas, _ = small_finger(application, window)
     fields = window.model.fields
-    fields.ranges.setCurrentIndex(FIXED)
+    fields.ranges.setCurrentIndex(FIXED_RANGE)
     fields.low.setValue(1.0)
     fields.high.setValue(2.5)
     for _ in range(2):
@@ -134,7 +134,7 @@ def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees
         QTest.keyClick(window.model.player, Qt.Key.Key_Left)
     canvas._bar.region.setRegion((63, 207))  # as a handle of the colour bar is dragged, a quarter of the way to its end
     canvas._bar.region.sigRegionChangeFinished.emit(canvas._bar.region)
-    assert fields.mode == FIXED
+    assert fields.mode == FIXED_RANGE
     assert canvas.look.range == pytest.approx((1.0, fields.high.value()), abs=0.015)
     assert fields.high.value() > 2.5
     fields.high.setValue(2.5)
@@ -155,7 +155,7 @@ def test_an_end_of_the_colours_is_typed_with_a_point_or_a_comma_in_every_country
     QLocale.setDefault(QLocale(locale))
     try:
         fields = FieldBar()
-        fields.ranges.setCurrentIndex(FIXED)
+        fields.ranges.setCurrentIndex(FIXED_RANGE)
         fields.high.lineEdit().selectAll()
         QTest.keyClicks(fields.high, typed)
         QTest.keyClick(fields.high, Qt.Key.Key_Return)
