@@ -145,7 +145,7 @@ def test_a_cable_pulled_again_and_again_costs_a_trial_each_time_and_the_session_
     box = NetFtBox(Bench(7), clock)
     box.start()
     numbers = dict(pair.split("=") for pair in box.uri.partition("?")[2].split("&"))
-    ports = {f"{name}_port": int(port) for name, port in numbers.items()}
+    ports = tuple(int(numbers[name]) for name in ("rdt", "tcp", "http"))
     folder = tmp_path / "s"
     with Recorder.start() as recorder:
         desk = Desk(recorder, {AskStroke: lambda _: recorder.send(Redo("nobody strokes this bench"))})
@@ -153,7 +153,7 @@ def test_a_cable_pulled_again_and_again_costs_a_trial_each_time_and_the_session_
         desk.until(Device)
         box.close()
         desk.until(LinkDown)
-        box = NetFtBox(Bench(7), clock, **ports)
+        box = NetFtBox(Bench(7), clock, ports=ports)
         box.start()
         assert desk.until(LinkBack).same
         recorder.send(StartSession(PLAN, str(folder)))
@@ -162,7 +162,7 @@ def test_a_cable_pulled_again_and_again_costs_a_trial_each_time_and_the_session_
             box.close()
             report = desk.until(SessionEnded)
             assert (report.end.cause, report.resumable) == ("device", True)
-            box = NetFtBox(Bench(7), clock, **ports)
+            box = NetFtBox(Bench(7), clock, ports=ports)
             box.start()
             assert desk.until(LinkBack).same
             recorder.send(ResumeSession(str(folder)))
