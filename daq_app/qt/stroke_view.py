@@ -237,6 +237,7 @@ class StrokeView(QWidget):
         for window in self._windows:
             window.setVisible(there)
             window.setRegion(ends)
+        self._make_room()
 
     def _try(self, edge: Edge, time: float) -> None:
         """Show an edge where it is being moved to, as far as it may be."""

@@ -171,7 +171,7 @@ def _descriptor(
 
 
 def rival_values(row: TrialRow) -> dict[str, float]:
-    """Return the quantities of a trial that may go with its score, by their names in `rivals.NAMES`."""
+    """Return the quantities of a trial that may go with its score, by their names in `rivals.RIVAL_NAMES`."""
     numbers = {name: getattr(row, attribute) for name, attribute in STROKE_FIELDS.items()}
     numbers |= {label: row.response(name) for label, name in RESPONSES.items()}
     return {name: value for name, value in numbers.items() if value is not None}

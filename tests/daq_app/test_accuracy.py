@@ -253,7 +253,7 @@ def test_a_guaranteed_tolerance_has_no_true_error_where_the_truth_of_one_surface
     small = cases("small")[:2]
     doubts = ((0.0,) * 3, (0.1,) * 3)
     truths = [Truth("small", c.title, (5e-3, 0.1, 0.06), doubts[n], (9,) * 3, 1.0, "") for n, c in enumerate(small)]
-    monkeypatch.setattr(estimates, "TOLERANCES", (0.1,))
+    monkeypatch.setattr(estimates, "_TOLERANCES", (0.1,))
     rows = [list(estimates.measure(with_rows(*truths[:count], request=OVER))) for count in (1, 2)]
     worst = [row.worst_error for part in rows for row in part if isinstance(row, GuaranteedCost)]
     assert worst[0] is not None

@@ -53,6 +53,6 @@ def test_a_scheduler_with_certificates_answers_who_has_them_and_refuses_others(c
         kind = asyncio.run(pool._identity(distributed, address, distributed.Security()))
     assert address.startswith("tls://")
     assert kind == "Scheduler"
-    monkeypatch.setattr(pool, "ANSWERS", 5.0)
+    monkeypatch.setattr(pool, "_ANSWERS", 5.0)
     with pytest.raises(pool.SchedulerError, match="no Dask scheduler answers there"):
         asyncio.run(pool._identity(distributed, address, distributed.Security()))

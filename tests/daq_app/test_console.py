@@ -169,7 +169,7 @@ def test_progress_elsewhere_is_a_plain_line_now_and_then(monkeypatch):
 
 
 def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_be_left(monkeypatch):
-    monkeypatch.setattr("daq_app.console.PATIENCE", 0.0)
+    monkeypatch.setattr("daq_app.console._PATIENCE", 0.0)
     speaker, _, err = console(as_json=False)
 
     def work():

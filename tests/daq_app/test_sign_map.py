@@ -115,7 +115,7 @@ def test_a_dask_cluster_answers_as_this_computer_does():
 
 def test_an_address_without_a_scheduler_is_a_sentence(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(pool, "ANSWERS", 0.5)
+    monkeypatch.setattr(pool, "_ANSWERS", 0.5)
     with pytest.raises(pool.SchedulerError, match="no Dask scheduler answers"):
         sign_map.answers_of(
             list(sign_map.single_changes("small").values())[:1], lambda _: None, scheduler="tcp://127.0.0.1:9"

@@ -41,7 +41,7 @@ def test_the_program_s_own_texts_come_as_xliff(tmp_path, language, untranslated)
 
 
 def test_the_windows_texts_come_as_a_file_that_keeps_what_was_translated(tmp_path, monkeypatch):
-    monkeypatch.setattr("daq_app.wording.FOLDER", tmp_path)
+    monkeypatch.setattr("daq_app.wording._FOLDER", tmp_path)
     file, again = tmp_path / "experimenter_nl.xlf", tmp_path / "again.xlf"
     assert run(["translate", "--window", "--language", "nl", "--out", str(file)]) == 0
     before = file.read_text()

@@ -253,7 +253,7 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:{silent}", "tcp://127.0.0.1:9", "http://127.0.0.1:{silent}"])
 def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
-    monkeypatch.setattr(pooling, "ANSWERS", 0.5)
+    monkeypatch.setattr(pooling, "_ANSWERS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         uri = address.format(silent=silent.getsockname()[1])
         assert run(["study", str(study), "--out", str(tmp_path), "--scheduler", uri, "--json"]) == 1
@@ -264,7 +264,7 @@ def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_
 
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(pooling, "ANSWERS", 5.0)
+    monkeypatch.setattr(pooling, "_ANSWERS", 5.0)
     monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 300.0)
     cluster_client = pooling.cluster_client
 

@@ -35,7 +35,7 @@ def test_more_subjects_find_more_and_spread_people_less():
 
 
 def test_the_verb_prints_a_table_and_refuses_nonsense(capsys, monkeypatch):
-    monkeypatch.setattr("daq_app.cli.verbs.study.SUBJECTS", (4,))
+    monkeypatch.setattr("daq_app.cli.verbs.study._SUBJECTS", (4,))
     monkeypatch.setattr("daq_app.cli.verbs.study.SURFACES", (3,))
     assert run(["study", "--power", "effect=30", "--studies", "20", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

@@ -38,7 +38,7 @@ def test_a_twin_is_what_goes_with_the_true_quantity_in_either_sense():
 
 
 def test_the_verb_simulates_studies_at_the_depths_asked_for(capsys, monkeypatch):
-    for name, value in (("SUBJECTS", (4,)), ("SURFACES", (3,)), ("RIVAL_SUBJECTS", (4,)), ("RIVAL_SURFACES", (3,))):
+    for name, value in (("_SUBJECTS", (4,)), ("SURFACES", (3,)), ("RIVAL_SUBJECTS", (4,)), ("RIVAL_SURFACES", (3,))):
         monkeypatch.setattr(f"daq_app.cli.verbs.study.{name}", value)
     monkeypatch.setattr("daq_app.cli.verbs.study.RIVAL_STUDIES", 2)
     easy = ["study", "--power", "effect=80", "noise=1", "slope_sd=0", "--studies", "20", "--depths", "1.25", "1.75"]

@@ -98,7 +98,7 @@ def marked_language(tmp_path_factory):
     )
     (folder / "experimenter_xx.xlf").write_text(f"<xliff><file>{''.join(units)}</file></xliff>", "utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wording, "FOLDER", folder)
+        patch.setattr(wording, "_FOLDER", folder)
         patch.setenv(VARIABLE, "xx")
         translations.cache_clear()
         yield
@@ -146,7 +146,7 @@ def test_a_translation_with_other_braces_leaves_its_text_in_english(monkeypatch)
 
 
 def test_a_file_that_cannot_be_read_leaves_the_window_in_english(tmp_path, monkeypatch):
-    monkeypatch.setattr(wording, "FOLDER", tmp_path)
+    monkeypatch.setattr(wording, "_FOLDER", tmp_path)
     (tmp_path / "experimenter_yy.xlf").write_text("<xliff><file>")
     assert translations(EXPERIMENTER, "yy") == {}
 
@@ -169,7 +169,7 @@ def test_a_process_that_is_started_speaks_the_language_of_the_environment(tmp_pa
     )
     code = (
         "from pathlib import Path; from daq_app import wording;"
-        f"wording.FOLDER = Path({str(tmp_path)!r}); print(wording.tr('predicting'))"
+        f"wording._FOLDER = Path({str(tmp_path)!r}); print(wording.tr('predicting'))"
     )
     process = subprocess.run(
         [sys.executable, "-c", code], env={VARIABLE: "zz"}, capture_output=True, text=True, check=True
