@@ -179,7 +179,7 @@ def _other_answers(trials: Sequence[TrialRow]) -> tuple[tuple[int, str, str], ..
 
 
 def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
-    """Return the mean over repetitions of each quantity of the surfaces, by its name in `rivals.RIVAL_NAMES` and by index."""
+    """Return the mean over repetitions of each quantity of the surfaces, by name (`rivals.RIVAL_NAMES`) and index."""
     values = by_key((name, (row.index, value)) for row in trials for name, value in rival_values(row).items())
     return {
         name: {index: float(np.mean(repeats)) for index, repeats in sorted(by_key(values.get(name, [])).items())}
