@@ -62,9 +62,10 @@ def crosses_itself(line: Array) -> bool:
     False
     """
     start, end = line[:-1], line[1:]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    overlap = (high[:, None] >= low).all(axis=2) & (high >= low[:, None]).all(axis=2)
-    piece, partner = np.nonzero(np.triu(overlap, 2))
+    overlap = np.tri(len(start), k=-2, dtype=bool)  # pairs that are no neighbours
+    for low, high in zip(np.minimum(start, end).T, np.maximum(start, end).T, strict=True):
+        overlap &= (high[:, None] >= low) & (high >= low[:, None])
+    piece, partner = np.nonzero(overlap)
     return bool(np.any(_cuts(start, end, piece, partner) & _cuts(start, end, partner, piece)))
 
 

@@ -231,7 +231,8 @@ class FiniteFinger(Finger[FinitePatches]):
         """Return the compression of the skin, with its least stretch and its kinks."""
         mesh, loose = self.geometry.mesh, self.geometry.loose
         before, after = self._skin(state)
-        touching = np.isin(self.geometry.whole, mesh.skin[state.touching])
+        touching = np.zeros(len(before), bool)
+        touching[np.searchsorted(self.geometry.whole, mesh.skin)] = state.touching
         return SkinCompression.of(before, after, loose, touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
