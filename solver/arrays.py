@@ -42,6 +42,9 @@ def inverse(matrices: Array) -> Array:
     return adjugate / determinant(matrices)[..., None, None]
 
 
+NEO_HOOKEAN = 2.0  # Ogden's exponent of the neo-Hookean law, which does not stiffen
+
+
 class ElementGeometry(NamedTuple):
     """Integrals over e elements that do not depend on the material; q = 9 quadrature points."""
 

@@ -11,9 +11,8 @@ from typing import ClassVar, Protocol, cast
 
 import numpy as np
 
-from solver.arrays import Array, determinant, inverse
+from solver.arrays import NEO_HOOKEAN, Array, determinant, inverse
 
-PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # Ogden's exponent of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
 _NEAR = 0.04  # Q up to which the series is used: above, the closed form loses no digits
 TERMS = 14  # of the series: enough up to an exponent of 20
@@ -134,7 +133,7 @@ class Law(Elasticity, Protocol):
 
     @property
     def stiffening(self) -> float:
-        """Ogden's exponent, by which the shear modulus grows with strain; PLAIN for a constant modulus [-]."""
+        """Ogden's exponent, by which the shear modulus grows with strain; NEO_HOOKEAN for a constant modulus [-]."""
         ...
 
 
@@ -150,7 +149,7 @@ class NeoHooke(Isotropic):
     @property
     def stiffening(self) -> float:
         """The exponent without stiffening."""
-        return PLAIN
+        return NEO_HOOKEAN
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +228,7 @@ class LocalState:
 def shape(exponent: Array, Q: Array) -> Array:
     """Return W by G/2 (...), without the term of ln J, for Ogden's exponents: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
     positive = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
-    if np.all(exponent == PLAIN):
+    if np.all(exponent == NEO_HOOKEAN):
         return positive
     return 16.0 / exponent**2 * np.sinh(exponent / 2.0 * np.arcsinh(np.sqrt(positive) / 2.0)) ** 2
 

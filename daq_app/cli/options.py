@@ -15,7 +15,7 @@ from sessions.plan.protocols.protocol import LARGEST_SEED as LARGEST
 from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, PLANNED_AT, AreaLaw
 from solver.quantities import NAMES, SED
 
-STUDY_SEED_END = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large
+LARGEST_STUDY_SEED = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large
 
 
 def within(
@@ -62,7 +62,7 @@ def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
 
 
 def add_seed(
-    parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = STUDY_SEED_END
+    parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = LARGEST_STUDY_SEED
 ) -> None:
     """Declare --seed, of something that is drawn at random."""
     add_number(parser, "--seed", int, (0, largest), use, default)

@@ -17,7 +17,7 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 _NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
-ROWS: dict[Edge, int] = {"onset": 0, "steady begin": 1, "steady end": 1, "lift": 0}  # of the words above the curves
+_ROWS: dict[Edge, int] = {"onset": 0, "steady begin": 1, "steady end": 1, "lift": 0}  # of the words above the curves
 
 
 class EdgeHandle(QPushButton):
@@ -136,7 +136,7 @@ class StrokeView(QWidget):
             handle.recorded.connect(self.moved.emit)
         strip = hbox(*((handle, 1) for handle in self.handles.values()), spacing=GRID // 2)
         vbox(*((plot, 1) for plot in self._plots), strip, on=self, spacing=GRID // 2)
-        self._bare = self._fitted = (0.0, 1.0)  # ranges of the forces without the words of edges, and with them [N]
+        self._extent = self._range = (0.0, 1.0)  # of the forces, and of the plot with the words of edges [N]
         self._forces: Any = self._plots[0].getPlotItem().getViewBox()
         self._forces.sigResized.connect(self._make_room)
         self.show_stroke(None)
@@ -171,23 +171,23 @@ class StrokeView(QWidget):
             known = self._columns[2][np.isfinite(self._columns[2])]
             self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
         low, high = self._forces.viewRange()[1]
-        self._bare = self._fitted = low, high
+        self._extent = self._range = low, high
         self._make_room()
 
     def _make_room(self) -> None:
         """Place the words of edges in rows above the curves, unless somebody has zoomed."""
         height, metrics = max(self._forces.height(), 1.0), QFontMetricsF(font(SMALL))
-        row, (low, high) = 1.25 * metrics.height() / height, self._bare
+        row, (low, high) = 1.25 * metrics.height() / height, self._extent
         begin, end = (self._lines[edge][0] for edge in ("steady begin", "steady end"))
         long = sum(metrics.horizontalAdvance(line.label.format) for line in (begin, end)) + 2 * GRID
         apart = (end.value() - begin.value()) / max(self._forces.viewPixelSize()[0], 1e-12)
-        rows = {**ROWS, "steady end": 1 if apart > long else 2}
+        rows = {**_ROWS, "steady end": 1 if apart > long else 2}
         for edge, number in rows.items():
             self._lines[edge][0].label.setPosition(1.0 - (number + 0.5) * row)
-        if np.allclose(self._forces.viewRange()[1], self._fitted):
+        if np.allclose(self._forces.viewRange()[1], self._range):
             head = min((max(rows.values()) + 1) * row, 0.6)
-            self._fitted = low, low + (high - low) / (1.0 - head)
-            self._plots[0].setYRange(*self._fitted, padding=0.0)
+            self._range = low, low + (high - low) / (1.0 - head)
+            self._plots[0].setYRange(*self._range, padding=0.0)
 
     def _read(self, time: float) -> str:
         names = (("N", "N"), ("T", "N"), ("µ", ""))

@@ -138,7 +138,7 @@ def solve_active_set(
     history = np.empty((control.rounds + 1, 2, size), np.int32)
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
     may_hold = load.mu > 0.0 and load.tau > 0.0
-    one_by_one, records = size < 0, min(size, 0)  # False and 0, whose literals would compile subroutines twice
+    one_by_one, records = size < 0, min(size, 0)  # False and 0; numba compiles subroutines again for literals
     for turn in range(control.rounds + 1):
         bounded_length(position.x, skin, system.length)
         if by_forces:

@@ -18,7 +18,7 @@ from solver.arrays import (
     SkinPosition,
 )
 
-RIGHT_SIDES = 4  # of the right-hand side
+RIGHT_SIDES = 4  # right-hand sides that are solved together
 ZERO = 1e-15  # a pivot below this, relative to the largest diagonal entry, is round-off
 
 # tributary lengths of an edge's first, middle and last node by the positions of the three: Simpson's rule

@@ -4,6 +4,7 @@ import numpy as np
 
 from solver._kernels.compiling import compile_loop, subroutine
 from solver.arrays import (
+    NEO_HOOKEAN,
     Array,
     BodyState,
     ElementArrays,
@@ -14,8 +15,6 @@ from solver.arrays import (
     Narrow,
     ShapeFunctions,
 )
-
-_PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law, which does not stiffen
 
 
 @subroutine
@@ -152,7 +151,7 @@ def assemble(u: Array, pressure: Array, new_tangent: bool, elements: ElementArra
             return least
         sum_forces(e, elements, work, system)
         if new_tangent:
-            stiffens = elements.stiffening[e] != _PLAIN
+            stiffens = elements.stiffening[e] != NEO_HOOKEAN
             deform_gradients(e, stiffens, pressure, elements, work)
             if stiffens:
                 sum_laplace(elements.grad_x[e], elements.grad_y[e], work.push, work.laplace)
@@ -192,7 +191,7 @@ def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: E
         v1 += w1 * log
         v2 += w2 * log
         wg = w * shear
-        if exponent != _PLAIN:
+        if exponent != NEO_HOOKEAN:
             factor, growth = shear_growth(exponent, excess_of(h00, f01, f10, h11, log))
             shear_slope[q] = 2.0 * growth * wg
             wg *= factor

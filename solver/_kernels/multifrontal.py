@@ -91,8 +91,8 @@ def _factorise(top: Array, complement: Array) -> bool:
     """Factorise a front in place, upper halves only; return False where a pivot is zero.
 
     The inner rows `top` (k, k + b) become their factor, and `complement` (b, b) the Schur complement. Rows are finished
-    two at a time; those of `complement` are updated four at a time, by four finished rows at a time. That keeps most
-    numbers in registers and the nearest cache. In rows updated together, entries before the diagonal have no meaning.
+    and updated two at a time, by four finished rows at a time. That keeps most numbers in registers and the nearest
+    cache. Of two rows updated together, the entry of the second before its diagonal has no meaning.
     """
     k, b = top.shape[0], complement.shape[0]
     over = np.empty(k)  # reciprocal pivots
@@ -209,7 +209,7 @@ def back_substitute_part(p: int, condensed_force: Array, factors: Factors, out: 
 def back_substitute(condensed_force: Array, skin: Array, parts: Flags, out: Array, factors: Factors) -> None:
     """Fill `out` (n,) with all displacements for the skin's, `skin` (m,), under the loads of -`condensed_force` (n,).
 
-    `condensed_force` is the result of `condense`. Only those `parts` (p,) of the body that are true are done.
+    `condensed_force` is the result of `condense`. Only the `parts` (p,) of the body that are true are solved.
     """
     first = out.shape[0] - skin.shape[0]
     for i in range(skin.shape[0]):

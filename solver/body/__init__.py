@@ -11,8 +11,8 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels import elements as element_loops
 from solver._kernels.compiling import HELD_X, HELD_Y
-from solver.arrays import Array, ElementArrays, ElementGeometry, Indices, Narrow, ShapeFunctions, inverse
-from solver.constitutive import PLAIN, Elasticity, LocalState
+from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, ElementGeometry, Indices, Narrow, ShapeFunctions, inverse
+from solver.constitutive import Elasticity, LocalState
 from solver.mesh import Q2P1, Mesh, distinct
 
 UNHELD = 1e14  # product of the largest entries of stiffness and compliance, from which the body counts as loose [-]
@@ -347,7 +347,7 @@ def integrate_elements(
     """
     shear, lame, stiffening = (
         np.array(numbers, np.float64)[mesh.region]
-        for numbers in zip(*((m.shear, m.lame, getattr(m, "stiffening", PLAIN)) for m in materials), strict=True)
+        for numbers in zip(*((m.shear, m.lame, getattr(m, "stiffening", NEO_HOOKEAN)) for m in materials), strict=True)
     )
     grad_x, grad_y, weight, modes, laplace, centre, combination = _geometry(mesh)
     elements = ElementArrays(

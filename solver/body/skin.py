@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.arrays import Array, Flags, Indices
 
-SQUEEZED = 0.85  # stretch on at least one side below which a jump of the tangent counts as a kink
+SQUEEZED = 0.85  # stretch to one side of a joint below which a jump of the tangent counts as a kink
 
 
 class SkinCompression(NamedTuple):
@@ -22,15 +22,15 @@ class SkinCompression(NamedTuple):
     # Only open, compressed skin counts: jumps where it touches, or is stretched at an edge of contact, are the mesh's.
 
     @staticmethod
-    def of(before: Array, after: Array, loose: Flags, touching: Flags) -> "SkinCompression":
-        """Return how far the sides of a elements are squeezed, where `loose` (a,) is true.
+    def of(nodes: Array, u: Array, loose: Flags, touching: Flags) -> "SkinCompression":
+        """Return how far the sides of a elements are compressed, where `loose` (a,) is true.
 
-        `before` and `after` (2 a + 1, 2) are positions of their nodes, undeformed and deformed. Some are `touching`
-        (2 a + 1,).
+        `nodes` (2 a + 1, 2) are their undeformed positions and `u` (2 a + 1, 2) their displacements [mm]. Some are
+        `touching` (2 a + 1,).
         """
         if not loose.any():
             return SkinCompression(np.inf, 0, np.inf, 0.0)
-        steps = np.diff(np.stack([before, after]), axis=1).reshape(2, -1, 2, 2)[:, loose]  # (2, l, halves, 2)
+        steps = np.diff(np.stack([nodes, nodes + u]), axis=1).reshape(2, -1, 2, 2)[:, loose]  # (2, l, halves, 2)
         lengths = _length(steps)
         ratio = lengths[1] / lengths[0]
         tangents = 3.0 * steps - steps[:, :, ::-1]  # at both ends

@@ -290,18 +290,13 @@ class _OwnBody:
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        before, after = self._skin(state)
-        return SkinCompression.of(before, after, np.ones(len(before) // 2, bool), state.touching)
+        skin = self.body.mesh.skin
+        every = np.ones(len(skin) // 2, bool)
+        return SkinCompression.of(self.body.mesh.nodes[skin], state.u[skin], every, state.touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return crosses_itself(self._skin(state)[1])
-
-    def _skin(self, state: EquilibriumState) -> tuple[Array, Array]:
-        """Return the undeformed and deformed positions (2 a + 1, 2) of the skin's nodes."""
-        skin = self.body.mesh.skin
-        before = self.body.mesh.nodes[skin]
-        return before, before + state.u[skin]
+        return crosses_itself(self.newton.condensed.place(state.u))
 
     def is_unusable(self, state: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""

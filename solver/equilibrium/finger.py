@@ -229,21 +229,14 @@ class FiniteFinger(Finger[FinitePatches]):
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return the compression of the skin, with its least stretch and its kinks."""
-        mesh, loose = self.geometry.mesh, self.geometry.loose
-        before, after = self._skin(state)
-        touching = np.zeros(len(before), bool)
-        touching[np.searchsorted(self.geometry.whole, mesh.skin)] = state.touching
-        return SkinCompression.of(before, after, loose, touching)
+        mesh, whole = self.geometry.mesh, self.geometry.whole
+        touching = np.zeros(len(whole), bool)
+        touching[np.searchsorted(whole, mesh.skin)] = state.touching
+        return SkinCompression.of(mesh.nodes[whole], state.u[whole], self.geometry.loose, touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return crosses_itself(self._skin(state)[1])
-
-    def _skin(self, state: EquilibriumState) -> tuple[Array, Array]:
-        """Return the undeformed and deformed positions (2 a + 1, 2) of all the skin's nodes."""
-        whole = self.geometry.whole
-        before = self.geometry.mesh.nodes[whole]
-        return before, before + state.u[whole]
+        return crosses_itself((self.geometry.mesh.nodes + state.u)[self.geometry.whole])
 
 
 KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": FiniteFinger}  # by kinematics

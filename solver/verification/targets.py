@@ -19,7 +19,7 @@ from solver.verification.processes import Cold, Memory
 from solver.verification.request import Request
 from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.truth import JUDGED, KINEMATICS, cases, known_truths
-from solver.verification.warm import WARM, Warm
+from solver.verification.warm import WARM_SCENES, Warm
 
 _AGREED = 1e-10  # largest relative difference of a load path from the direct state
 PEAK = 0.02  # largest error of the warm stepper, by the peak
@@ -117,7 +117,7 @@ def _warm(rows: Sequence[Warm], target: Target) -> Target:
     worst = max(row.worst_error for row in rows)
     how = f"error {percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
     slowest = 1e3 * max(row.p99_s for row in rows)
-    part = _part(len(rows), len(WARM), "surfaces")
+    part = _part(len(rows), len(WARM_SCENES), "surfaces")
     return replace(target, measured=slowest if worst <= PEAK else None, how=how, part=part)
 
 

@@ -25,8 +25,8 @@ PASSES, QUICK_PASSES = 5, 3
 _PRESS, _SLIDES, _DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and its distance [mm]
 LIFTS = 8  # readings of the lift-off: 40 ms at 200 Hz
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
-WARM = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
-_QUICK: dict[Kinematics, tuple[str, ...]] = {"finite": WARM[:1], "small": WARM[::3]}
+WARM_SCENES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
+_QUICK: dict[Kinematics, tuple[str, ...]] = {"finite": WARM_SCENES[:1], "small": WARM_SCENES[::3]}
 Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED [MPa]
 
 
@@ -46,7 +46,9 @@ class Warm:
 
 def measure(request: Request) -> Iterator[Warm | LeftOut]:
     """Return an iterator over rows, one for each kinematics and surface."""
-    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (_QUICK[kind] if request.quick else WARM)]
+    scenes = [
+        s for kind in KINEMATICS for s in cases(kind) if s.title in (_QUICK[kind] if request.quick else WARM_SCENES)
+    ]
     unbounded = [replace(scene, friction=Friction(scene.friction.mu)) for scene in scenes]
     passes = QUICK_PASSES if request.quick else PASSES
     return rows_within(request, unbounded, "surfaces followed reading by reading", lambda scene: [_row(scene, passes)])

@@ -10,7 +10,7 @@ from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.verification.published import contacts
 from solver.verification.published.contacts import ELEMENT
-from solver.verification.published.problems import CAPPED, LOADS_BY
+from solver.verification.published.problems import CAPPED, TANGENTIAL_LOADS
 from tests.solver.finite_examples import finger, sheet
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.laws import energy
@@ -82,7 +82,7 @@ def test_a_bound_on_it_carries_the_elementary_integral(k, force):
     )
 
 
-@pytest.mark.parametrize("part", LOADS_BY["finite"])
+@pytest.mark.parametrize("part", TANGENTIAL_LOADS["finite"])
 def test_its_partial_slip_is_that_of_cattaneo_and_mindlin(part):
     light = contacts.light("finite")
     state, half = light.shear(0.3, part), np.sqrt(1 - part)

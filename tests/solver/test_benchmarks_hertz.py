@@ -10,7 +10,7 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.contact import FrictionLaw
 from solver.verification.published import contacts, problems
 from solver.verification.published.contacts import ELEMENT
-from solver.verification.published.problems import BELOW, CAPPED, HERTZ_PROBLEMS, LOADS_BY
+from solver.verification.published.problems import BELOW, CAPPED, HERTZ_PROBLEMS, TANGENTIAL_LOADS
 from solver.verification.request import Request
 
 
@@ -102,7 +102,7 @@ def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_
     np.testing.assert_allclose(shear, mu, atol=0.005)  # all along the contact: from 0.3 on the largest there is
 
 
-@pytest.mark.parametrize("part", LOADS_BY["small"])
+@pytest.mark.parametrize("part", TANGENTIAL_LOADS["small"])
 @pytest.mark.parametrize("mu", [0.01, 0.3])
 def test_partial_slip_is_that_of_cattaneo_and_mindlin(light, mu, part):
     """Stick for |x| < c = sqrt(1 - Q/(mu P)); q = mu p less mu p0 c sqrt(1 - x^2/c^2) inside."""

@@ -12,19 +12,18 @@ import numpy as np
 import pytest
 
 from solver import _kernels
-from solver._kernels import compiling
-from solver._kernels import contact_system as skin_loops
+from solver._kernels import compiling, contact_system
 from solver._kernels.compiling import bind_arguments
 from solver.progress import listening, report_progress
 
 SCRIPT = """
 import numpy as np
-from solver._kernels import contact_system as skin_loops
+from solver._kernels import contact_system
 from solver._kernels.compiling import bind_arguments
 from solver.progress import listening
 out = np.zeros(3)
 with listening(lambda doing, _: print(doing)):
-    skin_loops.tributary(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
+    contact_system.tributary(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
 print(*out)
 """
 COMPILED = "compiling tributary, loop number 1, once on this machine"
@@ -106,7 +105,7 @@ def ctrl_c():
 
 
 def test_ctrl_c_that_is_lost_in_llvm_stops_when_the_loop_is_compiled(ctrl_c):
-    watch, event = _kernels._Compilation(), SimpleNamespace(data={"dispatcher": skin_loops.tributary})
+    watch, event = _kernels._Compilation(), SimpleNamespace(data={"dispatcher": contact_system.tributary})
     messages = []
     with listening(lambda doing, _: messages.append(doing)):
         report_progress("solving")
@@ -139,13 +138,13 @@ def test_ctrl_c_ends_a_first_compilation(tmp_path):
 
 def test_small_arrays_of_another_order_are_taken_too():
     x, out = np.repeat(np.linspace(0.0, 3.0, 3), 2), np.zeros(3)
-    skin_loops.tributary(x[::2], np.array([0, 1, 0], np.int32), out)
+    contact_system.tributary(x[::2], np.array([0, 1, 0], np.int32), out)
     np.testing.assert_allclose(out, [0.5, 2.0, 0.5], rtol=1e-15)
 
 
 def test_bound_arguments_stay_and_those_of_other_types_find_their_own_code():
     at, out = np.array([0, 1, 0], np.int32), np.zeros(3)
-    lengths = bind_arguments(skin_loops.tributary, at, out)
+    lengths = bind_arguments(contact_system.tributary, at, out)
     for x in (np.linspace(0.0, 3.0, 3), np.repeat(np.linspace(0.0, 3.0, 3), 2)[::2]):
         out[:] = 0.0
         lengths(x)

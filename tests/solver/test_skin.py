@@ -24,14 +24,14 @@ def bent_at_a_joint(squeeze, angle):
 
 
 def test_skin_that_is_squeezed_evenly_has_one_stretch_and_no_crease():
-    least, _, lowest, kink = SkinCompression.of(BEFORE, 0.7 * BEFORE, LOOSE, OPEN)
+    least, _, lowest, kink = SkinCompression.of(BEFORE, -0.3 * BEFORE, LOOSE, OPEN)
     assert (least, lowest, kink) == pytest.approx((0.7, 0.7, 0.0), abs=1e-12)
 
 
 def test_stretch_at_the_ends_of_elements_is_exact_where_it_varies_linearly():
     after = BEFORE.copy()
     after[:, 0] -= 0.2 * BEFORE[:, 0] ** 2  # stretch 1 - 0.4 x
-    skin = SkinCompression.of(BEFORE, after, LOOSE, OPEN)
+    skin = SkinCompression.of(BEFORE, after - BEFORE, LOOSE, OPEN)
     assert skin.lowest == pytest.approx(1.0 - 0.4 * BEFORE[-1, 0], rel=1e-12)
     assert skin.place == ELEMENTS - 1
     assert skin.least == pytest.approx(1.0 - 0.2 * (BEFORE[-1, 0] + BEFORE[-2, 0]), rel=1e-12)  # of its last half
@@ -39,7 +39,7 @@ def test_stretch_at_the_ends_of_elements_is_exact_where_it_varies_linearly():
 
 def test_a_crease_is_the_jump_of_the_tangent():
     squeeze, angle = 0.6, 1.1
-    skin = SkinCompression.of(BEFORE, bent_at_a_joint(squeeze, angle), LOOSE, OPEN)
+    skin = SkinCompression.of(BEFORE, bent_at_a_joint(squeeze, angle) - BEFORE, LOOSE, OPEN)
     assert skin.kink == pytest.approx(2.0 * squeeze * np.sin(angle / 2.0), rel=1e-12)
 
 
@@ -48,17 +48,19 @@ def test_a_jump_of_the_tangent_is_no_crease_where_skin_is(reason):
     touching, loose = OPEN.copy(), LOOSE.copy()
     touching[4], loose[2] = reason == "touching", reason != "held"
     after = bent_at_a_joint(1.1 * SQUEEZED if reason == "stretched" else 0.6, 1.1)
-    assert SkinCompression.of(BEFORE, after, loose, touching).kink == pytest.approx(0.0, abs=1e-12)
+    assert SkinCompression.of(BEFORE, after - BEFORE, loose, touching).kink == pytest.approx(0.0, abs=1e-12)
 
 
 def test_held_skin_is_not_squeezed():
     after = BEFORE.copy()
     after[6, 0] = BEFORE[5, 0] + 0.01
-    loose_skin, held = (SkinCompression.of(BEFORE, after, loose, OPEN) for loose in (LOOSE, np.arange(ELEMENTS) < 2))
+    loose_skin, held = (
+        SkinCompression.of(BEFORE, after - BEFORE, loose, OPEN) for loose in (LOOSE, np.arange(ELEMENTS) < 2)
+    )
     assert loose_skin.place == 2
     assert loose_skin.least < 0.2
     assert held.least == pytest.approx(1.0)
-    assert SkinCompression.of(BEFORE, after, ~LOOSE, OPEN).least == np.inf
+    assert SkinCompression.of(BEFORE, after - BEFORE, ~LOOSE, OPEN).least == np.inf
 
 
 def side(a, b, c):

@@ -19,7 +19,7 @@ import numpy as np
 
 from daq_app.batch.pool import Shelf, visits
 from daq_app.cli.options import (
-    STUDY_SEED_END,
+    LARGEST_STUDY_SEED,
     add_analysis,
     add_number,
     add_seed,
@@ -144,7 +144,7 @@ EXAMPLE = "daq-app study recordings --out results"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
     meaning = "make a study of ten simulated subjects instead"
-    add_number(parser, "--synthetic", int, (0, STUDY_SEED_END), meaning, metavar="SEED")
+    add_number(parser, "--synthetic", int, (0, LARGEST_STUDY_SEED), meaning, metavar="SEED")
     meaning = "page, table and results (FOLDER/pooled); with --synthetic the study too"
     parser.add_argument("--out", type=Path, metavar="DIR", help=meaning)
     add_shared(

@@ -126,12 +126,12 @@ def flaws_table(study: StudyFindings) -> Table | None:
 
 
 _FEW = "too few readings"
-_MOST = 400  # rows on the page; of a larger study they are in the table beside it, and in the page as a file
+_MOST_TRIALS = 400  # of which the page shows a table; `trials.csv` holds those of any study
 
 
 def trials_table(study: StudyFindings) -> Table | None:
     """Return every trial with what was scored, measured and predicted; None where they are too many for a page."""
-    if sum(len(visit.rows) for visit in study.visits) > _MOST:
+    if sum(len(visit.rows) for visit in study.visits) > _MOST_TRIALS:
         return None
     columns = (
         "trial | index | score [0–100] | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "

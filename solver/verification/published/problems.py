@@ -68,7 +68,7 @@ BELOW = {
 }
 CAPPED = ((1.0, 1.0), (0.8, 0.895912), (0.6, 0.715243), (0.4, 0.495368))  # k, Q/(mu P)
 # Q/(mu P) of partial slip; elements at finite strain are three times as long
-LOADS_BY: dict[Kinematics, tuple[float, ...]] = {
+TANGENTIAL_LOADS: dict[Kinematics, tuple[float, ...]] = {
     "small": (0.1, 0.25, 0.5, 0.75, 0.9, 0.99),
     "finite": (0.25, 0.5, 0.75),
 }
@@ -154,7 +154,7 @@ def light_finite() -> Iterator[Problem]:
 def partial_slip(kinematics: Kinematics = "small") -> Iterator[Problem]:
     """Yield half the width of the stick zone and the traction in its middle, under the pressure of nu = 0.4999."""
     light, mu = contacts.light(kinematics), 0.3
-    for part in LOADS_BY[kinematics]:
+    for part in TANGENTIAL_LOADS[kinematics]:
         state = light.shear(mu, part)
         problem, half = f"partial slip{WHERE[kinematics]}, Q/(mu P) {part:g}", math.sqrt(1 - part)
         traction = -light.at_middle(state.tangential) / (mu * light.peak)

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from solver.arrays import Array
-from solver.constitutive import PLAIN, shape, stress_parts
+from solver.arrays import NEO_HOOKEAN, Array
+from solver.constitutive import shape, stress_parts
 from solver.contact import SHEAR_LIMITED, SLIP
 
 
@@ -20,7 +20,7 @@ def energy(law, F):
     """Return W (...) [MPa] of a law of finite strain at deformation gradients F (..., 2, 2); nan where det F <= 0."""
     J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
-    stretch_energy = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
+    stretch_energy = Q if law.stiffening == NEO_HOOKEAN else shape(np.array(law.stiffening), Q)
     return law.shear / 2.0 * stretch_energy + law.lame / 2.0 * np.log(J) ** 2
 
 
