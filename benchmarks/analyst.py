@@ -38,9 +38,9 @@ def _work(folder: Path) -> None:
     print(f"loading the work                 {time.process_time() - start:6.2f} s")
     start = time.process_time()
     delays: dict[str, float] = {}
-    messages: list[m.Said] = []
+    messages: list[m.Reply] = []
 
-    def say(message: m.Said) -> None:
+    def say(message: m.Reply) -> None:
         delays.setdefault(type(message).__name__, time.process_time() - start)
         messages.append(message)
 
@@ -48,9 +48,9 @@ def _work(folder: Path) -> None:
     work.go_on()
     print(
         f"trials and strokes are known after {delays['ReportReady']:4.2f} s, "
-        f"the first finger after {delays['Answered']:.2f} s"
+        f"the first finger after {delays['TrialAnswer']:.2f} s"
     )
-    answers = sum(isinstance(one, m.Answered) for one in messages)
+    answers = sum(isinstance(one, m.TrialAnswer) for one in messages)
     print(f"all {answers} trials are answered after {time.process_time() - start:4.2f} s")
     report = next(one.report for one in messages if isinstance(one, m.ReportReady))
     stroke = next(s for s in report.strokes if s.steady is not None)
@@ -68,7 +68,7 @@ def _work(folder: Path) -> None:
         start = time.process_time()
         work.do(request)
         print(f"{words:36s} {time.process_time() - start:4.2f} s")
-    _painting(next(one.film for one in messages if isinstance(one, m.Filmed)))
+    _painting(next(one.film for one in messages if isinstance(one, m.FingerHistory)))
 
 
 def _painting(film) -> None:  # noqa: ANN001
@@ -105,7 +105,7 @@ def _stops(folder: Path) -> None:
     took: list[float] = []
     for _ in range(STOPS):
         analyst = Analyst(folder)
-        _until(analyst, m.Answered)
+        _until(analyst, m.TrialAnswer)
         start = time.monotonic()
         analyst.ask(m.Stop())
         _until(analyst, m.Cancelled)

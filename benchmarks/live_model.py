@@ -65,7 +65,7 @@ def _with_readings(seconds: float) -> None:
 
     model = LiveModel()
     model.prepare()
-    while model.said is None and not model.problem:
+    while model.provisional is None and not model.problem:
         model.add(Live(0, *_block(0, 4), (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
         model.poll()
         time.sleep(0.05)

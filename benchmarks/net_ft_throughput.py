@@ -64,11 +64,11 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     box = context.Process(target=serve, args=(min(rate, TOP), factor, theirs))
     box.start()
     uri, origin = ours.recv()
-    shown, window = context.Pipe()
+    drawer_pipe, window = context.Pipe()
     drawer = context.Process(target=draw, args=(rate, window)) if drawing else None
     if drawer is not None:
         drawer.start()
-        shown.recv()
+        drawer_pipe.recv()
     transducer: Transducer = open_transducer(uri, clock_at(factor))
     if ready:
         there, theirs = context.Pipe()
@@ -80,7 +80,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     transducer.start()
     ages: list[float] = []
     lags: list[float] = []
-    waiting: list[ReadingBlock] = []
+    blocks: list[ReadingBlock] = []
     due = 0.0
     began, processor, received = time.monotonic(), time.process_time(), transducer.health.received
     while (now := time.monotonic()) - began < seconds:
@@ -89,13 +89,13 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
             now = time.monotonic()
             ages.append(np.nan if ready else now - origin - float(block.counter[-1]) / 7000.0 / factor)
             lags.append(transducer.health.lag_ms / 1e3 / factor)
-            waiting.append(block)
-        if now >= due and waiting:
+            blocks.append(block)
+        if now >= due and blocks:
             due = now + SHOWN_EVERY
-            gathered, waiting = ReadingBlock.concatenate(waiting), []
-            wrench = calibration.wrench(gathered.raw, np.zeros(6))
+            readings, blocks = ReadingBlock.concatenate(blocks), []
+            wrench = calibration.wrench(readings.raw, np.zeros(6))
             if drawer is not None:
-                shown.send((gathered.time, wrench))
+                drawer_pipe.send((readings.time, wrench))
         time.sleep(every)
     wall, processor = time.monotonic() - began, time.process_time() - processor
     health = transducer.health
@@ -105,8 +105,8 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     box.join()
     frames = 0.0
     if drawer is not None:
-        shown.send(None)
-        frames = shown.recv() / wall
+        drawer_pipe.send(None)
+        frames = drawer_pipe.recv() / wall
         drawer.join()
     lag, age = np.percentile(lags, [50, 99]) * 1e3, np.percentile(ages, [50, 99]) * 1e3
     return (
@@ -163,11 +163,11 @@ def draw(rate: int, pipe: Connection) -> None:
     pipe.send("ready")
     frames, ended = 0, False
     while not ended:
-        arrived = [pipe.recv()]
+        messages = [pipe.recv()]
         while pipe.poll():
-            arrived.append(pipe.recv())
-        ended = arrived[-1] is None
-        for readings in filter(None, arrived):
+            messages.append(pipe.recv())
+        ended = messages[-1] is None
+        for readings in filter(None, messages):
             values = np.full((len(CHANNELS), len(readings[0])), np.nan)
             values[:6] = readings[1].T
             trace.add(readings[0], values)

@@ -44,7 +44,7 @@ class PlayedRecorder:
     def __init__(self) -> None:
         """Start with nothing to say."""
         self.sent: list[object] = []
-        self._waiting: list[m.Report] = []
+        self._queue: list[m.Report] = []
         self._bench = Bench(3)
         self._last = 0
         self._health = health()  # as said last
@@ -52,7 +52,7 @@ class PlayedRecorder:
 
     def play(self, *reports: m.Report) -> None:
         """Say these at the next poll."""
-        self._waiting += reports
+        self._queue += reports
         self._health = next((one for one in reports if isinstance(one, m.HealthReport)), self._health)
 
     def stroke(self, trial: int, at: float) -> None:
@@ -69,11 +69,11 @@ class PlayedRecorder:
             time = number / RATE
             wrench = self._bench.wrench(time)
             status = np.zeros(len(number), np.int64)
-            self._waiting.append(m.Live(1, number, time, number, wrench, status, (0.0,) * 6))
+            self._queue.append(m.Live(1, number, time, number, wrench, status, (0.0,) * 6))
             load = loads(wrench, np.array(RATED)).max(axis=0)
             self._peak = np.fmax(self._peak, load)
             shares = {"load": tuple(load.tolist()), "peak": tuple(self._peak.tolist())}
-            self._waiting.append(structs.replace(self._health, **shares))
+            self._queue.append(structs.replace(self._health, **shares))
             self._last = int(number[-1]) + 1
 
     def send(self, request: object) -> None:
@@ -82,7 +82,7 @@ class PlayedRecorder:
 
     def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  nothing is waited for
         """Return what is to be said."""
-        reports, self._waiting = tuple(self._waiting), []
+        reports, self._queue = tuple(self._queue), []
         return reports
 
     def close(self) -> None:
@@ -172,15 +172,15 @@ def _take(setting: str, out: Path, session: Path | None) -> None:
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(out / "settings"))
     application = QApplication([])
-    shown = (
+    arguments = (
         application,
         (width, height),
         DARK if theme == "dark" else LIGHT,
         lambda name: out / f"{name}-{setting}.png",
     )
-    _Places(*shown).all()
+    _Places(*arguments).all()
     if session is not None:
-        _Places(*shown).review(session)
+        _Places(*arguments).review(session)
 
 
 class _Places:
@@ -216,7 +216,7 @@ class _Places:
         self.picture("04-mount")
         self.picture("05-subject-instruction", self.subject)
         model = self.window.live._model
-        self.wait(lambda: model.said is not None)
+        self.wait(lambda: model.provisional is not None)
         self.play(steps.StartTake(1, 1), steps.MeasureZero(), until=4.0)
         self.recorder.stroke(1, 4.0)
         self.play(steps.AskStroke(trial), until=5.0)
@@ -226,7 +226,7 @@ class _Places:
         self.picture("07-stroking")
         self.play(logged("finger_lifted", 1, time=7.2, noticed=7.25), until=7.3)
         self.play(steps.AskScore(trial, PLAN.blocks[0].scale_ends), until=8.5)
-        self.wait(lambda: self.window.bridge.state.session.judged == 1)
+        self.wait(lambda: self.window.bridge.state.session.judged_trial == 1)
         self.picture("08-scoring")
         self.picture("09-subject-line-empty", self.subject)
         line = self.subject.line
@@ -287,10 +287,10 @@ class _Places:
         window.model.player.seek(30)
         picture("24-review-history", 2)
         window.model.tabs.setCurrentIndex(1)
-        self.wait(lambda: window.state.drawn)
+        self.wait(lambda: window.state.pictures)
         picture("25-review-session", 2)
         window.ask(state.Compare(str(session)))
-        self.wait(lambda: "compared" in window.state.drawn)
+        self.wait(lambda: "compared" in window.state.pictures)
         picture("26-review-comparison", 2)
         window.keys.toggle()
         picture("27-review-keys", 2)
@@ -302,7 +302,7 @@ class _Places:
         """Have reports said, then readings up to an instant."""
         self.recorder.play(*reports)
         self.recorder.readings(until)
-        self.wait(lambda: not any(isinstance(said, m.Live) for said in self.recorder._waiting))
+        self.wait(lambda: not any(isinstance(report, m.Live) for report in self.recorder._queue))
 
     def picture(self, name: str, widget=None) -> None:  # noqa: ANN001
         """Take a picture of the window, or of another widget, once it has painted."""

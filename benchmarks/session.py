@@ -42,18 +42,18 @@ def _session(room: Path) -> Path:
 def _print_replay(recording: Recording, room: Path) -> None:
     """Print how many times faster than real time the session is replayed, the solver left out."""
     lasted = (recording.events[-1].time_ns - recording.events[0].time_ns) * 1e-9
-    replayed: list[float] = []
-    compared: list[float] = []
+    replay_s: list[float] = []
+    total_s: list[float] = []
     for number in range(RUNS):
         began = time.perf_counter()
         copy = replay(recording, room / f"replay-{number}", None, lambda *_: None)
-        replayed.append(time.perf_counter() - began)
+        replay_s.append(time.perf_counter() - began)
         differences = [*different_readings(recording, copy), *different_events(recording, copy)]
         analyse(copy)
-        compared.append(time.perf_counter() - began)
+        total_s.append(time.perf_counter() - began)
     print(f"session of {lasted:.1f} s, {recording.events[-1].readings} readings")
-    print(f"replayed in {median(replayed):.3f} s: {lasted / median(replayed):.0f} times real time (median of {RUNS})")
-    print(f"compared and analysed too: {median(compared):.3f} s, {lasted / median(compared):.0f} times real time")
+    print(f"replayed in {median(replay_s):.3f} s: {lasted / median(replay_s):.0f} times real time (median of {RUNS})")
+    print(f"compared and analysed too: {median(total_s):.3f} s, {lasted / median(total_s):.0f} times real time")
     print(f"differences: {len(differences)}")
 
 

@@ -74,7 +74,7 @@ def _session(options: argparse.Namespace) -> None:
     from daq_app.qt import start
 
     start.SIMULATED_BENCH = f"sim:?seed=7&rate={options.rate}"
-    watched = _Observations()
+    observations = _Observations()
     application = QApplication([])
     window = start.open_window(application)
     window.resize(*map(int, options.size.split("x")))
@@ -83,22 +83,22 @@ def _session(options: argparse.Namespace) -> None:
     window.live.show_seconds(options.shown)
     heart = QTimer()
     heart.setInterval(BEAT)
-    heart.timeout.connect(lambda: watched.beat(window))
+    heart.timeout.connect(lambda: observations.beat(window))
     with tempfile.TemporaryDirectory() as folder:
         window.page.folder.setText(folder)
         window.page.subject.setText("B01")
         window.page.simulated.setChecked(True)
         window.act("primary")
-        _until(lambda: window.bridge.state.session is not None and window.bridge.model.said is not None)
+        _until(lambda: window.bridge.state.session is not None and window.bridge.model.provisional is not None)
         _for(3.0)
-        watched.begin(window)
+        observations.begin(window)
         heart.start()
         before = _processor()
         _for(options.seconds)
-        cpu = {name: spent - before.get(name, 0.0) for name, spent in _processor().items()}
+        cpu = {name: total - before.get(name, 0.0) for name, total in _processor().items()}
         heart.stop()
         print(f"{options.rate} readings a second, {options.shown} s shown, {options.size}, {options.seconds:g} s long:")
-        watched.report(options.seconds, cpu)
+        observations.report(options.seconds, cpu)
         print(f"  readings lost: {window.bridge.state.bench.health.lost}")
         window.bridge.end()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -122,18 +122,18 @@ class _Observations:
         self.predictions = 0
         paint = LivePlot.paintEvent
 
-        def watched(plot: LivePlot, event: object) -> None:
+        def paint_and_note(plot: LivePlot, event: object) -> None:
             paint(plot, event)
             self._note(plot)
 
-        LivePlot.paintEvent = watched
+        LivePlot.paintEvent = paint_and_note
 
     def begin(self, window: object) -> None:
         """Begin to count."""
         for values in (self.painted, self.late, self.busy, self.behind, self.age, self.model_age):
             values.clear()
         self.window, self.predictions = window, window.bridge.model.predictions
-        self._last, self._own, self._shown, self._said = time.perf_counter(), time.thread_time(), 0, None
+        self._last, self._own, self._newest_ns, self._prediction = time.perf_counter(), time.thread_time(), 0, None
 
     def beat(self, window: object) -> None:
         """Note how late a beat is, and what was worked since the one before."""
@@ -151,20 +151,20 @@ class _Observations:
         if plot is self.window.live.plots[0]:
             self.painted.append(time.perf_counter())
             blocks = bridge.feed._take
-            received = int(blocks[-1].received_ns[-1]) if blocks else self._shown
-            if received != self._shown:
+            received = int(blocks[-1].received_ns[-1]) if blocks else self._newest_ns
+            if received != self._newest_ns:
                 self.age.append(now - (1e-9 * received - bridge.session_offset))
-                self._shown = received
-        elif plot is self.window.live._model_plot and bridge.model.said not in (None, self._said):
-            self._said = bridge.model.said
-            self.model_age.append(now - (1e-9 * self._said.received_ns - bridge.session_offset))
+                self._newest_ns = received
+        elif plot is self.window.live._model_plot and bridge.model.provisional not in (None, self._prediction):
+            self._prediction = bridge.model.provisional
+            self.model_age.append(now - (1e-9 * self._prediction.received_ns - bridge.session_offset))
 
     def report(self, seconds: float, cpu: dict[str, float]) -> None:
         """Print what was noted in so many seconds; `cpu` is processor time by process [s]."""
         count = self.window.bridge.model.predictions - self.predictions
         print(f"  frames: {len(self.painted) / seconds:.0f} a second, {_parts(np.diff(self.painted))} ms apart")
         print(f"  processor of the window: {1000 * cpu['window'] / len(self.painted):.1f} ms a frame, all it does")
-        print("  processor by process: " + ", ".join(f"{name} {spent / seconds:.2f}" for name, spent in cpu.items()))
+        print("  processor by process: " + ", ".join(f"{name} {cpu_s / seconds:.2f}" for name, cpu_s in cpu.items()))
         late, busy = (sum(x > 0.05 for x in values) for values in (self.late, self.busy))
         print(f"  between two turns of the event loop: {_parts(self.late)} ms, over 50 ms {late} times")
         print(f"  of that its own work: {_parts(self.busy)} ms, over 50 ms {busy} times")

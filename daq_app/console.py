@@ -27,13 +27,13 @@ class Underway:
 
     doing: str
     part: float = 0.0  # of the whole, as shown
-    _begun: float = 0.0  # the part when it began what it is doing
+    _start: float = 0.0  # the part when it began what it is doing
 
     def hear(self, doing: str, part: float) -> None:
         """Take what is being done, and which part of that is done."""
         if doing != self.doing:
-            self.doing, self._begun = doing, self.part
-        self.reach(self._begun + 0.5 * part * (1.0 - self._begun))
+            self.doing, self._start = doing, self.part
+        self.reach(self._start + 0.5 * part * (1.0 - self._start))
 
     def reach(self, part: float) -> None:
         """Move on to this part of the whole; the end is only there when it is there."""
@@ -81,9 +81,9 @@ class Console:
         self.as_json = as_json
         self._out = out or sys.stdout
         self._err = err or sys.stderr
-        self._shown = 0.0
-        self._begun = 0.0  # the job that progress is shown of [s]
-        self._done = 1.0  # of it
+        self._last_line = 0.0
+        self._start = 0.0  # the job that progress is shown of [s]
+        self._part = 1.0  # of it
         self._line_open = False
 
     @property
@@ -112,23 +112,23 @@ class Console:
             self._end_progress()
             self._answer(json.dumps(document, indent=1, allow_nan=False))
 
-    def progress(self, done: float, text: str, *, end_known: bool = True) -> None:
-        """Show how far a long job is (`done` from 0 to 1): a bar on a terminal, else now and then a new line.
+    def progress(self, part: float, text: str, *, end_known: bool = True) -> None:
+        """Show how far a long job is (`part` from 0 to 1): a bar on a terminal, else now and then a new line.
 
-        The bar tells rate and time left where the end is known. A `done` below the last one begins another job.
+        The bar tells rate and time left where the end is known. A `part` below the last one begins another job.
         """
         now = time.monotonic()
-        if done < self._done:
-            self._begun = now
-        self._done = done
+        if part < self._part:
+            self._start = now
+        self._part = part
         terminal = self.at_terminal
-        if now - self._shown < (0.1 if terminal else 2.0) and done < 1:
+        if now - self._last_line < (0.1 if terminal else 2.0) and part < 1:
             return
-        self._shown = now
+        self._last_line = now
         if terminal:
             self._tell(f"\r\x1b[K{self._bar(harmless(text), now, end_known)}", end="")
         else:
-            self._tell(f"{100 * done:3.0f} %  {harmless(text)}")
+            self._tell(f"{100 * part:3.0f} %  {harmless(text)}")
         self._line_open = terminal
 
     def reporter(self, text: str, until: float = 1.0) -> Callable[[float], bool]:
@@ -153,9 +153,9 @@ class Console:
         except (OSError, ValueError):
             columns = _COLUMNS
         return tqdm.format_meter(
-            100.0 * self._done,
+            100.0 * self._part,
             100.0,
-            now - self._begun,
+            now - self._start,
             ncols=max(columns - 1, 1),  # a full line would be broken by some terminals
             prefix=text,
             ascii=not (self._err.encoding or "").lower().startswith("utf"),
@@ -173,8 +173,8 @@ class Console:
         start, over = time.monotonic(), threading.Event()
         at = Underway(text)
 
-        def reach(done: float) -> bool:
-            at.reach(done)
+        def reach(part: float) -> bool:
+            at.reach(part)
             return True
 
         def show() -> None:

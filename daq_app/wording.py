@@ -106,8 +106,8 @@ def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     if value is None or not isfinite(value):
         return "–"
     value *= factor
-    shown = f"{value:#.{digits}g}".rstrip(".")
-    return f"{value:,.0f}" if 10.0**digits <= abs(float(shown)) < 1e6 else shown
+    text = f"{value:#.{digits}g}".rstrip(".")
+    return f"{value:,.0f}" if 10.0**digits <= abs(float(text)) < 1e6 else text
 
 
 def typed_number(text: str, point: str = ".") -> float | None:

@@ -54,19 +54,19 @@ def write_pictures(folder: Path) -> None:
     """Write a picture of the window's parts in each theme, made by the program's own style."""
     application = QApplication.instance() or QApplication([])
     for name, theme in THEMES.items():
-        shown = _parts()
-        shown.setStyle(QStyleFactory.create("Fusion"))
-        shown.setPalette(tokens.palette(theme))
-        shown.setStyleSheet(tokens.style_sheet(theme))
-        shown.resize(640, 260)
-        shown.grab().save(str(folder / f"looks-{name}.png"))
+        widget = _parts()
+        widget.setStyle(QStyleFactory.create("Fusion"))
+        widget.setPalette(tokens.palette(theme))
+        widget.setStyleSheet(tokens.style_sheet(theme))
+        widget.resize(640, 260)
+        widget.grab().save(str(folder / f"looks-{name}.png"))
     del application
 
 
 def _parts() -> QWidget:
-    shown = QWidget()
-    shown.setObjectName("window")
-    grid = QGridLayout(shown)
+    widget = QWidget()
+    widget.setObjectName("window")
+    grid = QGridLayout(widget)
     for at, role in enumerate(("headline", "title", "value", "quiet")):
         grid.addWidget(label(f"{role.capitalize()} 0123", role), at, 0)
     grid.addWidget(button("Primary", "primary", lambda: None, "primary"), 0, 1)
@@ -80,7 +80,7 @@ def _parts() -> QWidget:
         graded = label(f"This is {grade}.", "value")
         graded.setProperty("grade", grade)
         grid.addWidget(graded, at + 1, 2)
-    return shown
+    return widget
 
 
 def _luminance(name: str) -> float:

@@ -41,22 +41,22 @@ def _strain_legend(axes: Axes, kinds: Iterable[str], place: Literal["upper right
 
 
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
-    drawn = style.sheet(*SQUARE)
-    axes = drawn.axes[0]
+    sheet = style.sheet(*SQUARE)
+    axes = sheet.axes[0]
     table: list[tuple[str | float, ...]] = []
     for kinematics, mine in _by_strain(rows).items():
-        timed = [(r.judged_error, getattr(r, time), r) for r in mine]
-        known = [(error, 1e3 * span, r) for error, span, r in timed if error is not None and span is not None]
-        if not known:
+        spans = [(r.judged_error, getattr(r, time), r) for r in mine]
+        timings = [(error, 1e3 * span, r) for error, span, r in spans if error is not None and span is not None]
+        if not timings:
             continue
         colour = _COLOURS[kinematics]
         points = [
             (error, span, error < 3.0 * doubt[kinematics], f"{kinematics} strain: {row.dofs} unknowns, ", "")
-            for error, span, row in known
+            for error, span, row in timings
         ]
-        _curve(drawn, kinematics, points)
-        table += [(kinematics, row.dofs, error, 1e-3 * span) for error, span, row in known]
-        error, span, _ = known[-1]
+        _curve(sheet, kinematics, points)
+        table += [(kinematics, row.dofs, error, 1e-3 * span) for error, span, row in timings]
+        error, span, _ = timings[-1]
         axes.annotate(
             f"{kinematics} strain", (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour
         )
@@ -65,22 +65,22 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     _logarithmic(axes)
     axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
     header = ("kinematics", "unknowns", "largest true error [-]", "median time [s]")
-    return drawn.panel(f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
+    return sheet.panel(f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
 
 
-def _curve(drawn: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
+def _curve(sheet: style.Sheet, kinematics: str, points: Sequence[tuple[float, float, bool, str, str]]) -> None:
     """Draw times [ms] against errors [-], with a mark at each, hollow or not, and words around its numbers."""
-    axes, colour = drawn.axes[0], _COLOURS[kinematics]
+    axes, colour = sheet.axes[0], _COLOURS[kinematics]
     axes.plot([100 * error for error, *_ in points], [span for _, span, *_ in points], color=colour, linewidth=0.8)
     for error, span, hollow, before, behind in points:
-        gid = drawn.note(f"{before}{100 * error:.2g} %, {span:.3g} ms{behind}")
+        gid = sheet.note(f"{before}{100 * error:.2g} %, {span:.3g} ms{behind}")
         face = "white" if hollow else colour
         axes.plot(100 * error, span, _MARKS[kinematics], color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
 
 
 def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
-    drawn = style.sheet(*SQUARE)
-    axes = drawn.axes[0]
+    sheet = style.sheet(*SQUARE)
+    axes = sheet.axes[0]
     by_strain = _by_strain(rows)
     for kinematics, mine in by_strain.items():
         for error_of, words in (("worst_estimate", "guaranteed"), ("worst_error", "true")):
@@ -90,7 +90,7 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
                 for r in mine
                 if (error := getattr(r, error_of))
             ]  # fmt: skip
-            _curve(drawn, kinematics, points)
+            _curve(sheet, kinematics, points)
     _logarithmic(axes)
     _strain_legend(axes, by_strain, "upper right")
     title = "surfaces solved to a tolerance"
@@ -104,28 +104,28 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
          "not known" if r.worst_error is None else r.worst_error, r.took_s / r.surfaces)
         for r in rows
     ]  # fmt: skip
-    return drawn.panel("speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
+    return sheet.panel("speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
 
 
 def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
-    drawn = style.sheet(*_WIDE)
-    axes = drawn.axes[0]
+    sheet = style.sheet(*_WIDE)
+    axes = sheet.axes[0]
     table: list[tuple[str | float, ...]] = []
-    shown = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
+    colours = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
     for row in rows:
         across, up = (row.errors, row.took_s) if timed else (row.sizes, row.errors)
         words = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
         dashes = "--" if row.kinematics == "finite" else "-"
         axes.plot(
-            across, up, dashes, marker=_mark(row.problem), color=shown.get(row.quantity, style.GREEN), markersize=3.5,
-            linewidth=0.9, gid=drawn.note(words),
+            across, up, dashes, marker=_mark(row.problem), color=colours.get(row.quantity, style.GREEN), markersize=3.5,
+            linewidth=0.9, gid=sheet.note(words),
         )  # fmt: skip
         table += [
             (row.problem, row.quantity, row.kinematics, size, error, took)
             for size, error, took in zip(row.sizes, row.errors, row.took_s, strict=True)
         ]
     for quantity in dict.fromkeys(row.quantity for row in rows):
-        axes.plot([], [], "-", color=shown.get(quantity, style.GREEN), label=quantity)
+        axes.plot([], [], "-", color=colours.get(quantity, style.GREEN), label=quantity)
     for kind in dict.fromkeys(row.problem.split(",")[0] for row in rows):
         axes.plot([], [], " ", marker=_mark(kind), color=style.GREY, markersize=3.5, label=kind)
     if any(row.kinematics == "finite" for row in rows):
@@ -135,9 +135,9 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
     if timed:
         axes.set(xlabel="error [–]", ylabel="time of a solve [s]")
-        return drawn.panel("benchmarks", "Time against true error on published problems", header, table)
+        return sheet.panel("benchmarks", "Time against true error on published problems", header, table)
     axes.set(xlabel="element size, by the unit of each problem [–]", ylabel="error [–]")
-    return drawn.panel("orders", "Error against element size", header, table)
+    return sheet.panel("orders", "Error against element size", header, table)
 
 
 def _mark(problem: str) -> str:
@@ -146,14 +146,14 @@ def _mark(problem: str) -> str:
 
 
 def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
-    drawn = style.sheet(*SQUARE)
-    axes = drawn.axes[0]
+    sheet = style.sheet(*SQUARE)
+    axes = sheet.axes[0]
     for row in rows:
         face = _COLOURS[row.kinematics] if row.above is not None else "none"
         words = f"{row.case}, {row.kinematics}: estimate {100 * row.estimate:.2g} %, true {100 * row.error:.2g} %"
         axes.plot(
             100 * max(row.error, 1e-7), 100 * row.estimate, _MARKS[row.kinematics], color=_COLOURS[row.kinematics],
-            markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=drawn.note(words),
+            markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=sheet.note(words),
         )  # fmt: skip
     _logarithmic(axes)
     low, high = axes.get_xlim()
@@ -167,12 +167,12 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
     table = [(r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows]
     name = "estimate-" + number.split()[0].lower()
-    return drawn.panel(name, f"Estimated against true error of the {number}", header, table)
+    return sheet.panel(name, f"Estimated against true error of the {number}", header, table)
 
 
 def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
-    drawn = style.sheet(_WIDE[0], max(190, 60 + 45 * len(rows)))
-    axes = drawn.axes[0]
+    sheet = style.sheet(_WIDE[0], max(190, 60 + 45 * len(rows)))
+    axes = sheet.axes[0]
     parts = dict.fromkeys(name for row in rows for name in row.parts)
     colours = dict(zip(parts, cycle(_PARTS), strict=False))
     table: list[tuple[str | float, ...]] = []
@@ -192,12 +192,12 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.05))
     axes.set_xlabel("time [ms]")
     header = ("kinematics", "tolerance", "unknowns", "part", "share [-]", "time [s]")
-    return drawn.panel("costs", "Where the time of a solve goes", header, table)
+    return sheet.panel("costs", "Where the time of a solve goes", header, table)
 
 
 def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
-    drawn = style.sheet(*SQUARE)
-    axes = drawn.axes[0]
+    sheet = style.sheet(*SQUARE)
+    axes = sheet.axes[0]
     for kinematics, mine in _by_strain(rows).items():
         power = exponent(mine)
         words = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
@@ -213,7 +213,7 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
     axes.set(xlabel="unknowns", ylabel="time [ms]")
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
     table = [(r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows]
-    return drawn.panel("growth", "Growth of the time with the unknowns", header, table)
+    return sheet.panel("growth", "Growth of the time with the unknowns", header, table)
 
 
 CAPTIONS = {
@@ -239,13 +239,13 @@ CAPTIONS = {
 }  # fmt: skip
 
 
-def plates(measured: RunResults) -> dict[str, style.Plate]:
+def plates(results: RunResults) -> dict[str, style.Plate]:
     """Return the figures that there are numbers for, by name."""
-    speeds, guaranteed, orders = measured.of(Speed), measured.of(GuaranteedCost), measured.of(Order)
-    costs, growth = measured.of(Cost), measured.of(Growth)
-    truths = [truth for truth in measured.of(Truth) if truth.case in JUDGED and truth.doubt]
+    speeds, guaranteed, orders = results.of(Speed), results.of(GuaranteedCost), results.of(Order)
+    costs, growth = results.of(Cost), results.of(Growth)
+    truths = [truth for truth in results.of(Truth) if truth.case in JUDGED and truth.doubt]
     doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in _COLOURS}
-    estimates = [[row for row in measured.of(Estimate) if row.number == number] for number in GOALS]
+    estimates = [[row for row in results.of(Estimate) if row.number == number] for number in GOALS]
     with style.look():
         panels: dict[str, list[style.Panel | None]] = {
             "speed": [
@@ -259,8 +259,8 @@ def plates(measured: RunResults) -> dict[str, style.Plate]:
             "costs": [_cost_panel(costs) if costs else None],
             "growth": [_growth_panel(growth) if growth else None],
         }
-    drawn = {name: style.plate(name, CAPTIONS[name], parts) for name, parts in panels.items()}
-    return {name: plate for name, plate in drawn.items() if plate.panels}
+    every = (style.plate(name, CAPTIONS[name], parts) for name, parts in panels.items())
+    return {plate.name: plate for plate in every if plate.panels}
 
 
 def _logarithmic(axes: Axes) -> None:

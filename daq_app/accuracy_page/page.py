@@ -71,8 +71,8 @@ def _table_maker(
 ) -> Callable[[RunResults], Table]:
     """Return the function that makes a table with a line for each row of a kind, each cell made by its column."""
 
-    def table(measured: RunResults) -> Table:
-        rows = sorted(measured.of(kind), key=order)
+    def table(results: RunResults) -> Table:
+        rows = sorted(results.of(kind), key=order)
         return Table(
             name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows)
         )
@@ -80,24 +80,24 @@ def _table_maker(
     return table
 
 
-def _machine(measured: RunResults) -> Table:
+def _machine(results: RunResults) -> Table:
     rows: list[tuple[str, str]] = []
-    for row in measured.of(Machine):
+    for row in results.of(Machine):
         rows += [
-            ("begun", f"{measured.begun} UTC"), ("system", row.system),
+            ("begun", f"{results.begun} UTC"), ("system", row.system),
             ("processor", f"{row.processor}, {row.cores} cores"),
             ("threads of linear algebra", row.threads),
             ("processes wanting a core before it began", "not known" if row.load is None else f"{row.load:.2f}"),
-            ("took", f"{sum(measured.took_s.values()):.0f} s" + (", stopped by hand" if measured.stopped else "")),
+            ("took", f"{sum(results.took_s.values()):.0f} s" + (", stopped by hand" if results.stopped else "")),
             *row.versions.items(),
-            *(("not measured", sentence) for sentence in measured.left_out),
+            *(("not measured", sentence) for sentence in results.left_out),
         ]  # fmt: skip
     return Table("machine", "Machine, load and versions.", ("", ""), tuple(rows))
 
 
-def _estimates(measured: RunResults) -> Table:
+def _estimates(results: RunResults) -> Table:
     """Return how often estimates are above and near, by kinematics and number."""
-    rows = measured.of(Estimate)
+    rows = results.of(Estimate)
     cells: list[tuple[str, ...]] = []
     for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
         mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
@@ -120,8 +120,8 @@ def _share(answers: Sequence[bool | None]) -> str:
     return f"{sum(verdicts)} of {len(verdicts)}" if verdicts else "–"
 
 
-def _hard(measured: RunResults, kinematics: str) -> Table:
-    rows = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
+def _hard(results: RunResults, kinematics: str) -> Table:
+    rows = [row for row in results.of(HardCase) if row.kinematics == kinematics]
     passed = sum(not row.flaw for row in rows)
     caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
     outcomes = [f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary for row in rows]
@@ -248,9 +248,9 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
 )  # fmt: skip
 
 
-def tables(measured: RunResults) -> dict[str, Table]:
+def tables(results: RunResults) -> dict[str, Table]:
     """Return the tables that there are rows for, by name."""
-    return {table.name: table for table in (make(measured) for make in _TABLES) if table.rows}
+    return {table.name: table for table in (make(results) for make in _TABLES) if table.rows}
 
 
 def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:
@@ -258,14 +258,14 @@ def filled_pages(docs: Path, tables: Mapping[str, Table]) -> dict[Path, str]:
 
     A table that the run has no rows for is said to be missing. Raises OSError, and ValueError for a page without marks.
     """
-    filled: dict[Path, str] = {}
+    texts: dict[Path, str] = {}
     for page, names in PAGES.items():
         text = (docs / page).read_text(encoding="utf-8")
         for name in names:
             content = f"{tables[name].caption}\n\n{tables[name].markdown()}" if name in tables else "Not measured."
             text = fill_marks(text, name, content)
-        filled[docs / page] = text
-    return filled
+        texts[docs / page] = text
+    return texts
 
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
@@ -284,32 +284,32 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 )
 
 
-def page(measured: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
+def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
-    figures, listed = plates(measured) if figures is None else figures, tables(measured)
-    there = [section for section in SECTIONS if any(part in figures or part in listed for part in section[2])]
+    figures, by_name = plates(results) if figures is None else figures, tables(results)
+    there = [section for section in SECTIONS if any(part in figures or part in by_name for part in section[2])]
     return template("accuracy.html.jinja", "daq_app.accuracy_page").render(
-        found=measured,
+        results=results,
         figures=figures,
-        tables=listed,
+        tables=by_name,
         sections=[(name, words) for name, words, _ in there],
         parts={name: parts for name, _, parts in there},
         wide=("benchmarks", "orders", "costs"),
-        drawn=embed,
+        embed=embed,
         processor_time=PROCESSOR_TIME,
     )
 
 
-def write(measured: RunResults, folder: Path) -> tuple[Path, ...]:
+def write(results: RunResults, folder: Path) -> tuple[Path, ...]:
     """Write page, pictures and data to `folder`; return the files. Raises ReportError where that cannot be done."""
     data = folder / DATA
-    swap_in(data, json.dumps(measured.to_dict(), indent=1, allow_nan=False) + "\n")
-    written = [data]
-    figures = plates(measured)
+    swap_in(data, json.dumps(results.to_dict(), indent=1, allow_nan=False) + "\n")
+    paths = [data]
+    figures = plates(results)
     for plate in figures.values():
         for panel in plate.panels:
             path = folder / FIGURES / f"{panel.name}.svg"
             swap_in(path, panel.svg)
-            written.append(path)
-    swap_in(folder / PAGE, page(measured, figures))
-    return (folder / PAGE, *written)
+            paths.append(path)
+    swap_in(folder / PAGE, page(results, figures))
+    return (folder / PAGE, *paths)

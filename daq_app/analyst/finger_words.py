@@ -9,7 +9,7 @@ from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
-Compared = tuple[tuple[str, tuple[tuple[float | None, float | None], ...]], ...]
+ComparisonRows = tuple[tuple[str, tuple[tuple[float | None, float | None], ...]], ...]
 MEAN_PANELS = tr_noop(("µ", "SED [kPa]", "score"))
 PHASES = {
     "pressing": tr_noop("pressing down"), "sticking": tr_noop("sticking: dragged, nothing slips yet"),
@@ -17,7 +17,7 @@ PHASES = {
 }  # fmt: skip
 
 
-def compare_reports(first: Report, second: Report) -> Compared:
+def compare_reports(first: Report, second: Report) -> ComparisonRows:
     """Return every stimulus of either session, experiments in their order, and both sessions' means in `MEAN_PANELS`.
 
     mu is the one that the model got; None where a session has no number.
@@ -32,12 +32,12 @@ def compare_reports(first: Report, second: Report) -> Compared:
 
 def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
     gathered: defaultdict[tuple[str, int], defaultdict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for said in report.predictions:
-        if said.index is None:
+    for one in report.predictions:
+        if one.index is None:
             continue
-        for name, value in (("µ", said.mu), ("SED [kPa]", None if said.sed is None else 1000.0 * said.sed)):
+        for name, value in (("µ", one.mu), ("SED [kPa]", None if one.sed is None else 1000.0 * one.sed)):
             if value is not None:
-                gathered[said.experiment, said.index][name].append(value)
+                gathered[one.experiment, one.index][name].append(value)
     for experiment in report.experiments:
         for score in experiment.scores:
             gathered[experiment.name, score.index]["score"].append(score.mean)
@@ -46,21 +46,21 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
 
 def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
     """Return where the colours of all trials of a session, and of one compared with it, begin and end."""
-    known = [] if state is None else [state.fingers]
-    if state is not None and state.compared is not None:
-        known.append(state.compared.fingers)
-    return automatic_range(field, (finger.frame for fingers in known for finger in fingers.values()))
+    finger_maps = [] if state is None else [state.fingers]
+    if state is not None and state.other is not None:
+        finger_maps.append(state.other.fingers)
+    return automatic_range(field, (finger.frame for fingers in finger_maps for finger in fingers.values()))
 
 
-def shown_film(state: AnalystState) -> m.Filmed | None:
+def shown_film(state: AnalystState) -> m.FingerHistory | None:
     """Return the history that was asked for, where it is that of the chosen trial."""
     row = selected_row(state)
     return state.film if row is not None and state.film is not None and state.film.key == row.key else None
 
 
-def was_tried(said: PredictionFinding) -> bool:
+def was_tried(prediction: PredictionFinding) -> bool:
     """Say whether a trial was given to the solver: all that it needs is known."""
-    return None not in (said.mu, said.tau_max, said.indentation, said.direction)
+    return None not in (prediction.mu, prediction.tau_max, prediction.indentation, prediction.direction)
 
 
 def finger_words(state: AnalystState | None) -> str:
@@ -68,15 +68,15 @@ def finger_words(state: AnalystState | None) -> str:
     row = None if state is None else selected_row(state)
     if state is None or row is None:
         return ""
-    said = row.prediction
+    prediction = row.prediction
     name = tr("stroke") if row.trial is None else tr("trial {trial}", trial=row.trial)
-    if said is None:
+    if prediction is None:
         if state.halted:
             return tr("The finger of {name} was not solved: the work was stopped. 'Go on' solves it.", name=name)
         return tr("The finger of {name} is being solved.", name=name)
-    if said.sed is None:
-        return tr("No settled finger. {why}", why=said.reasons.get("sed", tr("no reason is known")))
-    parts = [tr("Finger of {name}, settled", name=name), sed_words(state.report, said)]
+    if prediction.sed is None:
+        return tr("No settled finger. {why}", why=prediction.reasons.get("sed", tr("no reason is known")))
+    parts = [tr("Finger of {name}, settled", name=name), sed_words(state.report, prediction)]
     if (finger := state.fingers.get(row.key)) is not None:
         parts.append(_contact_words(finger.frame))
     return " · ".join(parts)
@@ -87,11 +87,11 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
 
     Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
     """
-    other, row = (None, None) if state is None else (state.compared, selected_row(state))
+    other, row = (None, None) if state is None else (state.other, selected_row(state))
     if state is None or other is None or state.report is None or row is None or row.prediction is None:
         return None, ""
     mine, theirs = (_of_stimulus(report, row.prediction) for report in (state.report, other.report))
-    place = [said.stroke for said in mine].index(row.prediction.stroke)
+    place = [one.stroke for one in mine].index(row.prediction.stroke)
     theirs_row = theirs[place] if place < len(theirs) else None
     finger = None if theirs_row is None else other.fingers.get((theirs_row.trial, theirs_row.stroke))
     if theirs_row is None or theirs_row.sed is None or finger is None:
@@ -101,10 +101,10 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
 
 def _of_stimulus(report: Report, of: PredictionFinding) -> list[PredictionFinding]:
     alike = [p for p in report.predictions if (p.experiment, p.index) == (of.experiment, of.index)]
-    return sorted(alike, key=lambda said: said.stroke or 0)
+    return sorted(alike, key=lambda p: p.stroke or 0)
 
 
-def film_words(film: m.Filmed | None, at: int | None = None) -> str:
+def film_words(film: m.FingerHistory | None, at: int | None = None) -> str:
     """Return what is said of one state of a history; without one, why the history ends before it settles."""
     if film is None:
         return ""

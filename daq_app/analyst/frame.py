@@ -198,9 +198,9 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
     tops = [0.0]
     for frame in frames:
         values = np.abs(field.of(frame))
-        known = values[np.isfinite(values)]
-        if len(known):
-            tops.append(float(np.quantile(known, _TOP)))
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            tops.append(float(np.quantile(finite, _TOP)))
     high = step_above(max(tops))
     return (-high if field.signed else 0.0), high
 

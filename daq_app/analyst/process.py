@@ -85,33 +85,33 @@ class Analyst:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._stopped: float | None = None  # when it was asked to stop and has not yet
+        self._stop_time: float | None = None  # when it was asked to stop and has not yet
         self._child: Child | None = self._begin()
 
-    def poll(self) -> tuple[m.Said, ...]:
+    def poll(self) -> tuple[m.Reply, ...]:
         """Return what came since the last call."""
-        said: list[m.Said] = []
+        messages: list[m.Reply] = []
         while self._child is not None:
             try:
                 if (message := self._child.receive()) is None:
                     break
-                said.append(message)
+                messages.append(message)
             except (EOFError, OSError):
                 self.close()
-                if not said or not isinstance(said[-1], m.Problem):
+                if not messages or not isinstance(messages[-1], m.Problem):
                     words = tr("The work has stopped without a word; what is asked next begins it anew.")
-                    said.append(m.Problem(words))
-        if any(isinstance(one, m.Cancelled) for one in said):
-            self._stopped = None
-        if self._stopped is not None and time.monotonic() - self._stopped > _PATIENCE:
+                    messages.append(m.Problem(words))
+        if any(isinstance(one, m.Cancelled) for one in messages):
+            self._stop_time = None
+        if self._stop_time is not None and time.monotonic() - self._stop_time > _PATIENCE:
             self.close()
-            said.append(m.Cancelled())
-        return tuple(said)
+            messages.append(m.Cancelled())
+        return tuple(messages)
 
     def ask(self, request: m.Ask) -> None:
         """Ask for something; where the work was ended before, it begins anew and does that first."""
         if isinstance(request, m.Stop):
-            self._stopped = time.monotonic()
+            self._stop_time = time.monotonic()
         if self._child is None:
             if isinstance(request, m.Stop):
                 return
@@ -123,7 +123,7 @@ class Analyst:
         """End the work."""
         if self._child is not None:
             self._child.close()
-        self._child = self._stopped = None
+        self._child = self._stop_time = None
 
     def _begin(self) -> Child:
         return Child(run, str(self._folder), name="analyst")

@@ -51,8 +51,8 @@ def marks_of(row: Row) -> str:
     """Return what the marks of a line mean, for who hovers and for screen readers."""
     stroke, failed = row.stroke, row.prediction is not None and row.prediction.sed is None
     flaws = tr("! has flaws: ") + _flaws(stroke) if stroke is not None and stroke.flaws else ""
-    decided = tr("✎ somebody decided something about it") if stroke is not None and stroke.decided else ""
-    return "; ".join(filter(None, (flaws, decided, tr("✗ the model has no SED for it") if failed else "")))
+    decision = tr("✎ somebody decided something about it") if stroke is not None and stroke.decided else ""
+    return "; ".join(filter(None, (flaws, decision, tr("✗ the model has no SED for it") if failed else "")))
 
 
 def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
@@ -72,43 +72,44 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (tr("normal force"), _value(stroke, "normal_force", "{:.2f} N")),
             (tr("flaws"), _flaws(stroke) or tr("none")),
         ]
-    if (said := row.prediction) is not None:
-        under, errors = condition(state.report, said), errors_words(said.normal_force_error)
-        sed = _value(said, "sed", "") if said.sed is None else sed_with_errors(state.report, said)
+    if (prediction := row.prediction) is not None:
+        under = condition(state.report, prediction)
+        force = _value(prediction, "normal_force", "{:.2f} N" + errors_words(prediction.normal_force_error))
+        sed = _value(prediction, "sed", "") if prediction.sed is None else sed_with_errors(state.report, prediction)
         lines += [
             (tr("SED {condition}, averaged over the ending", condition=under), sed),
-            *_other_response(state, said),
-            (tr("model: µ"), _value(said, "mu", "{:.3f} (" + tr(said.mu_rule) + ")")),
-            (tr("model: indentation"), _value(said, "indentation", "{:.2f} mm, " + tr("prescribed"))),
-            (tr("model: normal force {condition}", condition=under), _value(said, "normal_force", "{:.2f} N" + errors)),
+            *_other_response(state, prediction),
+            (tr("model: µ"), _value(prediction, "mu", "{:.3f} (" + tr(prediction.mu_rule) + ")")),
+            (tr("model: indentation"), _value(prediction, "indentation", "{:.2f} mm, " + tr("prescribed"))),
+            (tr("model: normal force {condition}", condition=under), force),
         ]
     elif state.stage == "analysed":
         lines.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
     return tuple(lines)
 
 
-def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[str, str]]:
+def _other_response(state: AnalystState, prediction: PredictionFinding) -> list[tuple[str, str]]:
     """Return the chosen quantity with its errors; nothing where it is the SED, which always stands."""
-    shown = shown_response(state.response)
-    response = shown.of(said)
-    if shown.name == SED.name or not response:
+    kind = shown_response(state.response)
+    response = kind.of(prediction)
+    if kind.name == SED.name or not response:
         return []
     value, *error = response
     mesh = error[0] / abs(value) if error and value else None
-    under, words = condition(state.report, said), tr(shown.label)
+    under, words = condition(state.report, prediction), tr(kind.label)
     name = tr("{response} {condition}, averaged over the ending", response=words, condition=under)
-    return [(name, shown.text(shown.factor * value) + errors_words(mesh))]
+    return [(name, kind.text(kind.factor * value) + errors_words(mesh))]
 
 
-def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
+def sed_with_errors(report: Report | None, prediction: PredictionFinding) -> str:
     """Return a SED with its error from the mesh, and the greatest from what the model leaves out, over all trials."""
-    assert said.sed is not None  # a trial without an answer has a reason in its place
-    return f"{1000.0 * said.sed:.3f} kPa{errors_words(said.error_estimate, _effect(report))}"
+    assert prediction.sed is not None  # a trial without an answer has a reason in its place
+    return f"{1000.0 * prediction.sed:.3f} kPa{errors_words(prediction.error_estimate, _effect(report))}"
 
 
-def sed_words(report: Report | None, said: PredictionFinding) -> str:
+def sed_words(report: Report | None, prediction: PredictionFinding) -> str:
     """Return a SED with its condition and errors."""
-    return f"SED {condition(report, said)} {sed_with_errors(report, said)}"
+    return f"SED {condition(report, prediction)} {sed_with_errors(report, prediction)}"
 
 
 def greatest_errors(report: Report | None, response: str = SED.name) -> str:
@@ -116,16 +117,16 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
 
     The mesh's error is the greatest of all trials, and unknown where that of one is.
     """
-    shown = shown_response(response)
-    pairs = [(said, shown.of(said)) for said in (() if report is None else report.predictions)]
-    known = [(said, value) for said, value in pairs if value]
-    if not known:
+    kind = shown_response(response)
+    pairs = [(prediction, kind.of(prediction)) for prediction in (() if report is None else report.predictions)]
+    answers = [(prediction, value) for prediction, value in pairs if value]
+    if not answers:
         return ""
-    mesh = [value[1] / abs(value[0]) for _, value in known if len(value) > 1 and value[0]]
+    mesh = [value[1] / abs(value[0]) for _, value in answers if len(value) > 1 and value[0]]
     effect = _effect(report) if response == SED.name else ""
-    errors = errors_words(max(mesh) if len(mesh) == len(known) else None, effect)
-    under = " / ".join(sorted({condition(report, said) for said, _ in known}))
-    return tr("{response} {condition}{errors}", response=tr(shown.label), condition=under, errors=errors)
+    errors = errors_words(max(mesh) if len(mesh) == len(answers) else None, effect)
+    under = " / ".join(sorted({condition(report, prediction) for prediction, _ in answers}))
+    return tr("{response} {condition}{errors}", response=tr(kind.label), condition=under, errors=errors)
 
 
 def picture_errors(report: Report | None, picture: str) -> str:
@@ -140,12 +141,12 @@ def _effect(report: Report | None) -> str:
     return "" if most is None else f"{most.name} {most.value}"
 
 
-def condition(report: Report | None, said: PredictionFinding) -> str:
+def condition(report: Report | None, prediction: PredictionFinding) -> str:
     """Return under which condition a SED holds: the depth that was prescribed, and the strain.
 
     The window shows another number while a session runs: that at the measured force.
     """
-    depth = "" if said.indentation is None else tr("at {depth:.3g} mm", depth=said.indentation)
+    depth = "" if prediction.indentation is None else tr("at {depth:.3g} mm", depth=prediction.indentation)
     return ", ".join(filter(None, (depth, "" if report is None else tr(report.model.split(",")[0]))))
 
 
@@ -157,14 +158,14 @@ def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
 def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     """Return what the model holds of the chosen trial, and of all: name, value, remark."""
     row = selected_row(state)
-    said = None if row is None else row.prediction
+    prediction = None if row is None else row.prediction
     facts: list[tuple[str, str, str]] = []
-    if said is not None:
-        way = "" if said.direction is None else tr("{way}, as measured", way=tr(_WAYS[said.direction]))
+    if prediction is not None:
+        way = "" if prediction.direction is None else tr("{way}, as measured", way=tr(_WAYS[prediction.direction]))
         facts += [
-            (tr("µ of this trial"), _value(said, "mu", "{:.4f}"), tr(said.mu_rule)),
-            (tr("τ max of this trial"), _value(said, "tau_max", "{:.2f} kPa", 1000.0), ""),
-            (tr("indentation"), _value(said, "indentation", "{:.3g} mm"), tr("of the block's plan")),
+            (tr("µ of this trial"), _value(prediction, "mu", "{:.4f}"), tr(prediction.mu_rule)),
+            (tr("τ max of this trial"), _value(prediction, "tau_max", "{:.2f} kPa", 1000.0), ""),
+            (tr("indentation"), _value(prediction, "indentation", "{:.3g} mm"), tr("of the block's plan")),
             (tr("way"), way or "–", ""),
         ]
     if (report := state.report) is not None:
@@ -188,15 +189,17 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     report = state.report
     if report is None:
         return ()
-    shown = shown_response(state.response)
+    kind = shown_response(state.response)
     scores = {(one.name, score.index): score.mean for one in report.experiments for score in one.scores}
     points: list[Point] = []
     for number, row in enumerate(rows(state)):
-        said = row.prediction
-        response = None if said is None else shown.of(said)
-        if said is not None and said.index is not None and response and (said.experiment, said.index) in scores:
-            score = scores[said.experiment, said.index]
-            points.append(Point(said.experiment, said.index, score, shown.factor * response[0], number))
+        prediction = row.prediction
+        response = None if prediction is None else kind.of(prediction)
+        if prediction is None or prediction.index is None or not response:
+            continue
+        stimulus = prediction.experiment, prediction.index
+        if stimulus in scores:
+            points.append(Point(*stimulus, scores[stimulus], kind.factor * response[0], number))
     return tuple(points)
 
 
@@ -210,10 +213,10 @@ def progress_words(step: Step | None) -> str:
     """
     if step is None:
         return ""
-    left = "" if step.left is None else tr(", about {seconds} s left", seconds=int(step.left) + 1)
+    remaining = "" if step.remaining_s is None else tr(", about {seconds} s left", seconds=int(step.remaining_s) + 1)
     at, steps = round(step.part * step.load_steps), step.load_steps
-    done = tr("load step {step} of {steps}", step=at, steps=steps) if steps else f"{100 * step.part:.0f} %"
-    return f"{tr(step.words)}  {done}{left}"
+    amount = tr("load step {step} of {steps}", step=at, steps=steps) if steps else f"{100 * step.part:.0f} %"
+    return f"{tr(step.words)}  {amount}{remaining}"
 
 
 def _name_of(of: StrokeFinding | PredictionFinding | AnswerFinding) -> str:
@@ -263,25 +266,25 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
     links = [Link(state.folder.name, "session", str(state.folder))]
     if row.trial is not None:
         links.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
-    said, stroke = row.prediction, row.stroke
-    if said is not None and said.sed is not None:
-        links.append(Link(sed_words(state.report, said), "prediction", tr("averaged over the ending")))
+    prediction, stroke = row.prediction, row.stroke
+    if prediction is not None and prediction.sed is not None:
+        links.append(Link(sed_words(state.report, prediction), "prediction", tr("averaged over the ending")))
     if stroke is None:
         return tuple(links)
-    links.append(_friction(stroke, said))
+    links.append(_friction(stroke, prediction))
     if stroke.steady is not None:
         words = tr("steady window {begin:.3f} to {end:.3f} s", begin=stroke.steady[0], end=stroke.steady[1])
         links.append(Link(words, "window", tr("of stroke {number}, device's clock", number=stroke.number)))
     words, more = tr("raw readings"), tr("counts, sequence and device counter, as they were recorded")
-    if state.read is not None and state.read.stroke == stroke.number:
-        words, more = tr("readings: {count}", count=len(state.read.readings.block)), state.read.readings.place
+    if state.excerpt is not None and state.excerpt.stroke == stroke.number:
+        words, more = tr("readings: {count}", count=len(state.excerpt.readings.block)), state.excerpt.readings.place
     return (*links, Link(words, "readings", more))
 
 
-def _friction(stroke: StrokeFinding, said: PredictionFinding | None) -> Link:
-    if said is not None and said.mu is not None:
+def _friction(stroke: StrokeFinding, prediction: PredictionFinding | None) -> Link:
+    if prediction is not None and prediction.mu is not None:
         tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
-        rule = tr("the model was given the {rule}", rule=tr(said.mu_rule))
-        return Link(f"µ {said.mu:.3f}{tau}", "friction", rule)
+        rule = tr("the model was given the {rule}", rule=tr(prediction.mu_rule))
+        return Link(f"µ {prediction.mu:.3f}{tau}", "friction", rule)
     why = stroke.reasons.get("mu_dynamic", "") if stroke.mu_dynamic is None else tr("mean over the steady window")
     return Link(f"µ {quantity(stroke.mu_dynamic, 3)}", "friction", why)

@@ -25,7 +25,7 @@ class Step(Struct, frozen=True):
 
     part: float  # of all of it, 0 to 1
     words: str
-    left: float | None = None  # about how long it will still take [s]; None: not known
+    remaining_s: float | None = None  # about how long it will still take [s]; None: not known
     load_steps: int = 0  # of which `part` are done; 0: it is not done in load steps
 
 
@@ -37,14 +37,14 @@ class ReportReady(Struct, frozen=True):
     history: History = History()
 
 
-class Answered(Struct, frozen=True, eq=False):
+class TrialAnswer(Struct, frozen=True, eq=False):
     """The model's answer to one trial."""
 
     finding: PredictionFinding
     finger: Finger | None  # None where there is no answer
 
 
-class Drawn(Struct, frozen=True):
+class SessionPicture(Struct, frozen=True):
     """A picture of the session; `png` is empty where there are no numbers for it."""
 
     name: str
@@ -52,7 +52,7 @@ class Drawn(Struct, frozen=True):
     png: bytes
 
 
-class Filmed(Struct, frozen=True, eq=False):
+class FingerHistory(Struct, frozen=True, eq=False):
     """The history of one trial's finger."""
 
     key: Key
@@ -60,14 +60,14 @@ class Filmed(Struct, frozen=True, eq=False):
     why: str = ""  # why it ends before a settled state; "" where it has one
 
 
-class Read(Struct, frozen=True, eq=False):
+class Excerpt(Struct, frozen=True, eq=False):
     """The readings around one stroke, as they were recorded."""
 
     stroke: int  # its number
     readings: RawReadings
 
 
-class Compared(Struct, frozen=True, eq=False):
+class OtherSession(Struct, frozen=True, eq=False):
     """Another session, analysed and predicted alike."""
 
     folder: str
@@ -167,8 +167,11 @@ class Stop(Struct, frozen=True):
 
 
 Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
-Said = Step | ReportReady | Answered | Drawn | Filmed | Read | Compared | Done | Problem | Cancelled | Idle
-Message = Ask | Said | Respond
+Reply = (
+    Step | ReportReady | TrialAnswer | SessionPicture | FingerHistory | Excerpt | OtherSession
+    | Done | Problem | Cancelled | Idle
+)  # fmt: skip
+Message = Ask | Reply | Respond
 
 Stage = Literal["opening", "analysed", "predicted"]
 OPENING = Step(0.0, tr_noop("opening"))
@@ -184,10 +187,10 @@ class AnalystState:
     history: History = field(default_factory=History)
     version: int = 0  # of the report; pictures drawn of an earlier one are out of date
     fingers: Mapping[Key, Finger] = field(default_factory=dict[Key, Finger])
-    drawn: Mapping[str, Drawn] = field(default_factory=dict[str, Drawn])  # of this version, by name
-    film: Filmed | None = None  # the last that was asked for
-    read: Read | None = None  # likewise
-    compared: Compared | None = None
+    pictures: Mapping[str, SessionPicture] = field(default_factory=dict[str, SessionPicture])  # of this version
+    film: FingerHistory | None = None  # the last that was asked for
+    excerpt: Excerpt | None = None  # likewise
+    other: OtherSession | None = None
     step: Step | None = OPENING  # None: nothing is being done
     outcome: str = ""  # how the last work ended
     halted: bool = False  # somebody stopped the model's answers
@@ -215,28 +218,28 @@ def fold(state: AnalystState, message: Message) -> AnalystState:
     match message:
         case ReportReady():
             return _on_report(state, message)
-        case Answered():
+        case TrialAnswer():
             return _fold_answer(state, message)
-        case Drawn():
-            return replace(state, drawn={**state.drawn, message.name: message})
-        case Filmed():
+        case SessionPicture():
+            return replace(state, pictures={**state.pictures, message.name: message})
+        case FingerHistory():
             return replace(state, film=message, outcome="")
-        case Read():
-            return replace(state, read=message)
+        case Excerpt():
+            return replace(state, excerpt=message)
         case Respond(response):
             return replace(state, response=response)
-        case Compared():
-            return replace(state, compared=message, outcome="")
+        case OtherSession():
+            return replace(state, other=message, outcome="")
         case Step() | Idle() | Done() | Problem() | Cancelled():
             return _fold_progress(state, message)
         case _:
             return _on_request(state, message)
 
 
-def _fold_progress(state: AnalystState, said: Step | Idle | Done | Problem | Cancelled) -> AnalystState:
-    match said:
+def _fold_progress(state: AnalystState, message: Step | Idle | Done | Problem | Cancelled) -> AnalystState:
+    match message:
         case Step():
-            return replace(state, step=said)
+            return replace(state, step=message)
         case Idle():
             return replace(state, step=None)
         case Done(sentence):
@@ -244,8 +247,8 @@ def _fold_progress(state: AnalystState, said: Step | Idle | Done | Problem | Can
         case Problem(sentence):
             return replace(state, step=None, outcome=sentence)
         case Cancelled():
-            kept = "" if state.report is None else tr(" What was done before is kept.")
-            return replace(state, step=None, outcome=tr("Stopped.{kept}", kept=kept), halted=state.stage != "predicted")
+            rest = "" if state.report is None else tr(" What was done before is kept.")
+            return replace(state, step=None, outcome=tr("Stopped.{kept}", kept=rest), halted=state.stage != "predicted")
 
 
 def _on_request(state: AnalystState, request: Ask) -> AnalystState:
@@ -275,18 +278,18 @@ def rows(state: AnalystState) -> tuple[Row, ...]:
         return ()
     by_stroke = {p.stroke: p for p in report.predictions if p.stroke is not None}
     answers = {one.trial: one for one in report.answers}
-    listed = [Row(s.trial, s, by_stroke.get(s.number), answers.get(s.trial or 0)) for s in report.strokes]
+    table = [Row(s.trial, s, by_stroke.get(s.number), answers.get(s.trial or 0)) for s in report.strokes]
     for p in report.predictions:
         if p.stroke is None:
-            later = (at for at, row in enumerate(listed) if (row.trial or 0) > (p.trial or 0))
-            listed.insert(next(later, len(listed)), Row(p.trial, None, p, answers.get(p.trial or 0)))
-    return tuple(listed or (Row(one.trial, None, None, one) for one in report.answers))
+            later = (at for at, row in enumerate(table) if (row.trial or 0) > (p.trial or 0))
+            table.insert(next(later, len(table)), Row(p.trial, None, p, answers.get(p.trial or 0)))
+    return tuple(table or (Row(one.trial, None, None, one) for one in report.answers))
 
 
 def selected_row(state: AnalystState) -> Row | None:
     """Return the selected row; None where there is none."""
-    listed = rows(state)
-    return listed[state.row] if state.row < len(listed) else None
+    table = rows(state)
+    return table[state.row] if state.row < len(table) else None
 
 
 def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
@@ -296,21 +299,21 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
     if message.stage == "analysed" and before is not None:
         same = {_model_input(stroke) for stroke in report.strokes} & {_model_input(stroke) for stroke in before.strokes}
         numbers = {number for number, _ in same}
-        kept = tuple(p for p in before.predictions if p.stroke in numbers)
-        report = replace(report, predictions=kept)
+        predictions = tuple(p for p in before.predictions if p.stroke in numbers)
+        report = replace(report, predictions=predictions)
         fingers = {key: finger for key, finger in fingers.items() if key[1] in numbers}
     version, history = state.version + 1, message.history
     after = replace(
-        state, stage=message.stage, report=report, history=history, version=version, fingers=fingers, drawn={}
+        state, stage=message.stage, report=report, history=history, version=version, fingers=fingers, pictures={}
     )
     return _at_the_same_row(state, after)
 
 
 def _at_the_same_row(before: AnalystState, after: AnalystState) -> AnalystState:
     """Return the state after with the row that was chosen before, wherever it stands now."""
-    chosen, keys = selected_row(before), [row.key for row in rows(after)]
-    if chosen is not None and chosen.key in keys:
-        return replace(after, row=keys.index(chosen.key))
+    row, keys = selected_row(before), [row.key for row in rows(after)]
+    if row is not None and row.key in keys:
+        return replace(after, row=keys.index(row.key))
     return replace(after, row=max(0, min(before.row, len(keys) - 1)))
 
 
@@ -320,13 +323,13 @@ def _model_input(stroke: StrokeFinding) -> tuple[int, object]:
     return stroke.number, (stroke.trial, friction)
 
 
-def _fold_answer(state: AnalystState, answered: Answered) -> AnalystState:
-    report, finding = state.report, answered.finding
+def _fold_answer(state: AnalystState, answer: TrialAnswer) -> AnalystState:
+    report, finding = state.report, answer.finding
     if report is None:
         return state
     rest = tuple(p for p in report.predictions if (p.trial, p.stroke) != (finding.trial, finding.stroke))
     fingers = {key: finger for key, finger in state.fingers.items() if key != (finding.trial, finding.stroke)}
-    if answered.finger is not None:
-        fingers[finding.trial, finding.stroke] = answered.finger
+    if answer.finger is not None:
+        fingers[finding.trial, finding.stroke] = answer.finger
     after = replace(state, report=replace(report, predictions=(*rest, finding)), fingers=fingers)
     return _at_the_same_row(state, after)

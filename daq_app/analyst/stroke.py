@@ -99,8 +99,8 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
 class History(Struct, frozen=True):
     """The decisions that can be undone, the last one at the end, and those that can be redone, the next one first."""
 
-    done: tuple[str, ...] = ()  # each in words
-    undone: tuple[str, ...] = ()
+    undoable: tuple[str, ...] = ()  # each in words
+    redoable: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class PlacedEdge:
     edge: Edge
     time: float  # [s, device time]
     present: bool  # False where there is none yet and this is only where one could be
-    decided: str  # who decided it and why; "" where the analysis found it
+    decision: str  # who decided it and why; "" where the analysis found it
 
 
 def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
@@ -128,7 +128,7 @@ def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
 
 def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:
     """Return the instant nearest to `time` [s] at which an edge may lie: between its neighbours."""
-    times = {placed.edge: placed.time for placed in edges_of(stroke)}
+    times = {one.edge: one.time for one in edges_of(stroke)}
     at = EDGES.index(edge)
     low = times[EDGES[at - 1]] + EDGE_DISTANCE if at > 0 else float("-inf")
     high = times[EDGES[at + 1]] - EDGE_DISTANCE if at + 1 < len(EDGES) else float("inf")
@@ -139,7 +139,7 @@ def decision_of(stroke: StrokeFinding, edge: Edge, time: float, by: str, why: st
     """Return the decision that moves an edge."""
     what, new = WHAT[edge], within(stroke, edge, time)
     old = {"onset": stroke.onset, "lift": stroke.lift, "steady": stroke.steady}[what]
-    times = {placed.edge: placed.time for placed in edges_of(stroke)} | {edge: new}
+    times = {one.edge: one.time for one in edges_of(stroke)} | {edge: new}
     value = (times["steady begin"], times["steady end"]) if what == "steady" else new
     return Decision(by, why, what, stroke.trial, stroke.within, old, value)
 
@@ -163,8 +163,8 @@ def _standing(decisions: Decisions) -> list[Decision]:
 
 def _undone(decisions: Decisions) -> list[Decision]:
     """Return the lines that undo a decision, and have come since the last one."""
-    decided = {line.number for line in decisions.lines if line.undoes is None}
-    return [line for line in decisions.standing if line.undoes in decided and line.number > max(decided)]
+    numbers = {line.number for line in decisions.lines if line.undoes is None}
+    return [line for line in decisions.standing if line.undoes in numbers and line.number > max(numbers)]
 
 
 def decision_meant(decisions: Decisions, line: Decision) -> Decision:

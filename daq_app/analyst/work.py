@@ -38,7 +38,7 @@ from solver.response.fields import Fields, Sketch, Still, fields_of, place_of_le
 if TYPE_CHECKING:
     from sessions.report.figures import Panel
 
-Say = Callable[[m.Said], None]
+Say = Callable[[m.Reply], None]
 Progress = Callable[[float], bool]
 Urgent = Callable[[], bool]  # whether what is being done must be left for something else
 _MOST = 150  # states of a way that did not settle, which may be long
@@ -54,11 +54,11 @@ class Work:
         say(m.Step(0.0, tr("opening")))
         self._recording = _open_recording(folder)
         self._raw = RawFile(self._recording)
-        self._chosen = 0
+        self._row = 0
         self._ways: dict[m.Key, tuple[TrialPrediction, Way | None]] = {}  # no way at finite strain
         self._sketches: dict[int, Sketch] = {}
         self._other: Report | None = None  # that is compared
-        self._filmed: m.Filmed | None = None  # the last history
+        self._filmed: m.FingerHistory | None = None  # the last history
         self._analyse()
 
     @property
@@ -78,7 +78,7 @@ class Work:
         """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
         match request:
             case m.Choose(row):
-                self._chosen = row
+                self._row = row
             case m.Move():
                 self._move(request)
             case m.Undo(by, again):
@@ -88,7 +88,7 @@ class Work:
             case m.ShowHistory(key):
                 self._film(key)
             case m.ShowReadings(stroke):
-                self._say(m.Read(stroke, self._raw.around(self._report.strokes[stroke - 1])))
+                self._say(m.Excerpt(stroke, self._raw.around(self._report.strokes[stroke - 1])))
             case m.Compare(folder):
                 self._compare(Path(folder))
             case m.Write():
@@ -98,15 +98,15 @@ class Work:
 
     def progress_listener(self, words: str, load_steps: int = 0) -> Callable[[float], bool]:
         """Return a listener to progress that reports the part done and the time left, and stops for urgent requests."""
-        began = said = time.monotonic()
+        began = last_report = time.monotonic()
 
         def report_part(part: float) -> bool:
-            nonlocal said
+            nonlocal last_report
             now = time.monotonic()
-            if now - said > 0.05:
-                said, took = now, now - began
-                left = took * (1.0 - part) / part if part > 0.05 and took > 1.0 else None
-                self._say(m.Step(part, words, left, load_steps))
+            if now - last_report > 0.05:
+                last_report, took = now, now - began
+                remaining_s = took * (1.0 - part) / part if part > 0.05 and took > 1.0 else None
+                self._say(m.Step(part, words, remaining_s, load_steps))
             return not self._urgent()
 
         return report_part
@@ -137,18 +137,18 @@ class Work:
 
     def _first(self) -> int | None:
         strokes = self._report.strokes
-        if not self._chosen < len(strokes):
+        if not self._row < len(strokes):
             return None
-        chosen, plan = strokes[self._chosen], self._recording.plan
+        stroke, plan = strokes[self._row], self._recording.plan
         if not plan.blocks:
-            return self._chosen
+            return self._row
         main = [trial.number for block in plan.blocks if block.phase == "main" for trial in block.trials]
-        return main.index(chosen.trial) if chosen.trial in main else None
+        return main.index(stroke.trial) if stroke.trial in main else None
 
     def _take_answer(self, _number: int, row: TrialPrediction, way: Way | None) -> None:
         finding = finding_of(row)
         self._ways[finding.trial, finding.stroke] = row, way
-        self._say(m.Answered(finding, self._finger(row.prediction)))
+        self._say(m.TrialAnswer(finding, self._finger(row.prediction)))
 
     def _finger(self, prediction: Prediction | None) -> Finger | None:
         if prediction is None:
@@ -165,7 +165,7 @@ class Work:
     def _draw(self, name: str) -> None:
         self._say(m.Step(0.0, tr("drawing")))
         panel, png = self._panel(name)
-        self._say(m.Drawn(name, "" if panel is None else panel.title, png))
+        self._say(m.SessionPicture(name, "" if panel is None else panel.title, png))
 
     def _panel(self, name: str, note: str = "") -> "tuple[Panel | None, bytes]":
         """Return a picture, its `note` under it, and its PNG; `session_pictures` names those of the session."""
@@ -197,8 +197,8 @@ class Work:
         if what in ("finger", "contact"):
             stroke, _, step = of.partition(" ")
             answers = (finding_of(row) for (_, number), (row, _) in self._ways.items() if number == int(stroke))
-            settled = (sed_words(self._report, said) for said in answers if said.sed is not None)
-            words = film_words(self._filmed, int(step)) if step else next(settled, "")
+            sentences = (sed_words(self._report, answer) for answer in answers if answer.sed is not None)
+            words = film_words(self._filmed, int(step)) if step else next(sentences, "")
             return f"{words}. {tr(FIELD_ERRORS)}"
         if what == "compared":
             return "\n".join(name_and_errors(one) for one in (self._report, self._other) if one is not None)
@@ -229,14 +229,14 @@ class Work:
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
-        drawn = ((stroke, field_of(row.block or "", row)) for (_, stroke), (row, _) in self._ways.items())
-        return {stroke: field for stroke, field in drawn if field is not None and stroke is not None}
+        pairs = ((stroke, field_of(row.block or "", row)) for (_, stroke), (row, _) in self._ways.items())
+        return {stroke: field for stroke, field in pairs if field is not None and stroke is not None}
 
     def _film(self, key: m.Key) -> None:
-        kept = self._ways.get(key)
-        if kept is None:
+        entry = self._ways.get(key)
+        if entry is None:
             raise NothingToShow(tr("The model has no way to show for this trial: it was not solved."))
-        prediction, way = kept
+        prediction, way = entry
         if way is None:
             raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))
         if way.march is None and (prediction.prediction is not None or way.scene.materials.relax):
@@ -249,7 +249,7 @@ class Work:
             film, stop = lost_film(way, sketch, progress)
             why = prediction.reasons.get("sed", "")
             why = tr("{first} Followed from first touch: {why}", first=why, why=stop) if stop else why
-        self._filmed = m.Filmed(key, film, why)
+        self._filmed = m.FingerHistory(key, film, why)
         self._say(self._filmed)
 
     def _compare(self, folder: Path) -> None:
@@ -266,7 +266,7 @@ class Work:
 
         prediction = predict(analysis, recording.plan, _options(recording), progress=progress, watch=take_answer)
         self._other = findings(recording, analysis, prediction)
-        self._say(m.Compared(str(folder), self._other, fingers))
+        self._say(m.OtherSession(str(folder), self._other, fingers))
 
     def _write(self, request: m.Write) -> str:
         """Write the report, a picture or an export, and return where it is."""
@@ -325,8 +325,8 @@ def _open_recording(folder: Path) -> Recording:
 
 def _options(recording: Recording) -> PredictionOptions:
     """Return the options of the kept prediction, or the usual ones; what nobody looks at here is not solved for."""
-    kept = stored_options(recording) or PredictionOptions()
-    return replace(kept, intervals=False, variants="none", variant_intervals=False)
+    options = stored_options(recording) or PredictionOptions()
+    return replace(options, intervals=False, variants="none", variant_intervals=False)
 
 
 def sentence_of(error: Exception) -> str:
@@ -365,12 +365,12 @@ def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
 def field_at(experiment: str, index: int, film: Film, at: int) -> Field:
     """Return one state of a film as the figures of a report draw it."""
     frame = film.frames[at]
-    drawn = Fields(frame.nodes, film.parts.triangles, frame.values, frame.outlines, frame.patch)
-    return Field(experiment, index, drawn, frame.contact)
+    fields = Fields(frame.nodes, film.parts.triangles, frame.values, frame.outlines, frame.patch)
+    return Field(experiment, index, fields, frame.contact)
 
 
-def _frame(drawn: Fields, skin: Skin, row: Array) -> Frame:
-    return Frame(drawn.nodes, dict(drawn.values), dict(drawn.outlines), drawn.patch, skin, row)
+def _frame(fields: Fields, skin: Skin, row: Array) -> Frame:
+    return Frame(fields.nodes, dict(fields.values), dict(fields.outlines), fields.patch, skin, row)
 
 
 def _instant(still: Still) -> Instant:

@@ -63,10 +63,10 @@ def analyse_session(
             set_gain_error(recording.folder, gain_error)
         except RecordingError as error:
             console.note(f"not kept: {error}")
-    stood = settings_of(before)
-    drawn = stood.bootstrap_seed if seed is None else seed
+    settings = settings_of(before)
+    bootstrap_seed = settings.bootstrap_seed if seed is None else seed
     analysis = analyse(
-        recording, AnalysisSettings(area=area or stood.area, gain_error=gain_error, bootstrap_seed=drawn)
+        recording, AnalysisSettings(area=area or settings.area, gain_error=gain_error, bootstrap_seed=bootstrap_seed)
     )
     _store(recording, ANALYSIS, analysis_document(analysis), console)
     return analysis
@@ -102,9 +102,9 @@ def stored_afferent(recording: Recording) -> AfferentSettings | None:
     return _afferent_of(_read_or_empty(recording, PREDICTION))
 
 
-def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
+def _afferent_of(document: Mapping[str, Any]) -> AfferentSettings | None:
     """Return the parameters of the afferent in a stored prediction; None where it has none. Raises SettingsError."""
-    afferent: Mapping[str, Any] | None = stored.get("afferent")
+    afferent: Mapping[str, Any] | None = document.get("afferent")
     return None if afferent is None else from_table(afferent.get("settings") or {}, AfferentSettings, PREDICTION)
 
 
@@ -175,30 +175,30 @@ def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
 
 
 def repeat(
-    name: str, stored: Mapping[str, Any], recording: Recording, decisions: Decisions, plan_of: Recording | None = None
+    name: str, document: Mapping[str, Any], recording: Recording, decisions: Decisions, plan_of: Recording | None = None
 ) -> dict[str, Any]:
-    """Return the analysis or prediction made once more as `stored` was, with its settings, options and blindness.
+    """Make an analysis or a prediction once more, with the settings, options and blindness of its `document`.
 
-    The plan is that of `plan_of`, where `recording` is a replay of it. Raises SettingsError where `stored` is damaged.
+    The plan is that of `plan_of`, where `recording` is a replay of it. Raises SettingsError for a damaged document.
     """
     if name == ANALYSIS:
-        kept: Mapping[str, Any] = stored.get("bootstrap") or {}
-        bootstrap = bootstrap_settings(kept.get("settings") or {}) if "bootstrap" in stored else None
-        return analysis_document(analyse(recording, settings_of(stored), decisions), bootstrap)
-    options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
-    stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
+        bootstrap_table: Mapping[str, Any] = document.get("bootstrap") or {}
+        bootstrap = bootstrap_settings(bootstrap_table.get("settings") or {}) if "bootstrap" in document else None
+        return analysis_document(analyse(recording, settings_of(document), decisions), bootstrap)
+    options = from_table(document.get("options", {}), PredictionOptions, PREDICTION)
+    stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in document.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
     original = plan_of or recording
     plan = (original if blind else reveal(original)).plan
-    analysis = analyse(recording, settings_of(stored), decisions)
+    analysis = analyse(recording, settings_of(document), decisions)
     prediction = _predict(analysis, plan, options, lambda _: True)
-    return with_present_names(_with_firing(prediction, _afferent_of(stored)))
+    return with_present_names(_with_firing(prediction, _afferent_of(document)))
 
 
-def changes(name: str, stored: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
+def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
-    sentences = first_sentences(list(differences(stored, json.loads(json.dumps(fresh)), name)))
-    return [*sentences, why(name, stored, software_versions())] if sentences else []
+    sentences = first_sentences(list(differences(document, json.loads(json.dumps(fresh)), name)))
+    return [*sentences, why(name, document, software_versions())] if sentences else []
 
 
 def _predict(
@@ -225,12 +225,12 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
     return {**analysis.to_dict(), "bootstrap": intervals_document(settings, intervals)}
 
 
-def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
+def settings_of(document: Mapping[str, Any]) -> AnalysisSettings:
     """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
 
     Only the area's law, the calibration's error and the intervals' seed can be asked for. Raises SettingsError.
     """
-    settings: Mapping[str, Any] = stored.get("settings") or stored
+    settings: Mapping[str, Any] = document.get("settings") or document
     area = from_table(settings.get("area") or {}, AreaLaw, "area")
     seed = settings.get("bootstrap_seed", 0)
     if not isinstance(seed, int) or seed < 0:
@@ -238,16 +238,16 @@ def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     return AnalysisSettings(area=area, gain_error=parse_gain_error(settings.get("gain_error")), bootstrap_seed=seed)
 
 
-def is_current(stored: Mapping[str, Any], decisions: Decisions) -> bool:
+def is_current(document: Mapping[str, Any], decisions: Decisions) -> bool:
     """Say whether a stored document was made with the decisions that are in force now."""
     now = json.loads(json.dumps([decision.to_dict() for decision in decisions.in_force]))
-    return stored.get("decisions", []) == now
+    return document.get("decisions", []) == now
 
 
-def decisions_of(stored: Mapping[str, Any]) -> Decisions:
+def decisions_of(document: Mapping[str, Any]) -> Decisions:
     """Return the decisions that a stored document was made with. Raises SettingsError where they are damaged."""
     try:
-        return Decisions(as_type(stored.get("decisions", []), tuple[Decision, ...]))
+        return Decisions(as_type(document.get("decisions", []), tuple[Decision, ...]))
     except ValueError as error:
         raise SettingsError(f"the decisions stored with it are damaged: {error}") from error
 

@@ -117,26 +117,26 @@ def by_cluster(
     """
     with cluster_client(address) as client:
         answers: Any = importlib.import_module("distributed").as_completed(loop=client.loop)
-        waiting = list(jobs)[::-1]
+        queue = list(jobs)[::-1]
         under_way: dict[Any, str] = {}  # by the key of the cluster
-        checked = set[str]()  # workers whose versions are ours
-        seen = time.monotonic()  # when a worker was last there
-        while waiting or under_way:
+        compatible = set[str]()  # workers whose versions are ours
+        last_worker_time = time.monotonic()  # when a worker was last there
+        while queue or under_way:
             there: dict[str, int] = client.nthreads()
             threads = sum(there.values())
-            joined = [worker for worker in there if worker not in checked]
+            joined = [worker for worker in there if worker not in compatible]
             if joined:  # before it is given anything to compute, also where it comes later
                 refuse_other_workers(client, joined, address)
-                checked.update(joined)
-            seen = time.monotonic() if threads else seen
-            if time.monotonic() - seen > WITHOUT_WORKERS:
+                compatible.update(joined)
+            last_worker_time = time.monotonic() if threads else last_worker_time
+            if time.monotonic() - last_worker_time > WITHOUT_WORKERS:
                 raise SchedulerError(
                     f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
                     "again: what is done is kept"
                 )
             # Files are read and sent as workers come free: never those of a thousand sessions at once.
-            while waiting and threads and len(under_way) < 2 * threads:
-                name = waiting.pop()
+            while queue and threads and len(under_way) < 2 * threads:
+                name = queue.pop()
                 try:
                     arguments = prepare(*jobs[name])
                 except RecordingError as error:
@@ -151,8 +151,8 @@ def by_cluster(
             future = next(answers)
             if future.cancelled():  # nobody cancels but a client that has lost its scheduler
                 raise ConnectionError("the connection was lost")
-            name, done = under_way.pop(future.key), future.status == "finished"
-            yield name, future.result() if done else Lost(f"no worker could compute it ({future.exception()})")
+            name, success = under_way.pop(future.key), future.status == "finished"
+            yield name, future.result() if success else Lost(f"no worker could compute it ({future.exception()})")
 
 
 def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> None:  # noqa: ANN401
@@ -216,9 +216,9 @@ class Shelf:
     def load(self, key: str) -> Visit | None:
         """Return the visit stored under a key; None where there is none, or where the file has changed."""
         with suppress(OSError, ValueError, KeyError, TypeError):
-            kept = json_object(self.file(key).read_bytes())
-            if kept["sha256"] == _digest(kept["visit"]):
-                return as_type(kept["visit"], Visit)
+            entry = json_object(self.file(key).read_bytes())
+            if entry["sha256"] == _digest(entry["visit"]):
+                return as_type(entry["visit"], Visit)
         return None
 
     def file(self, key: str) -> Path:
@@ -257,20 +257,20 @@ def visits(
     """
     keys, failed = _keys(folders, shelf)
     console.note(*(f"{name}: {why}" for name, why in failed))
-    kept = {folder: shelf.load(key) for folder, key in keys.items()}
-    done = [visit for visit in kept.values() if visit is not None]
-    missing = [folder for folder, visit in kept.items() if visit is None]
-    for folder in missing:
+    by_folder = {folder: shelf.load(key) for folder, key in keys.items()}
+    results = [visit for visit in by_folder.values() if visit is not None]
+    rest = [folder for folder, visit in by_folder.items() if visit is None]
+    for folder in rest:
         if shelf.file(keys[folder]).exists():
             console.note(f"{folder.name}: {shelf.file(keys[folder])} is damaged; the session is computed anew")
-    if done:
-        console.note(f"{len(done)} of {len(folders)} sessions were computed before and are taken as they are")
-    named = {folder.name: keys[folder] for folder in missing}
+    if results:
+        console.note(f"{len(results)} of {len(folders)} sessions were computed before and are taken as they are")
+    key_of = {folder.name: keys[folder] for folder in rest}
     start = time.monotonic()
-    if missing:
-        console.progress(0.0, f"0 of {len(missing)} sessions")
-    jobs = {folder.name: (folder, options) for folder in missing}
-    address = scheduler if missing else None  # it is not asked for nothing
+    if rest:
+        console.progress(0.0, f"0 of {len(rest)} sessions")
+    jobs = {folder.name: (folder, options) for folder in rest}
+    address = scheduler if rest else None  # it is not asked for nothing
     answers = (
         by_processes(compute_visit, jobs, workers)
         if address is None
@@ -284,15 +284,17 @@ def visits(
             else:
                 if address is not None:
                     refuse_unlike(answer["made_by"], address, "a worker")
-                shelf.keep(named[name], answer)
-                done.append(as_type(answer, Visit))
-            left = (time.monotonic() - start) / count * (len(missing) - count)
-            remaining = "" if console.at_terminal else f", {left:.0f} s left"
-            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{remaining}")
+                shelf.keep(key_of[name], answer)
+                results.append(as_type(answer, Visit))
+            remaining_s = (time.monotonic() - start) / count * (len(rest) - count)
+            words = "" if console.at_terminal else f", {remaining_s:.0f} s left"
+            console.progress(0.95 * count / len(rest), f"{count} of {len(rest)} sessions{words}")
     except KeyboardInterrupt:
-        console.note(f"{len(done)} of {len(folders)} sessions are computed and kept; the next run goes on from there")
+        console.note(
+            f"{len(results)} of {len(folders)} sessions are computed and kept; the next run goes on from there"
+        )
         raise
-    return done, failed
+    return results, failed
 
 
 def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[tuple[str, str]]]:
@@ -309,13 +311,13 @@ def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[
 
 def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A | Lost]]:
     """Yield each job's name and what `work` makes of it, from `workers` processes here, or as many as cores."""
-    left = dict(jobs)
+    rest = dict(jobs)
     try:
-        for name, answer in _in_pool(work, dict(left), workers) if left else ():
-            del left[name]
+        for name, answer in _in_pool(work, dict(rest), workers) if rest else ():
+            del rest[name]
             yield name, answer
     except BrokenProcessPool:  # a worker died, and nobody knows over which job: each gets a worker of its own
-        for name, arguments in left.items():
+        for name, arguments in rest.items():
             try:
                 yield from _in_pool(work, {name: arguments}, 1)
             except BrokenProcessPool:
@@ -326,10 +328,10 @@ def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generat
     """Yield names and answers. Where an exception leaves, as on Ctrl-C, the processes are killed."""
     pool = process_pool(workers or min(os.cpu_count() or 1, max(len(jobs), 1)))
     try:
-        waiting = {pool.submit(work, *arguments): name for name, arguments in jobs.items()}
-        while waiting:
-            for future in wait(waiting, _LOOK, FIRST_COMPLETED).done:
-                yield waiting.pop(future), future.result()
+        futures = {pool.submit(work, *arguments): name for name, arguments in jobs.items()}
+        while futures:
+            for future in wait(futures, _LOOK, FIRST_COMPLETED).done:
+                yield futures.pop(future), future.result()
         pool.shutdown()
     except BaseException:
         for process in multiprocessing.active_children():

@@ -91,8 +91,8 @@ def check_design(design: Mapping[str, Any], scene: Scene, where: str) -> dict[st
         pair: list[Any] = cast("list[Any]", span) if isinstance(span, list) else []
         numbers = [float(end) for end in pair if isinstance(end, int | float) and abs(end) <= sys.float_info.max]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
-            allowed = "[least, greatest], least below greatest"
-            raise SettingsError(f"{where}: {name} = {toml_value(ends)} is not allowed: {allowed}")
+            form = "[least, greatest], least below greatest"
+            raise SettingsError(f"{where}: {name} = {toml_value(ends)} is not allowed: {form}")
         try:
             for end in numbers:
                 with_values(scene, {name: end})
@@ -122,9 +122,9 @@ def sensitivity(
     scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
     responses = np.empty(len(points))
     failed: list[str] = []
-    for i, drawn in enumerate(scenes):
+    for i, sample in enumerate(scenes):
         try:
-            responses[i] = answer(drawn)
+            responses[i] = answer(sample)
         except SolveFailure as failure:
             failed.append(" ".join(str(failure).split()))
         progress((i + 1) / len(points))

@@ -109,8 +109,8 @@ def drawn_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
     return [_finger(dict(zip(DESIGN, point, strict=True)), published_finger(kinematics)) for point in points.tolist()]
 
 
-def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:
-    radius, epidermis, dermis, bone, angle, *stiff, nu, place, depth, press = drawn.values()
+def _finger(sample: Mapping[str, float], base: Scene) -> Trial:
+    radius, epidermis, dermis, bone, angle, *stiff, nu, place, depth, press = sample.values()
     finger = base.finger
     scaled = replace(
         finger,
@@ -137,8 +137,8 @@ def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:
 
 def _scale_stiffness(scene: Scene, factors: Mapping[str, float]) -> Scene:
     materials = scene.materials
-    changed = {name: replace(materials.of(name), E=factor * materials.of(name).E) for name, factor in factors.items()}
-    return replace(scene, materials=replace(materials, **changed))
+    layers = {name: replace(materials.of(name), E=factor * materials.of(name).E) for name, factor in factors.items()}
+    return replace(scene, materials=replace(materials, **layers))
 
 
 def finger_answer(trial: Trial) -> Answer | str:
@@ -169,11 +169,11 @@ def answers_of(
     """
     versions = software_versions()
     keys = [trial.key(versions) for trial in trials]
-    known = _load_answers(keep)
-    missing = [number for number, key in enumerate(keys) if key not in known]
-    done = len(trials) - len(missing)
-    if missing:
-        jobs = {keys[number]: (trials[number],) for number in missing}
+    by_key = _load_answers(keep)
+    rest = [number for number, key in enumerate(keys) if key not in by_key]
+    count = len(trials) - len(rest)
+    if rest:
+        jobs = {keys[number]: (trials[number],) for number in rest}
         far = scheduler is not None
         answers = by_cluster(finger_answer, jobs, scheduler) if far else by_processes(finger_answer, jobs, workers)
         log = nullcontext() if keep is None else keep.open("a", encoding="utf-8", buffering=1)
@@ -181,12 +181,12 @@ def answers_of(
             for key, answer in answers:
                 if isinstance(answer, Lost):
                     raise TooFewAnswers(f"a finger has no answer: {answer.why}; run this again, with --keep from there")
-                known[key] = answer
+                by_key[key] = answer
                 if file is not None:
                     file.write("\n" + json.dumps({"key": key, "answer": answer}))
-                done += 1
-                progress(done / len(trials))
-    return [known[key] for key in keys]
+                count += 1
+                progress(count / len(trials))
+    return [by_key[key] for key in keys]
 
 
 def _load_answers(keep: Path | None) -> dict[str, Any]:
@@ -214,7 +214,7 @@ def _signs(answer: Answer) -> Array:
     return np.sign(np.array([answer[name][0][0] for name in SERIES], np.float64))
 
 
-def share(kept: Array) -> tuple[float, float, float] | None:
+def share(outcomes: Array) -> tuple[float, float, float] | None:
     """Return the share of ones among numbers (n,), nan left out, with its 95 % interval; None of nothing.
 
     The interval is that of Wilson (1927, J. Am. Stat. Assoc. 22, 209).
@@ -224,15 +224,15 @@ def share(kept: Array) -> tuple[float, float, float] | None:
     """
     from scipy import stats  # slow to load
 
-    known = kept[np.isfinite(kept)]
-    if not len(known):
+    finite = outcomes[np.isfinite(outcomes)]
+    if not len(finite):
         return None
-    ends = stats.binomtest(int(known.sum()), len(known)).proportion_ci(method="wilson")
-    return float(known.mean()), float(ends.low), float(ends.high)
+    ends = stats.binomtest(int(finite.sum()), len(finite)).proportion_ci(method="wilson")
+    return float(finite.mean()), float(ends.low), float(ends.high)
 
 
-def shares_by_thirds(kept: Array, values: Array) -> list[tuple[float, float, float | None]]:
-    """Return the share of ones among `kept` (n,) in each third of the range of `values` (n,), with that third's ends.
+def shares_by_thirds(outcomes: Array, values: Array) -> list[tuple[float, float, float | None]]:
+    """Return the share of ones among `outcomes` (n,) in each third of the range of `values` (n,), with its ends.
 
     >>> shares_by_thirds(np.array([1.0, 1.0, 0.0]), np.array([0.0, 1.0, 3.0]))
     [(0.0, 1.0, 1.0), (1.0, 2.0, None), (2.0, 3.0, 0.0)]
@@ -240,7 +240,7 @@ def shares_by_thirds(kept: Array, values: Array) -> list[tuple[float, float, flo
     low, high = float(values.min()), float(values.max())
     ends = [low + third * (high - low) / 3.0 for third in range(4)]
     place = np.clip(np.searchsorted(ends, values, side="left") - 1, 0, 2)
-    shares = [share(kept[place == third]) for third in range(3)]
+    shares = [share(outcomes[place == third]) for third in range(3)]
     return [(*pair, None if share is None else share[0]) for pair, share in zip(pairwise(ends), shares, strict=True)]
 
 

@@ -28,18 +28,18 @@ def within(
     ends = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
     usual = f"a whole number from {ends}" if kind is int else ends
 
-    def read(text: str) -> float:
+    def parse(text: str) -> float:
         try:
             value = kind(text)
         except ValueError:
-            value, shown = math.nan, repr(text)
+            value, label = math.nan, repr(text)
         else:
-            shown = str(value) if kind is int else f"{value:g}"
+            label = str(value) if kind is int else f"{value:g}"
         if not least <= value <= greatest:
-            raise WrongValue(f"{name} {shown} is not allowed: {words or usual}{behind_a_point(text)}")
+            raise WrongValue(f"{name} {label} is not allowed: {words or usual}{behind_a_point(text)}")
         return value if per == 1 else value / per
 
-    return read
+    return parse
 
 
 def add_number(
@@ -188,8 +188,8 @@ def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) ->
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration-error, typed in per cent: the standard uncertainty of each axis' gain [-]."""
     meaning = "standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)"
-    read = within("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
-    parser.add_argument("--calibration-error", type=read, metavar="PERCENT", help=meaning)
+    parse = within("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
+    parser.add_argument("--calibration-error", type=parse, metavar="PERCENT", help=meaning)
 
 
 def area_law(options: argparse.Namespace) -> AreaLaw | None:

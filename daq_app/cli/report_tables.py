@@ -9,15 +9,17 @@ from sessions.report.tables.session import tables
 def table_texts(report: Report, *sections: str) -> list[str]:
     """Return the tables of some sections of a report as text."""
     by_section = tables(report)
-    return [_as_text(shown) for name in sections for shown in by_section[name]]
+    return [_as_text(one) for name in sections for one in by_section[name]]
 
 
-def _as_text(shown: Table) -> str:
+def _as_text(report_table: Table) -> str:
     """Return a table with its caption, each number over its interval, and the notes that its marks stand for."""
-    head = [f"{column.name} [{column.unit}]" if column.unit.strip("1") else column.name for column in shown.columns]
+    head = [
+        f"{column.name} [{column.unit}]" if column.unit.strip("1") else column.name for column in report_table.columns
+    ]
     rows: list[list[str]] = []
     headings: list[tuple[int, str]] = []  # before which row each group begins
-    for group in shown.groups:
+    for group in report_table.groups:
         headings += [(len(rows), group.name)] if group.name else []
         for cells in group.rows:
             rows.append([f"{cell.text} {cell.mark}".rstrip() for cell in cells])
@@ -25,5 +27,5 @@ def _as_text(shown: Table) -> str:
     first, *lines = table(rows, head=head).split("\n")
     for at, name in reversed(headings):
         lines.insert(at, f"{name}:")
-    notes = (f"{mark}: {sentence}".removeprefix(": ") for mark, sentence in shown.notes)
-    return "\n".join(("", shown.caption, first, *lines, *notes))
+    notes = (f"{mark}: {sentence}".removeprefix(": ") for mark, sentence in report_table.notes)
+    return "\n".join(("", report_table.caption, first, *lines, *notes))

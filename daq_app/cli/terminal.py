@@ -208,7 +208,7 @@ class _Attendance:
         self._console = console
         self._interrupted = interrupted
         self._terminal: Terminal | None = None
-        self._begun: m.SessionBegun | None = None
+        self._start: m.SessionBegun | None = None
         self._folder = ""
         self._end: SessionEnd | None = None
         self._stopping = False
@@ -238,15 +238,15 @@ class _Attendance:
                     self._recorder.leave()
 
     def _leave_silent_recorder(self) -> Never:
-        if self._begun is None:
+        if self._start is None:
             raise KeyboardInterrupt
         raise RecordingKept(
-            f"stopped; the recorder does not answer and will end the session by itself; {self._begun.folder} keeps it"
+            f"stopped; the recorder does not answer and will end the session by itself; {self._start.folder} keeps it"
         )
 
     def _watch_silence(self) -> None:
         """Say so once where the recorder does not answer, and once when it does again."""
-        running = self._begun is not None and self._end is None  # it is silent while it starts, and while it seals
+        running = self._start is not None and self._end is None  # it is silent while it starts, and while it seals
         silent = running and self._recorder.silence > SILENCE
         if silent != self._silent:
             self._silent = silent
@@ -260,7 +260,7 @@ class _Attendance:
         """Take a report, and return the outcome when it is the last."""
         match report:
             case m.SessionBegun():
-                self._begun = report
+                self._start = report
                 attended, forces = report.people != "simulated people", report.plan.forces
                 self._terminal = Terminal(self._console, forces=forces) if attended else None
             case Status():
@@ -274,9 +274,9 @@ class _Attendance:
             case m.Sealed():
                 assert self._end is not None
                 return Outcome(self._folder, self._end, sealed=True)
-            case m.LinkDown(sentence) if self._begun is None:
+            case m.LinkDown(sentence) if self._start is None:
                 raise LinkLost(sentence)  # it was opened, and does not stream
-            case m.Failed() if self._stopping and self._begun is None:
+            case m.Failed() if self._stopping and self._start is None:
                 raise KeyboardInterrupt  # as wanted, before anything was recorded
             case m.Failed() | m.Gone():
                 _raise_failure(report)
@@ -289,10 +289,10 @@ class _Attendance:
     def _show_status(self, status: Status) -> None:
         if self._terminal is not None:
             self._terminal.follow(status.state)
-        elif self._begun is not None:
-            done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
-            who = self._begun.plan.subject
-            self._console.progress(done, f"{who}: {status.state}, {status.safe.readings} readings safe")
+        elif self._start is not None:
+            part = 0.0 if status.trial is None else (status.trial - 1) / status.trials
+            who = self._start.plan.subject
+            self._console.progress(part, f"{who}: {status.state}, {status.safe.readings} readings safe")
 
 
 def _raise_failure(report: m.Report) -> None:

@@ -199,10 +199,10 @@ class AnalystWindow(QMainWindow):
         (self.trials.list, self.stroke.stroke.handles["onset"], self.model.tabs)[column].setFocus()
 
     def _look(self) -> None:
-        said = self._work.poll()
-        for message in said:
+        messages = self._work.poll()
+        for message in messages:
             self.state = fold(self.state, message)
-        if said:
+        if messages:
             self._show()
 
     def write_report(self) -> None:
@@ -277,7 +277,7 @@ class AnalystWindow(QMainWindow):
             else:
                 self._row.addWidget(panel, stretch)
                 panel.show()
-        if narrow and self.state.compared is not None:  # what has just come stays in sight
+        if narrow and self.state.other is not None:  # what has just come stays in sight
             self._pages.setCurrentIndex(2)
 
     def _lay_out(self) -> QWidget:
@@ -305,8 +305,8 @@ class TrialsColumn(QWidget):
         self.list = row_list(tr("trials"))
         self.list.currentRowChanged.connect(self._choose)
         self.responses = choice(tr("quantity that is held against the score"))
-        for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
-            self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
+        for response in (shown_response(quantity.name) for quantity in QUANTITIES):
+            self.responses.addItem(f"{tr(response.label)} [{response.unit}]", response.name)
         self.responses.activated.connect(lambda: respond(m.Respond(self.responses.currentData())))
         self.errors = WrappedLabel("quiet")
         self.relation = ZoomedPlot(tokens)
@@ -322,26 +322,26 @@ class TrialsColumn(QWidget):
         vbox(label(tr("Trials"), "section"), (self.list, 3), self._below, self.responses, self.errors, *plot, on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        listed = tuple(words_of(row) for row in rows(state))
+        lines = tuple(words_of(row) for row in rows(state))
         self.list.blockSignals(True)
-        if len(listed) != self.list.count():
+        if len(lines) != self.list.count():
             self.list.clear()
-            self.list.addItems(listed)
+            self.list.addItems(lines)
         for at, row in enumerate(rows(state)):
             item, marks = self.list.item(at), marks_of(row)
-            item.setText(listed[at])
+            item.setText(lines[at])
             item.setToolTip(marks)
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {marks}".rstrip())
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{lines[at]} {marks}".rstrip())
         self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)
         self.list.blockSignals(False)
         self.errors.show_text(greatest_errors(state.report, state.response))
         marks = {True: {"size": 18, "symbol": "s"}, False: {"size": 11, "symbol": "o"}}
         alike = {"brush": MODEL, "pen": pg.mkPen(QColor(self._tokens.text))}
-        shown = [{"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state)]
-        self.points.setData([spot | alike for spot in shown])
-        self.relation.setVisible(bool(shown))
-        self.none.setVisible(not shown)
-        empty = state.report is not None and not listed
+        spots = [{"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state)]
+        self.points.setData([spot | alike for spot in spots])
+        self.relation.setVisible(bool(spots))
+        self.none.setVisible(not spots)
+        empty = state.report is not None and not lines
         for widget in (self.list, self._below, self.responses):
             widget.setHidden(empty)
         words = tr("No trial has both a score and an answer of the model.")

@@ -319,8 +319,8 @@ def newest_force(trace: LiveTrace) -> float:
         return 0.0
     _, values = trace.between(newest - OVER, np.nextafter(newest, np.inf))
     normal = values[CHANNELS.index("N")]
-    known = normal[np.isfinite(normal)]
-    return float(known.mean()) if len(known) else 0.0
+    finite = normal[np.isfinite(normal)]
+    return float(finite.mean()) if len(finite) else 0.0
 
 
 class PressBar(QWidget):
@@ -342,10 +342,10 @@ class PressBar(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        filled = QRectF(box)
-        filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
+        bar = QRectF(box)
+        bar.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
         if self.isRightToLeft():
-            filled.moveRight(box.right())
-        painter.fillRect(filled, QColor(theme_of(self).act))
+            bar.moveRight(box.right())
+        painter.fillRect(bar, QColor(theme_of(self).act))
         painter.setPen(QPen(QColor(theme_of(self).quiet), 2))
         painter.drawRect(box)

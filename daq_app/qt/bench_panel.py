@@ -61,8 +61,8 @@ class BenchPanel(Panel):
         say(self._lamp_words, view.lamp_words)
         regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
         say(self._name, view.name)
-        for name, shown in self._fields.items():
-            say(shown, getattr(view, name), tr(SPOKEN.get(name, name)))
+        for name, widget in self._fields.items():
+            say(widget, getattr(view, name), tr(SPOKEN.get(name, name)))
         for name, text in view.life:
             say(self._life[name], text, tr(name))
         for name, text in view.counters:
@@ -106,11 +106,11 @@ class BenchPanel(Panel):
         self._choice.clear()
         for uri, words in view.devices:
             self._choice.addItem(words, uri)
-        wanted = view.uri or typed or "sim:"
-        at = self._choice.findData(wanted)
+        address = view.uri or typed or "sim:"
+        at = self._choice.findData(address)
         self._choice.setCurrentIndex(at)
         if at < 0:
-            self._choice.setEditText(wanted)
+            self._choice.setEditText(address)
         self._show_begin()
 
     def _show_begin(self) -> None:
@@ -211,9 +211,9 @@ class LoadBar(QWidget):
         painter.setBrush(QColor(t.raised))
         painter.drawRect(track)
         if bar.share is not None:
-            filled = track.adjusted(1, 1, -1, -1)
-            filled.setWidth(filled.width() * min(bar.share, 1.0))
-            painter.fillRect(filled, QColor(t.wrong if bar.share >= 1 else t.quiet))
+            level = track.adjusted(1, 1, -1, -1)
+            level.setWidth(level.width() * min(bar.share, 1.0))
+            painter.fillRect(level, QColor(t.wrong if bar.share >= 1 else t.quiet))
         if bar.peak is not None:
             at = track.left() + track.width() * min(bar.peak, 1.0)
             painter.fillRect(QRectF(at - 1.5, track.top() - 3, 3, track.height() + 6), colour)

@@ -70,7 +70,7 @@ class Bridge(QObject):
         self._judge = Judge(self._from_threads.put)
         self.state = fold(AppState(), Tick(time.monotonic()))
         self.view: View = derive_view(self.state)
-        self._shown = self.state
+        self._last_state = self.state
         self.feed = LiveFeed()
         self.model = LiveModel()
         self.session_offset = 0.0  # session clock minus this machine's [s]
@@ -164,7 +164,7 @@ class Bridge(QObject):
                 pass
         before = self.state.bench.peak.over
         self._fold(report)
-        self._judge.heard(report, self.feed)
+        self._judge.follow(report, self.feed)
         bench = self.state.bench
         if bench.info is not None and (isinstance(report, m.Device | m.Tared) or bench.peak.over != before):
             serial = bench.info.serial
@@ -174,8 +174,8 @@ class Bridge(QObject):
         """Look something up in a thread, which does not hold up the window."""
         threading.Thread(target=lambda: self._from_threads.put(what()), daemon=True).start()
 
-    def _settle(self, judged: Judged) -> None:
-        session, stroke, friction = self.state.session, judged.quality.stroke, judged.quality.friction
+    def _settle(self, judgement: Judged) -> None:
+        session, stroke, friction = self.state.session, judgement.quality.stroke, judgement.quality.friction
         if session and friction and stroke and stroke.steady and stroke.normal_force:
             self.model.settle(Settle(session.plan, friction, stroke.normal_force, stroke.steady))
 
@@ -183,9 +183,9 @@ class Bridge(QObject):
         self.state = fold(self.state, message)
 
     def _show(self) -> None:
-        if self.state is self._shown:
+        if self.state is self._last_state:
             return
-        self._shown = self.state
+        self._last_state = self.state
         session = self.state.session
         view = derive_view(self.state, translator(self.state.language if session is None else session.plan.language))
         if view != self.view:

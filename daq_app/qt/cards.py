@@ -63,7 +63,7 @@ class CutShort(Panel):
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
         self._send = send
-        self._shown: tuple[UnfinishedSession, ...] = ()
+        self._items: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
         self._sessions.currentTextChanged.connect(self._show_chosen)
@@ -85,8 +85,8 @@ class CutShort(Panel):
         threading.Thread(target=look, daemon=True).start()
 
     def show_sessions(self, sessions: tuple[UnfinishedSession, ...]) -> None:
-        if sessions != self._shown:
-            self._shown = sessions
+        if sessions != self._items:
+            self._items = sessions
             self._sessions.clear()
             for session in sessions:
                 self._sessions.addItem(session.words, str(session.folder))
@@ -128,7 +128,7 @@ class ScreenFields(QWidget):
         super().__init__()
         self._form = form
         self.words = ""  # the length of the line, and characters that no font here has
-        self.missing = ""  # why the subject's page is on no tablet, where it should be
+        self.problem = ""  # why the subject's page is on no tablet, where it should be
         self._line_words = ""
         self._size = QSize(1000, 640)  # of the subject's window
         self.language = choice(tr("language that the subject reads"))
@@ -144,18 +144,18 @@ class ScreenFields(QWidget):
         language = field(tr("Language that the subject reads"), self.language)
         vbox(language, self.thumbnail, self._ruler, self.camera, self._new_code, on=self, spacing=4)
 
-    def show_line(self, known: Millimetres, size: QSize) -> None:
+    def show_line(self, scale: Millimetres, size: QSize) -> None:
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
         self._size = size
-        self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=known.words)
+        self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=scale.words)
         self.show_form()
 
-    def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
+    def show_tablet(self, words: str, problem: str, picture: bytes) -> None:
         """Say how the tablet is reached; why no session can begin; its address for a camera (PNG, or empty)."""
-        self._line_words, self.missing = words, missing
-        shown = QPixmap()
-        shown.loadFromData(picture)
-        self.camera.setPixmap(shown)
+        self._line_words, self.problem = words, problem
+        pixmap = QPixmap()
+        pixmap.loadFromData(picture)
+        self.camera.setPixmap(pixmap)
         self.camera.setVisible(bool(picture))
         self._ruler.hide()  # there is one on the tablet's page
         self._new_code.show()

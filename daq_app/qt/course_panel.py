@@ -58,28 +58,28 @@ class CoursePanel(Panel):
 
     def show_view(self, view: CourseView) -> None:
         before, self._view = self._view, view
-        waiting = tr("waiting {timer}", timer=view.timer) if view.timer else ""
-        say(self._timer, waiting, tr("Time since this was asked:"))
+        wait = tr("waiting {timer}", timer=view.timer) if view.timer else ""
+        say(self._timer, wait, tr("Time since this was asked:"))
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
         for name, widget in self.buttons.items():
-            shown = view.buttons[name]
-            if before is None or shown != before.buttons[name]:
-                widget.setText(f"{shown.label} {tr(shown.key)}".strip())
-                widget.setAccessibleName(f"{shown.label}: {tr(_WORDS.get(shown.key, _WORDS['no answer']))}")
-                widget.setEnabled(shown.enabled)
+            entry = view.buttons[name]
+            if before is None or entry != before.buttons[name]:
+                widget.setText(f"{entry.label} {tr(entry.key)}".strip())
+                widget.setAccessibleName(f"{entry.label}: {tr(_WORDS.get(entry.key, _WORDS['no answer']))}")
+                widget.setEnabled(entry.enabled)
 
     def ask(self, what: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
-        if self._view is None or not (shown := self._view.buttons[what]).enabled:
+        if self._view is None or not (entry := self._view.buttons[what]).enabled:
             return
-        if shown.sends is not None:
-            self._send(shown.sends)
+        if entry.sends is not None:
+            self._send(entry.sends)
             return
         self._asking = what
-        self._asked_for = shown.question
-        say(self._question, shown.question)
-        self.line.setAccessibleName(shown.question)
+        self._asked_for = entry.question
+        say(self._question, entry.question)
+        self.line.setAccessibleName(entry.question)
         self.line.clear()
         self._bottom.setCurrentIndex(1)
         self.line.setFocus()

@@ -217,8 +217,8 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             left, below = boxes.min(axis=0)[[0, 2]].tolist()
             right, high = boxes.max(axis=0)[[1, 3]].tolist()
             room = max(here.height() - line - 2.0, 1.0)  # over a line of words under the tractions
-            shown = View.fit((left, right, below, high), 0.0, 0.0, here.width(), room)
-            x0, x1, y0, y1 = shown.visible(0.0, 0.0, here.width(), here.height())
+            view = View.fit((left, right, below, high), 0.0, 0.0, here.width(), room)
+            x0, x1, y0, y1 = view.visible(0.0, 0.0, here.width(), here.height())
             part = QRectF(x0, y0, x1 - x0, y1 - y0)
         if part is not None:
             self._box.setRange(part, padding=0.0)

@@ -81,16 +81,16 @@ class FingerPainter:
 
     def _paint_tissue(self, look: Look, shades: list[QColor]) -> None:
         frame, box = self.frame, self.box
-        shown = self.view.visible(box.left(), box.top(), box.width(), box.height())
+        region = self.view.visible(box.left(), box.top(), box.width(), box.height())
         nodes, values = frame.nodes, look.field.of(frame)
-        triangles = visible(nodes, self.parts.triangles, shown)
+        triangles = visible(nodes, self.parts.triangles, region)
         if len(triangles) and box.width() * box.height() / len(triangles) > _COARSE:
             nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
         part = (values[triangles].mean(axis=1) - low) / (high - low)
-        wanted = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
+        shade = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
         self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        for number, path in faces(self.view.to_screen(nodes)[triangles], wanted):
+        for number, path in faces(self.view.to_screen(nodes)[triangles], shade):
             self.painter.setPen(QPen(shades[number], 0))
             self.painter.setBrush(shades[number])
             self.painter.drawPath(path)

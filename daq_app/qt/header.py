@@ -37,14 +37,14 @@ class Header(QWidget):
         self._simulated.setVisible(False)
         self._lamp = Lamp(tr("recording"))
         self._words = label(tr("not recording"), "title")
-        self._saved = label("", "quiet")
-        self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self._age = label("", "quiet")
+        self._age.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         subject = hbox((self._heading, 3), (self._device, 2), self._language, spacing=GRID)
-        lamp = hbox(1, self._simulated, self._lamp, self._words, self._saved, spacing=GRID)
+        lamp = hbox(1, self._simulated, self._lamp, self._words, self._age, spacing=GRID)
         self._one_row = px(_ONE_ROW)
         self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
         longest = tr("saved {age:.1f} s ago", age=99.9)
-        self._saved.setFixedWidth(QFontMetrics(font(SMALL)).horizontalAdvance(f"{longest} "))
+        self._age.setFixedWidth(QFontMetrics(font(SMALL)).horizontalAdvance(f"{longest} "))
 
     def show_view(self, view: View) -> None:
         say(self._heading, view.heading)
@@ -58,7 +58,7 @@ class Header(QWidget):
         # All figures are as wide, but some lean beyond their place, which a label allows for.
         self._words.setMinimumWidth(self._words.fontMetrics().horizontalAdvance(view.lamp.words) + 2)
         regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
-        say(self._saved, view.lamp.saved)
+        say(self._age, view.lamp.age)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the lamp below the subject where the strip is too narrow for one row."""
@@ -74,7 +74,7 @@ class Notice(Panel):
         self._send, self._collapsible = send, False
         self._banner: Banner | None = None
         self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
-        self._said: object = None
+        self._topic: object = None
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
@@ -83,9 +83,9 @@ class Notice(Panel):
 
     def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
         """Show a banner and a warning of this step of the session, or else the last message."""
-        said = (banner is None, notice, step)
-        if said != self._said:
-            self.warning, self._said = "", said
+        topic = (banner is None, notice, step)
+        if topic != self._topic:
+            self.warning, self._topic = "", topic
         self._show(banner, notice)
 
     def _show(self, banner: Banner | None, notice: str) -> None:

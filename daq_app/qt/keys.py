@@ -91,7 +91,7 @@ def act_of(event: QKeyEvent) -> str | None:
         name = f"Ctrl+{name}"
     elif modifiers != Qt.KeyboardModifier.NoModifier:
         return None
-    return next((known.act for known in KEYS if known.key == name), None)
+    return next((one.act for one in KEYS if one.key == name), None)
 
 
 def name_of(event: QKeyEvent) -> str:
@@ -112,7 +112,7 @@ class KeysPage(Panel):
 
     def _fill(self) -> None:
         head = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
-        rows, pairs = QWidget(), ((tr(known.key), label(tr(known.words), wrap=True)) for known in self._keys)
+        rows, pairs = QWidget(), ((tr(one.key), label(tr(one.words), wrap=True)) for one in self._keys)
         grid = label_grid(pairs, role="value")
         grid.setHorizontalSpacing(3 * GRID)
         self._rows = vbox(grid, on=rows, margins=(0, 0, GRID, 0))
@@ -152,8 +152,8 @@ class Keyboard(QObject):
         super().__init__(window)
         self._window, self._plan, self._subject, self._act = window, plan, subject, act
         self._since_answer = QElapsedTimer()
-        for watched in (plan, subject, *subject.findChildren(QWidget)):
-            watched.installEventFilter(self)
+        for widget in (plan, subject, *subject.findChildren(QWidget)):
+            widget.installEventFilter(self)
         subject.answered.connect(self._since_answer.start)
         application = QApplication.instance()
         assert isinstance(application, QApplication)

@@ -77,17 +77,17 @@ class LiveBar(QWidget):
         # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.
         self.setMinimumSize(1, QFontMetrics(font(TITLE)).height())
 
-    def show_forces(self, shown: bool) -> None:
+    def show_forces(self, visible: bool) -> None:
         """Show the numbers, or keep them from the experimenter where the protocol does."""
-        self._forces_shown = shown
+        self._forces_shown = visible
         self._fit()
 
     def show_numbers(self, values: Array) -> None:
         """Show the means of the last readings (channels, n)."""
         for channel, form in PICTURE.items():
-            known = values[CHANNELS.index(channel)]
-            known = known[np.isfinite(known)]
-            text = quantity(float(known.mean()) if len(known) else None, *form)
+            finite = values[CHANNELS.index(channel)]
+            finite = finite[np.isfinite(finite)]
+            text = quantity(float(finite.mean()) if len(finite) else None, *form)
             if text != self.values[channel].text():
                 say(self.values[channel], text)
                 self.values[channel].setAccessibleName(spoken(channel, text))
@@ -172,7 +172,7 @@ class LivePanel(Panel):
         self._seconds = 10
         self._hold_time: float | None = None  # device time the picture is held at; readings go on behind it
         self._read_at = 0.0
-        self._drawn: object = None  # what the picture was drawn of
+        self._content: object = None  # what the picture was drawn of
         self._forces_shown = True
         self._least_for_acts = px(LEAST_FOR_ACTS)
         self.plots = [LivePlot(*plot) for plot in (*PLOTS, *AXIS_PLOTS)]
@@ -212,12 +212,12 @@ class LivePanel(Panel):
         self.tab.setToolTip(self.tab.accessibleName())
         self._show_acts()
 
-    def show_forces(self, shown: bool) -> None:
+    def show_forces(self, visible: bool) -> None:
         """Show readings, or nothing of them where the protocol keeps them from the experimenter."""
-        if shown != self._forces_shown:
-            self._forces_shown = shown
-            self._pictures.setVisible(shown)
-            self.bar.show_forces(shown)
+        if visible != self._forces_shown:
+            self._forces_shown = visible
+            self._pictures.setVisible(visible)
+            self.bar.show_forces(visible)
             self._show_acts()
 
     def show_seconds(self, seconds: int) -> None:
@@ -248,16 +248,16 @@ class LivePanel(Panel):
         if now is None or newest is None:
             now, marks = 0.0, ()
         end = picture_end(marks, now)
-        seen = tuple(mark for mark in marks if mark.stop >= end - self._seconds and mark.start <= now)
+        visible_marks = tuple(mark for mark in marks if mark.stop >= end - self._seconds and mark.start <= now)
         hold = tr("held") if self._hold_time is not None else ""
         frozen = newest is not None and end < newest
         latest = tr("last reading") if silent else tr("now")
-        drawn = (trace, now, end, self._seconds, self._columns(), seen, frozen, hold, latest)
-        if drawn != self._drawn:
-            self._drawn = drawn
+        content = (trace, now, end, self._seconds, self._columns(), visible_marks, frozen, hold, latest)
+        if content != self._content:
+            self._content = content
             if end == newest or trace.holds(end - self._seconds):  # else the stroke stays as it was drawn last
-                self._show_until(self.plots[:3], end, seen, clock)
-            self._show_until(self.plots[3:], now, seen, clock)
+                self._show_until(self.plots[:3], end, visible_marks, clock)
+            self._show_until(self.plots[3:], now, visible_marks, clock)
             for plot in self._column:
                 plot.show_axis(end=hold or (tr("lift + 1 s") if frozen else latest))
             for plot in self.plots[3:]:
@@ -281,13 +281,13 @@ class LivePanel(Panel):
 
     def model_says(self) -> None:
         """Take what the model said since the last call."""
-        for said in self._model.poll():
-            self._model_trace.add_prediction(said)
+        for prediction in self._model.poll():
+            self._model_trace.add_prediction(prediction)
 
     def _columns(self) -> int:
         """Return how many columns a curve has: two pixels each, as its line is wide."""
-        shown = next((plot for plot in self.plots if plot.isVisible()), self.plots[0])
-        return max(shown.width() // 2, 100)
+        first = next((plot for plot in self.plots if plot.isVisible()), self.plots[0])
+        return max(first.width() // 2, 100)
 
     def _draw_model(self, now: float, clock: float, *, still: bool, silent: bool) -> None:
         """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
@@ -297,26 +297,26 @@ class LivePanel(Panel):
         if not self.finger.isVisible() or self._hold_time is not None:
             return
         model = self._model
-        words = model_words(model.said, model.settled, model.problem, silent=silent)
-        said = None if silent else model.said
-        shown = model.settled if model.settled is not None and model.settled.picture is not None else said
-        picture, row = (None, np.empty(0)) if shown is None else (shown.picture, shown.row)
+        words = model_words(model.provisional, model.settled, model.problem, silent=silent)
+        provisional = None if silent else model.provisional
+        answer = model.settled if model.settled is not None and model.settled.picture is not None else provisional
+        picture, row = (None, np.empty(0)) if answer is None else (answer.picture, answer.row)
         self.finger.show_model(picture, row, words, clock)
 
     def _show_acts(self) -> None:
         """Show the acts where there are pictures that keep their least height beneath them; their keys always serve."""
         inside = self.contentsRect().marginsRemoved(self._rows.contentsMargins())
         least = self.bar.height_with_acts(inside.width()) + self._rows.spacing() + self.drawer.least_height()
-        shown = self._forces_shown and self.height() >= self._least_for_acts and inside.height() >= least
+        visible = self._forces_shown and self.height() >= self._least_for_acts and inside.height() >= least
         for act in (self.bar.finite, self.bar.length, self.bar.hold):
-            act.setVisible(shown)
+            act.setVisible(visible)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         speed, model = self.height() >= LEAST_FOR_SPEED, self.height() >= LEAST_FOR_MODEL
         visible = [True, True, speed, model]
-        for plot, shown, below in zip(self._column, visible, [*visible[1:], False], strict=True):
-            plot.setVisible(shown)
+        for plot, fits, below in zip(self._column, visible, [*visible[1:], False], strict=True):
+            plot.setVisible(fits)
             plot.show_axis(times=not below)  # one axis for all of them
         self.finger.setVisible(model)
         self._show_acts()
@@ -333,6 +333,6 @@ class LivePanel(Panel):
         self.bar.hold.setChecked(self._hold_time is not None)  # of nothing no picture is held
         self.bar.show_words()
 
-    def _finite(self, chosen: bool) -> None:
-        settings().setValue(FINITE, "yes" if chosen else "no")
-        self.show_finite(chosen)
+    def _finite(self, on: bool) -> None:
+        settings().setValue(FINITE, "yes" if on else "no")
+        self.show_finite(on)

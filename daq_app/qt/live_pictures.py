@@ -51,13 +51,13 @@ class ContactMap(PaintedWidget):
 
     def show_trail(self, position: Array) -> None:
         """Show the last positions (n, 2) [mm], the newest last; nan where nothing presses."""
-        shown = position[np.isfinite(position[:, 0])]
+        trail = position[np.isfinite(position[:, 0])]
         touching = bool(len(position)) and bool(np.isfinite(position[-1, 0]))
-        if not len(shown) and not len(self._trail):
+        if not len(trail) and not len(self._trail):
             return
-        self._trail = shown
+        self._trail = trail
         self._touching = touching
-        where = f"x {shown[-1, 0]:.0f}, y {shown[-1, 1]:.0f} mm" if touching else tr("nothing touches")
+        where = f"x {trail[-1, 0]:.0f}, y {trail[-1, 1]:.0f} mm" if touching else tr("nothing touches")
         self.setAccessibleName(tr("centre of pressure on the sample: {where}", where=where))
         self.update()
 
@@ -153,9 +153,9 @@ class FingerView(QWidget):
         self._picture, self._row, self._words = picture, 1000.0 * row, words
         if picture is not None and len(picture.sed):
             self._colours = self._colours.following(0.0, 1000.0 * float(np.quantile(picture.sed, _TOP)), clock)
-        known = self._row[np.isfinite(self._row)]
-        if len(known):
-            self._heights = self._heights.following(0.0, float(known.max()), clock)
+        finite = self._row[np.isfinite(self._row)]
+        if len(finite):
+            self._heights = self._heights.following(0.0, float(finite.max()), clock)
         self.setAccessibleName(tr("finger as the model sees it: {words}", words=words.words))
         self.setToolTip(words.words)
         self.update()
@@ -167,11 +167,11 @@ class FingerView(QWidget):
         painter.setPen(QColor(t.look if self._words.state in ("instead", "beyond", "failed") else t.quiet))
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height())
-        needed = painter.boundingRect(box, flags, self._words.words).height()
+        height = painter.boundingRect(box, flags, self._words.words).height()
         painter.drawText(box, flags, self._words.words)
         # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
         line = painter.fontMetrics().height()
-        top = max(needed, 3.0 * line) + 4
+        top = max(height, 3.0 * line) + 4
         painter.setFont(font(SMALL))
         room = self.height() - top
         row = room * (1.0 - _PART) if room * (1.0 - _PART) >= ROW_LINES * line else 0.0
@@ -230,9 +230,9 @@ class FingerView(QWidget):
         painter.drawLine(QPointF(here, plot.top()), QPointF(here, plot.bottom()))
         if len(self._row) != len(ROW):
             return
-        known = np.isfinite(self._row)
-        x = plot.left() + plot.width() * across[known]
-        y = plot.bottom() - plot.height() * self._row[known] / self._heights.high
+        finite = np.isfinite(self._row)
+        x = plot.left() + plot.width() * across[finite]
+        y = plot.bottom() - plot.height() * self._row[finite] / self._heights.high
         style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
         painter.setPen(fine(MODEL, style))
         draw_line(painter, x, y)

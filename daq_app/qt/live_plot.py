@@ -75,8 +75,8 @@ class LivePlot(PaintedWidget):
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
         """Draw the columns with `now` [s, device time] at the right edge; `clock` [s] is for the scale's patience."""
         self._columns, self._now, self._marks = columns, now, tuple(marks)
-        shown = columns.values[list(self._rows)]
-        least, greatest = (float(end.reduce(shown, axis=None, initial=np.nan)) for end in (np.fmin, np.fmax))
+        values = columns.values[list(self._rows)]
+        least, greatest = (float(end.reduce(values, axis=None, initial=np.nan)) for end in (np.fmin, np.fmax))
         before, self._scale = self._scale, self._scale.following(least, greatest, clock)
         if (before.low, before.high) != (self._scale.low, self._scale.high):
             self.redraw()
@@ -169,16 +169,16 @@ class LivePlot(PaintedWidget):
         painter = QPainter(picture)
         painter.setFont(font(SMALL, bold=True))
         x, baseline = inside.left() + 6, _TOP + metrics.ascent() + 1
-        named = [curve for curve in self._curves if curve.named]
-        several = len(named) > 1
+        curves = [curve for curve in self._curves if curve.named]
+        several = len(curves) > 1
         unit = self._name[max(self._name.find("["), 0) :] if several else self._name
-        words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in named)
-        room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
+        words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in curves)
+        room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(curves), 1)
         sample = max(min(SAMPLE * type_scale(), room), 0.0)
-        width = words + len(named) * sample if several else 0.0
+        width = words + len(curves) * sample if several else 0.0
         ground = QRectF(x - 3, _TOP, width + metrics.horizontalAdvance(unit) + 6, metrics.height())
         painter.fillRect(ground, sheer(self.theme.surface, 200))
-        for curve in named if several else ():
+        for curve in curves if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
             if curve.dashed:
                 pen.setDashPattern([1.6, 1.2])

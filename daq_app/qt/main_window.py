@@ -206,10 +206,10 @@ class MainWindow(QMainWindow):
 
     def _start_session(self) -> None:
         bench = bench_of(self.bridge.state.bench)
-        missing = first_missing(self.page.check(bench, anew=True))
-        if missing is None:
+        gap = first_missing(self.page.check(bench, anew=True))
+        if gap is None:
             self._begin(self.page.form(), bench)
-        elif missing.field == "forces" and self.bridge.view.bench.lamp == "off":
+        elif gap.field == "forces" and self.bridge.view.bench.lamp == "off":
             self.bench.connect_choice()
         else:
             self._form_changed()
@@ -223,8 +223,8 @@ class MainWindow(QMainWindow):
             self.notice.warn(tr("A protocol is piloted in Prepare, while no session is in hand."))
 
     def _preview(self) -> None:
-        if refused := open_preview(self.page.form(), self.subject.size(), self):
-            self.notice.warn(refused)
+        if refusal := open_preview(self.page.form(), self.subject.size(), self):
+            self.notice.warn(refusal)
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
@@ -242,9 +242,9 @@ class MainWindow(QMainWindow):
         self.page.show_bench(bench)
         cards = self.page.check(bench)
         ready = all(card.ready for card in cards)
-        view, missing = self.bridge.view.bench, first_missing(cards)
+        view, gap = self.bridge.view.bench, first_missing(cards)
         self.page.transducer.show_view(view)
-        connects = missing is not None and missing.field == "forces" and view.lamp == "off"
+        connects = gap is not None and gap.field == "forces" and view.lamp == "off"
         primary = Button(tr("Connect"), "Enter") if connects else Button(tr("Start"), "Enter", ready)
         self.to_do.show_what(headline(cards, self.page.subject.text()), primary, 0)
 
@@ -265,7 +265,7 @@ class MainWindow(QMainWindow):
         if self.tablet is None:
             self.page.screen_fields.show_line(millimetres(self.subject.screen()), self.subject.size())
         else:
-            self.page.screen_fields.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
+            self.page.screen_fields.show_tablet(self.tablet.words, self.tablet.problem, self.tablet.picture())
             self._warn_of_tablet()
         if self.bridge.view.course is None:
             self._form_changed()
@@ -299,16 +299,16 @@ class MainWindow(QMainWindow):
     def _fit(self) -> None:
         width, height = self.width() / type_scale(), self.height() / type_scale()
         wide = width >= _WIDE
-        shown = wide if self._bench_shown is None else self._bench_shown
-        self.bench.setVisible(shown)
+        visible = wide if self._bench_shown is None else self._bench_shown
+        self.bench.setVisible(visible)
         cards = self._left.currentIndex() == 0 and width >= _WIDE
         scale = type_scale() if wide else min(type_scale(), 1.4)
-        least = LEAST_CARDS * type_scale() if self._left.currentIndex() == 0 and (wide or not shown) else 0.0
+        least = LEAST_CARDS * type_scale() if self._left.currentIndex() == 0 and (wide or not visible) else 0.0
         self._left.setMaximumWidth(round((CARDS if cards else max(_PLAN, least / scale)) * scale))
         self._left.setMinimumWidth(round(max(_PLAN * scale, least)))
         self.bench.setFixedWidth(px(290))
-        self.strip.setVisible(not shown and width >= 800)
-        self.live.set_room(width >= _ROOMY + (CARDS if cards else 0) and not (shown and not wide))
+        self.strip.setVisible(not visible and width >= 800)
+        self.live.set_room(width >= _ROOMY + (CARDS if cards else 0) and not (visible and not wide))
         self.to_do.show_small(height < TALL or width < _ROOMY)
         self.notice.set_collapsible(height < LOW)
         self.keys.fit()

@@ -43,7 +43,7 @@ class TrialStrip(QScrollArea):
         """Show no trials; `inspect` is called with the number of the trial whose tile is pressed."""
         super().__init__()
         self._inspect = inspect
-        self._shown: tuple[Tile, ...] = ()
+        self._view: tuple[Tile, ...] = ()
         self.horizontalScrollBar().rangeChanged.connect(self._keep_in_sight)  # new tiles have their places then
         self.tiles: list[QPushButton] = []
         inside = QWidget()
@@ -54,7 +54,7 @@ class TrialStrip(QScrollArea):
         self.setFixedHeight(max(px(2 * SMALL + 2 * GRID), TARGET) + 12 + GRID // 2)  # with the scroll bar
 
     def show_tiles(self, tiles: tuple[Tile, ...]) -> None:
-        if tiles == self._shown:
+        if tiles == self._view:
             return
         while len(self.tiles) > len(tiles):
             gone = self.tiles.pop()
@@ -67,22 +67,22 @@ class TrialStrip(QScrollArea):
             tile_button.setAccessibleName(tile.words)
             tile_button.setToolTip(tile.words)
             regrade(tile_button, TILE_GRADES.get(tile.kind, ""))
-        self._shown = tiles
+        self._view = tiles
         self._keep_in_sight()
 
     def show_inspected_trial(self, number: int | None) -> None:
         """Mark the tile of the inspected trial; None marks none."""
-        for tile_button, tile in zip(self.tiles, self._shown, strict=True):
+        for tile_button, tile in zip(self.tiles, self._view, strict=True):
             tile_button.setChecked(tile.number == number)
 
     def _keep_in_sight(self) -> None:
-        current = next((at for at, tile in enumerate(self._shown) if tile.kind == "current"), None)
+        current = next((at for at, tile in enumerate(self._view) if tile.kind == "current"), None)
         if current is not None:
             self.ensureWidgetVisible(self.tiles[current], 8 * GRID, 0)
 
     def _add(self) -> None:
         at = len(self.tiles)
-        tile_button = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile", checkable=True)
+        tile_button = button("", tr("trial"), lambda: self._inspect(self._view[at].number), "tile", checkable=True)
         tile_button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.tiles.append(tile_button)
         self._row.insertWidget(at, tile_button)
@@ -93,7 +93,7 @@ class InspectedTrial(QWidget):
 
     def __init__(self, back: Callable[[], None]) -> None:
         super().__init__()
-        self._shown: Inspection | None = None
+        self._trial: Inspection | None = None
         self.heading = label("", "name", wrap=True)
         self.verdict = label("", "title", wrap=True)
         self.details = label("", "quiet", wrap=True)
@@ -107,22 +107,22 @@ class InspectedTrial(QWidget):
         plots = zip(self._plots, (3, 2, 2), strict=True)
         vbox(head, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
 
-    def show_trial(self, shown: Inspection) -> None:
-        if shown == self._shown:
+    def show_trial(self, trial: Inspection) -> None:
+        if trial == self._trial:
             return
-        self._shown = shown
-        say(self.heading, shown.heading)
-        say(self.verdict, shown.verdict)
-        regrade(self.verdict, GRADES.get(shown.grade, ""))
-        say(self.details, shown.details)
-        self.details.setVisible(bool(shown.details))
-        for name, text in shown.cells:
+        self._trial = trial
+        say(self.heading, trial.heading)
+        say(self.verdict, trial.verdict)
+        regrade(self.verdict, GRADES.get(trial.grade, ""))
+        say(self.details, trial.details)
+        self.details.setVisible(bool(trial.details))
+        for name, text in trial.cells:
             say(self.cells[name], text)
             self.cells[name].setAccessibleName(spoken(name, text))
         for plot in self._plots:
-            plot.setVisible(shown.stroke is not None and shown.stroke.curve is not None)
-        if shown.stroke is not None and shown.stroke.curve is not None:
-            self._show_course(shown.stroke, shown.stroke.curve)
+            plot.setVisible(trial.stroke is not None and trial.stroke.curve is not None)
+        if trial.stroke is not None and trial.stroke.curve is not None:
+            self._show_course(trial.stroke, trial.stroke.curve)
 
     def _show_course(self, stroke: Stroke, curve: StrokeCurve) -> None:
         time, onset, lift = curve.time, stroke.onset, stroke.lift
@@ -179,8 +179,8 @@ class Middle(QWidget):
         self.strip.show_tiles(course.tiles)
         session = self._bridge.state.session
         phase = "" if session is None else session.phase
-        begun = phase in AFTER_ONSET and self._phase not in AFTER_ONSET  # a busy machine never shows some phases
-        if begun or phase == "stroking":
+        onset = phase in AFTER_ONSET and self._phase not in AFTER_ONSET  # a busy machine never shows some phases
+        if onset or phase == "stroking":
             self.leave()
         self._phase = phase
         self._show_inspection()
@@ -195,7 +195,7 @@ class Middle(QWidget):
         session = self._bridge.state.session
         number = self.inspected
         if number is None and session is not None:
-            number = session.judged if session.judged is not None else session.trial
+            number = session.judged_trial if session.judged_trial is not None else session.trial
         if number is not None:
             self.inspect(number)
 
@@ -212,8 +212,8 @@ class Middle(QWidget):
 
     def _show_inspection(self) -> None:
         session, number = self._bridge.state.session, self.inspected
-        shown = None if session is None or number is None else inspection(session, number)
-        if shown is not None:
-            self.trial.show_trial(shown)
-        self._pages.setCurrentIndex(0 if shown is None else 1)
-        self.strip.show_inspected_trial(None if shown is None else shown.number)
+        trial = None if session is None or number is None else inspection(session, number)
+        if trial is not None:
+            self.trial.show_trial(trial)
+        self._pages.setCurrentIndex(0 if trial is None else 1)
+        self.strip.show_inspected_trial(None if trial is None else trial.number)

@@ -53,7 +53,7 @@ class ModelColumn(QWidget):
         super().__init__()
         self._ask, self._say = ask, say
         self._state: AnalystState | None = None
-        self._film: m.Filmed | None = None
+        self._film: m.FingerHistory | None = None
         self._name = ""  # of the finger's pictures, after their kind
         self._drawing = ("", -1)  # picture that was asked for, and version of the report
         self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
@@ -89,7 +89,7 @@ class ModelColumn(QWidget):
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
         self.which.activated.connect(self._show_picture)
         self.session_errors = WrappedLabel("quiet")
-        self.compared = ComparedView(compare, self._save)
+        self.comparison = ComparedView(compare, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
         vbox(self.which, self.session_errors, (self.picture, 1), on=session)
@@ -97,7 +97,7 @@ class ModelColumn(QWidget):
         self.tabs.setAccessibleName(tr("pictures"))
         self.tabs.addTab(self._finger_page(), tr("Finger"))
         self.tabs.addTab(session, tr("Session"))
-        self.tabs.addTab(self.compared, tr("Comparison"))
+        self.tabs.addTab(self.comparison, tr("Comparison"))
         self.tabs.addTab(self.scene, tr("Scene"))
         self.tabs.currentChanged.connect(self._show_picture)
         vbox(self.tabs, on=self)
@@ -111,14 +111,14 @@ class ModelColumn(QWidget):
             count = 0 if film is None else len(film.film.instants)
             self.player.set_times([number / STEPS_A_SECOND for number in range(count)], max(count - 1, 0))
         row = selected_row(state)
-        said, stroke = (None, None) if row is None else (row.prediction, row.stroke)
-        self.history.setEnabled(film is None and said is not None and said.mu is not None)
+        prediction, stroke = (None, None) if row is None else (row.prediction, row.stroke)
+        self.history.setEnabled(film is None and prediction is not None and prediction.mu is not None)
         self.why.show_text(film_words(film))
         if film is None:
             self._ask_where(row, state.version)
         drawable = film is not None or (row is not None and row.key in state.fingers)
         self._name = f" {stroke.number}" if drawable and stroke is not None else ""
-        self.together.setVisible(state.compared is not None)
+        self.together.setVisible(state.other is not None)
         self._paint()
         self.scene.show_lines(scene_table(state))
         if before is None or before.version != state.version or before.report is None:
@@ -126,10 +126,10 @@ class ModelColumn(QWidget):
             if names != [self.which.itemText(i) for i in range(self.which.count())]:
                 self.which.clear()
                 self.which.addItems(names)
-        if (other := state.compared) is not None and state.report is not None:
+        if (other := state.other) is not None and state.report is not None:
             names = (name_and_errors(state.report), name_and_errors(other.report))
-            self.compared.show_rows(compare_reports(state.report, other.report), names)
-            if before is None or before.compared is not other:
+            self.comparison.show_rows(compare_reports(state.report, other.report), names)
+            if before is None or before.other is not other:
                 self._drawing = ("", -1)
                 self.together.setChecked(True)
                 self._paint()
@@ -141,17 +141,17 @@ class ModelColumn(QWidget):
         state, tab, which = self._state, self.tabs.currentIndex(), self.which.currentIndex()
         if state is None:
             return
-        if tab == _COMPARISON and state.compared is not None:
-            view, name, words = self.compared.picture, COMPARISON_NAME, tr("both sessions")
+        if tab == _COMPARISON and state.other is not None:
+            view, name, words = self.comparison.picture, COMPARISON_NAME, tr("both sessions")
         elif tab == SESSION and 0 <= which < len(names := session_pictures(state.report)):
             view, (name, words) = self.picture, names[which]
             self.session_errors.show_text(picture_errors(state.report, name))
         else:
             return
-        drawn = state.drawn.get(name)
-        if drawn is not None:
-            title = drawn.title or tr("There are no numbers yet for: {words}", words=words)
-            view.show_picture(name, title, drawn.png)
+        picture = state.pictures.get(name)
+        if picture is not None:
+            title = picture.title or tr("There are no numbers yet for: {words}", words=words)
+            view.show_picture(name, title, picture.png)
             return
         view.show_picture("", tr("Drawing: {words}", words=words), b"")
         if self._drawing != (name, state.version):
@@ -170,18 +170,20 @@ class ModelColumn(QWidget):
         other, other_words = other_finger(state) if self.together.isChecked() else (None, "")
         lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
         field = self.fields.field
-        shown = tuple(one.frame for one in (finger, other) if one is not None)
-        frames = tuple(film.film.frames) if film is not None and self._filming else shown
+        present = tuple(one.frame for one in (finger, other) if one is not None)
+        frames = tuple(film.film.frames) if film is not None and self._filming else present
         own = automatic_range(field, frames)  # of a film that is written: the same for all of it
         common = common_range(state, field)
         ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
         look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
         pair = ((self.finger, finger, f"A  {words}"), (self.other, other, f"B  {other_words}"))
-        drawn = pair if other_words else ((self.finger, finger, words),)
-        self.finger.sight.words = tuple(said for _, _, said in drawn)
-        for canvas, one, said in drawn:
+        panels = pair if other_words else ((self.finger, finger, words),)
+        self.finger.sight.words = tuple(caption for _, _, caption in panels)
+        for canvas, one, caption in panels:
             frame, parts = (None, NO_PARTS) if one is None else (one.frame, one.parts)
-            canvas.show_frame(frame, parts, said, look if canvas is self.finger else replace(look, lost=None), shown)
+            canvas.show_frame(
+                frame, parts, caption, look if canvas is self.finger else replace(look, lost=None), present
+            )
         self.other.setVisible(bool(other_words))
         self.plot.show_field((finger, other) if other_words else (finger,), field, self.finger.sight.line)
         kind = "contact" if self.near.isChecked() else "finger"
@@ -201,8 +203,8 @@ class ModelColumn(QWidget):
 
     def _probe(self, place: tuple[float, float] | None) -> None:
         canvases = [self.finger, *([self.other] if self.other.isVisible() else [])]
-        said = [] if place is None else [canvas.words_at(place) for canvas in canvases]
-        self.probe.show_text("  |  ".join(filter(None, said)))
+        readouts = [] if place is None else [canvas.words_at(place) for canvas in canvases]
+        self.probe.show_text("  |  ".join(filter(None, readouts)))
 
     def _show_step(self, at: int) -> None:
         self._at = at
@@ -216,8 +218,8 @@ class ModelColumn(QWidget):
 
     def _ask_where(self, row: Row | None, version: int) -> None:
         """Ask how far a solve without an answer came, once."""
-        said = None if row is None else row.prediction
-        if row is None or said is None or said.sed is not None or not was_tried(said):
+        prediction = None if row is None else row.prediction
+        if row is None or prediction is None or prediction.sed is not None or not was_tried(prediction):
             return
         if (row.key, version) != self._followed:
             self._followed = row.key, version

@@ -54,7 +54,7 @@ class NewSessionPage(Panel):
         super().__init__(tr("new session"))
         self._send = send
         self._cards: tuple[Card, ...] = ()
-        self._checked: object = None  # what the cards were derived from
+        self._source: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in CARD_FIELDS}
         self.subject = entry(tr("subject code, never a name"))
         words = tr("take the proposed code")
@@ -144,7 +144,7 @@ class NewSessionPage(Panel):
             normal=self.normal.currentText() if self._height.isVisibleTo(self) else "",
             area=self.area.text() if self.with_forces.isChecked() else "",
             simulated=self.simulated.isChecked(),
-            tablet=self.screen_fields.missing,
+            tablet=self.screen_fields.problem,
         )
 
     def show_bench(self, bench: Bench) -> None:
@@ -169,10 +169,10 @@ class NewSessionPage(Panel):
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
         """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
-        checked = self.form(), bench, self.screen_fields.words
-        if anew or checked != self._checked:
-            self._checked = checked
-            self._cards = checklist(*checked)
+        source = self.form(), bench, self.screen_fields.words
+        if anew or source != self._source:
+            self._source = source
+            self._cards = checklist(*source)
             for card in self._cards:
                 self.frames[card.name].show_card(card)
         return self._cards
@@ -180,10 +180,10 @@ class NewSessionPage(Panel):
     def go_to_missing(self) -> None:
         """Let typing go to the first field that is wrong, and mark its card."""
         fields: dict[str, QWidget] = {**self._lines, "protocol": self.protocol}
-        missing = [card for card in self._cards if not card.ready]
-        for card in missing:
+        gaps = [card for card in self._cards if not card.ready]
+        for card in gaps:
             self.frames[card.name].insist()
-        first = next((fields[card.field] for card in missing if card.field in fields), None)
+        first = next((fields[card.field] for card in gaps if card.field in fields), None)
         if first is not None:
             first.setFocus()
 
@@ -193,27 +193,27 @@ class NewSessionPage(Panel):
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
-        known, before = enrolment(self.form()), optional_phases(self.form())
+        record, before = enrolment(self.form()), optional_phases(self.form())
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
-        self._enrol.setVisible(known is not None and known.may_enrol)
+        self._enrol.setVisible(record is not None and record.may_enrol)
         self.screen_fields.offer_languages()
         self.screen_fields.show_form()
         for widget in (self.protocol, self.seed):
-            widget.setEnabled(known is None)
-            widget.setToolTip("" if known is None else tr("the study's own: {protocol}", protocol=known.protocol))
+            widget.setEnabled(record is None)
+            widget.setToolTip("" if record is None else tr("the study's own: {protocol}", protocol=record.protocol))
 
     def _speak(self) -> None:
         """Let the subject's page speak the chosen language before there is a session."""
         self._send(LanguageChosen(self.screen_fields.language.currentData() or ENGLISH))
 
     def _enrol_subject(self) -> None:
-        refused = enrol_subject(self.form())
+        refusal = enrol_subject(self.form())
         self._show_study()
-        self._checked = None  # the study has changed, not the form
+        self._source = None  # the study has changed, not the form
         self.changed.emit()
-        if refused:
-            self.frames["Subject"].show_card(Card("Subject", ready=False, words=refused, field="subject"))
+        if refusal:
+            self.frames["Subject"].show_card(Card("Subject", ready=False, words=refusal, field="subject"))
 
     def _choose_protocol(self, at: int) -> None:
         if at == self.protocol.count() - 1:

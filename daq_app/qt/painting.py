@@ -32,19 +32,19 @@ def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
     """Paint a picture in the middle, as large as there is room and its proportions kept; return where it is."""
     whole, ratio = painter.window(), painter.device().devicePixelRatioF()
     smooth = Qt.TransformationMode.SmoothTransformation
-    drawn = picture.scaled(whole.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
-    drawn.setDevicePixelRatio(ratio)
-    place = QRect(QPoint(), drawn.deviceIndependentSize().toSize())
+    pixmap = picture.scaled(whole.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
+    pixmap.setDevicePixelRatio(ratio)
+    place = QRect(QPoint(), pixmap.deviceIndependentSize().toSize())
     place.moveCenter(whole.center())
-    painter.drawPixmap(place.topLeft(), drawn)
+    painter.drawPixmap(place.topLeft(), pixmap)
     return place
 
 
 def sheer(colour: str, alpha: int) -> QColor:
     """Return a colour that lets what is behind it through, from 0 all of it to 255 nothing."""
-    shown = QColor(colour)
-    shown.setAlpha(alpha)
-    return shown
+    shade = QColor(colour)
+    shade.setAlpha(alpha)
+    return shade
 
 
 def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
@@ -72,9 +72,9 @@ def lines(x: Array, y: Array) -> list[QPolygonF]:
     """Return the line through points (n,) in pieces: it is broken where a coordinate is nan."""
     points = np.empty((len(x), 2))
     points[:, 0], points[:, 1] = x, y
-    known = np.zeros(len(x) + 2, np.bool_)
-    known[1:-1] = np.isfinite(x) & np.isfinite(y)
-    edges = np.flatnonzero(known[1:] != known[:-1])
+    finite = np.zeros(len(x) + 2, np.bool_)
+    finite[1:-1] = np.isfinite(x) & np.isfinite(y)
+    edges = np.flatnonzero(finite[1:] != finite[:-1])
     return [_polygon(points[a:b]) for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
 
 

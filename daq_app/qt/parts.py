@@ -75,9 +75,9 @@ class WrappedLabel(QLabel):
 
     def show_text(self, text: str) -> None:
         """Show a text; none of it takes no room."""
-        shown = text.replace("/", "/\u200b")  # where a line may end
-        if shown != self.text():
-            self.setText(shown)
+        display = text.replace("/", "/\u200b")  # where a line may end
+        if display != self.text():
+            self.setText(display)
             self.setAccessibleName(text)
             self._fit()
         self.setVisible(self._keeps_room or bool(text))
@@ -94,10 +94,10 @@ class WrappedLabel(QLabel):
 
     def _fit(self) -> None:
         self.setMinimumHeight(0)  # which Qt would count among what the text needs
-        needed = max(self.heightForWidth(max(self.width(), 60)), self._least)
+        height = max(self.heightForWidth(max(self.width(), 60)), self._least)
         if self._keeps_room:
-            self._least = needed
-        self.setFixedHeight(needed)
+            self._least = height
+        self.setFixedHeight(height)
 
 
 def button(text: str, name: str, does: Callable[[], object], role: str = "", *, checkable: bool = False) -> QPushButton:
@@ -160,15 +160,15 @@ def row_list(name: str) -> QListWidget:
 class EntryLine(QLineEdit):
     """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
 
-    def __init__(self, keep: Callable[[], None], left: Callable[[], None]) -> None:
+    def __init__(self, keep: Callable[[], None], leave: Callable[[], None]) -> None:
         super().__init__()
-        self._keep, self._left = keep, left
+        self._keep, self._leave = keep, leave
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self._keep()
         elif event.key() == Qt.Key.Key_Escape:
-            self._left()
+            self._leave()
         else:
             super().keyPressEvent(event)
 
@@ -302,13 +302,13 @@ class Openness:
 
     def __init__(self, key: str, place: Callable[[], object]) -> None:
         self._key, self._place = key, place
-        self._wanted = settings().value(key) != "no"
+        self._wish = settings().value(key) != "no"
         self._instead = False  # it was opened where there is no room
         self.room = True
 
     def __bool__(self) -> bool:
         """Say whether it is open."""
-        return self._wanted if self.room else self._instead
+        return self._wish if self.room else self._instead
 
     def set_room(self, room: bool) -> None:
         if room != self.room:
@@ -317,8 +317,8 @@ class Openness:
 
     def toggle(self) -> None:
         if self.room:
-            self._wanted = not self._wanted
-            settings().setValue(self._key, "yes" if self._wanted else "no")
+            self._wish = not self._wish
+            settings().setValue(self._key, "yes" if self._wish else "no")
         else:
             self._instead = not self._instead
         self._place()
@@ -346,8 +346,8 @@ class Drawer(QSplitter):
 
     def least_height(self) -> int:
         """Return the height that those of its two parts need that are shown [px]."""
-        shown = [layout for part in (self._main, self._drawer) if not part.isHidden() and (layout := part.layout())]
-        return max(layout.totalMinimumSize().height() for layout in shown)
+        layouts = [layout for part in (self._main, self._drawer) if not part.isHidden() and (layout := part.layout())]
+        return max(layout.totalMinimumSize().height() for layout in layouts)
 
     def _place(self) -> None:
         self._drawer.setVisible(bool(self.open))

@@ -14,7 +14,7 @@ from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPixmap
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QApplication, QFileDialog, QProgressDialog, QPushButton, QSizePolicy, QWidget
 
-from daq_app.analyst.finger_words import MEAN_PANELS, Compared
+from daq_app.analyst.finger_words import MEAN_PANELS, ComparisonRows
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.painting import paint_fitted
 from daq_app.qt.parts import button, hbox, label, say, vbox
@@ -113,11 +113,11 @@ class ComparedView(QWidget):
         vbox(hbox((self.words, 1), self.choose), (self.table, 1), (self.picture, 2), on=self)
         self.show_rows((), ("", ""))
 
-    def show_rows(self, rows: Compared, sessions: tuple[str, str]) -> None:
+    def show_rows(self, rows: ComparisonRows, sessions: tuple[str, str]) -> None:
         """Show the stimuli of two sessions, by their names."""
         there = bool(sessions[1])
-        named = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
-        say(self.words, named if there else tr("No second session is open."))
+        names = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
+        say(self.words, names if there else tr("No second session is open."))
         self.table.setVisible(there)
         self.picture.setVisible(there)
         lines: list[tuple[str, ...]] = []
@@ -219,13 +219,13 @@ def _mp4(frames: list[Image.Image]) -> bytes:
     except ImportError as error:
         raise ImportError(tr(NO_MP4)) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
-    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / _SHOWN:g}", "-i", "-"]
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / _SHOWN:g}", "-i", "-"]
     codec = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
     pixels = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
     with TemporaryDirectory() as folder:  # the place of an MP4's parts is known at its end: no pipe takes it
         film = Path(folder) / "film.mp4"
-        encoder = [get_ffmpeg_exe(), "-loglevel", "error", *taken, *codec, str(film)]
-        done = subprocess.run(encoder, input=pixels, capture_output=True, check=False)
-        if done.returncode != 0:
-            raise OSError(f"the encoder stopped: {done.stderr.decode(errors='replace').strip()[:200]}")
+        encoder = [get_ffmpeg_exe(), "-loglevel", "error", *source, *codec, str(film)]
+        result = subprocess.run(encoder, input=pixels, capture_output=True, check=False)
+        if result.returncode != 0:
+            raise OSError(f"the encoder stopped: {result.stderr.decode(errors='replace').strip()[:200]}")
         return film.read_bytes()

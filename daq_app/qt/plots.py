@@ -43,11 +43,11 @@ class RoomyAxis(pg.AxisItem):
     def tickSpacing(self, least: float, greatest: float, size: float) -> list[tuple[float, float]]:  # noqa: N802  Qt's
         """Return spacings and offsets of the numbers on `size` pixels, the widest first."""
         spacings = pg.AxisItem.tickSpacing(self, least, greatest, size)
-        needed = QFontMetricsF(self.style["tickFont"]).height() * (greatest - least) / size
-        if not spacings or spacings[0][0] >= needed:
+        spacing = QFontMetricsF(self.style["tickFont"]).height() * (greatest - least) / size
+        if not spacings or spacings[0][0] >= spacing:
             return spacings
-        power = 10.0 ** floor(log10(needed))
-        return [(next(step * power for step in (1, 2, 5, 10) if step * power >= needed), 0.0)]
+        power = 10.0 ** floor(log10(spacing))
+        return [(next(step * power for step in (1, 2, 5, 10) if step * power >= spacing), 0.0)]
 
 
 def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types
@@ -100,10 +100,10 @@ class ZoomedPlot(pg.PlotWidget):
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
         axis.setHeight(round(above + axis.label.boundingRect().height()))
 
-    def show_numbers(self, *, shown: bool) -> None:
+    def show_numbers(self, *, visible: bool) -> None:
         """Show the numbers along both axes, or none: a plot of nothing has no scale."""
         for side in ("left", "bottom"):
-            self.getPlotItem().getAxis(side).setStyle(showValues=shown)
+            self.getPlotItem().getAxis(side).setStyle(showValues=visible)
 
     def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
         """Name curves, each beside a piece of its line; `corner` is where, from 0, 0 at the top left to 1, 1."""
@@ -194,22 +194,22 @@ class FieldPlot(QWidget):
         if source == LINE and line is None:
             words = tr("Press Line and drag over the finger, or drag with Shift.")
         for at, curve in enumerate(self._curves):
-            known = self.values[at] if at < len(self.values) else _NOTHING
-            curve.setData(*known, symbol="o" if source == _RECEPTORS else None, symbolBrush=MODEL)
+            points = self.values[at] if at < len(self.values) else _NOTHING
+            curve.setData(*points, symbol="o" if source == _RECEPTORS else None, symbolBrush=MODEL)
         if (len(fingers) > 1) != self._named:
             self._named = len(fingers) > 1
             self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
         self._here.setVisible(source != LINE)
         self.plot.name_across(f"{axis}<br>{words}" if len(place) else words)
-        self.plot.show_numbers(shown=len(place) > 0)
+        self.plot.show_numbers(visible=len(place) > 0)
         self.plot.setAccessibleName(f"{axis}: {words}")
         self._unit = "kPa" if source == _RECEPTORS else field.unit.removesuffix("-")
 
     def _read(self, at: float) -> str:
         names = _NAMES if len(self.values) > 1 else ("",)
         curves = zip(names, self.values, strict=True)
-        said = (read_out("mm", place, at, [(name, self._unit, values)]) for name, (place, values) in curves)
-        return "   ".join(filter(None, said))
+        readouts = (read_out("mm", place, at, [(name, self._unit, values)]) for name, (place, values) in curves)
+        return "   ".join(filter(None, readouts))
 
 
 def _curve(finger: Finger | None, source: int, field: FieldChoice, line: Line | None) -> Curve:

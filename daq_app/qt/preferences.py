@@ -35,17 +35,17 @@ def choose(what: str, value: object) -> None:
 
 def theme() -> str:
     """Return the theme that was chosen, one of THEMES."""
-    said = str(settings().value(THEME))
-    return said if said in THEMES else "system"
+    name = str(settings().value(THEME))
+    return name if name in THEMES else "system"
 
 
 def chosen_scale() -> float:
     """Return how much larger than usual type is to be [-]: as it was chosen, or as the system asks for."""
     try:
-        chosen = float(str(settings().value(SCALE)))
+        scale = float(str(settings().value(SCALE)))
     except ValueError:
         return font_scale()
-    return chosen if chosen in SCALES else font_scale()
+    return scale if scale in SCALES else font_scale()
 
 
 type_scale = cache(chosen_scale)  # of the type of this run: a choice holds from the next start on
@@ -59,25 +59,25 @@ def font_scale() -> float:
 
 def language() -> str:
     """Return the language of the experimenter's windows: as it was chosen, or as the environment says."""
-    said = str(settings().value(LANGUAGE) or os.environ.get(VARIABLE))
-    return said if said in languages(EXPERIMENTER) else SOURCE_LANGUAGE
+    code = str(settings().value(LANGUAGE) or os.environ.get(VARIABLE))
+    return code if code in languages(EXPERIMENTER) else SOURCE_LANGUAGE
 
 
 def recent_sessions() -> tuple[Path, ...]:
     """Return the sessions that were recorded or opened last and are still there, the newest first."""
     try:
-        listed = json.loads(str(settings().value(_RECENT)))
+        entries = json.loads(str(settings().value(_RECENT)))
     except ValueError:
         return ()
-    places = [Path(one) for one in listed if isinstance(one, str)] if isinstance(listed, list) else []  # pyright: ignore[reportUnknownVariableType]
+    places = [Path(one) for one in entries if isinstance(one, str)] if isinstance(entries, list) else []  # pyright: ignore[reportUnknownVariableType]
     return tuple(place for place in places if place.is_dir())[:RECENT]
 
 
 def remember_session(folder: Path) -> None:
     """Put a session first among the recent ones."""
     whole = folder.absolute()
-    kept = [whole, *(place for place in recent_sessions() if place != whole)]
-    settings().setValue(_RECENT, json.dumps([str(place) for place in kept[:RECENT]]))
+    folders = [whole, *(place for place in recent_sessions() if place != whole)]
+    settings().setValue(_RECENT, json.dumps([str(place) for place in folders[:RECENT]]))
 
 
 def save_place(window: QWidget) -> None:
@@ -87,9 +87,9 @@ def save_place(window: QWidget) -> None:
 
 def restore_place(window: QWidget) -> None:
     """Put a window where it was; Qt brings it back onto a screen that is there."""
-    kept = settings().value(_GEOMETRY)
-    if isinstance(kept, QByteArray):
-        window.restoreGeometry(kept)
+    geometry = settings().value(_GEOMETRY)
+    if isinstance(geometry, QByteArray):
+        window.restoreGeometry(geometry)
     else:
         resize_to_hint(window)
 
@@ -136,11 +136,11 @@ def millimetres(screen: QScreen) -> Millimetres:
     return Millimetres(_pixels_per_mm(screen) * factor, checked=True)
 
 
-def store_ruler_length(screen: QScreen, measured: float) -> Millimetres | None:
+def store_ruler_length(screen: QScreen, length: float) -> Millimetres | None:
     """Store how long a line of nominally 100 mm is on the screen [mm]; None where no screen can show it so."""
-    if not LEAST <= measured <= MOST:
+    if not LEAST <= length <= MOST:
         return None
-    pixels = millimetres(screen).pixels * 100.0 / measured
+    pixels = millimetres(screen).pixels * 100.0 / length
     settings().setValue(_key(screen), repr(pixels / _pixels_per_mm(screen)))
     return Millimetres(pixels, checked=True)
 
@@ -159,10 +159,10 @@ def _key(screen: QScreen) -> str:
     return f"millimetres/{safe}-{screen.devicePixelRatio():g}"
 
 
-def line_settings(shown: Millimetres) -> tuple[Setting, ...]:
+def line_settings(scale: Millimetres) -> tuple[Setting, ...]:
     """Return what a session keeps of the line that is answered on: its length, and how long a millimetre is."""
-    origin = "measured" if shown.checked else "default"
+    origin = "measured" if scale.checked else "default"
     return (
         Setting("answer line length", LENGTH, "mm", origin),
-        Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
+        Setting("pixels in a millimetre of the answering screen", round(scale.pixels, 4), "1/mm", origin),
     )

@@ -157,10 +157,10 @@ class Menus:
 
     def _list_recent(self) -> None:
         self.recent.clear()
-        listed = preferences.recent_sessions()
-        for place in listed:
+        folders = preferences.recent_sessions()
+        for place in folders:
             self.recent.addAction(place.name, lambda place=place: self._act(f"open {place}"))
-        if not listed:
+        if not folders:
             self.recent.addAction(tr("No session was recorded or opened yet")).setEnabled(False)
 
 
@@ -173,8 +173,8 @@ def about_box(parent: QWidget) -> QMessageBox:
 
 def about_words() -> str:
     """Return the versions of the program and of what it stands on."""
-    known = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
-    return "\n".join((*known, *(f"{name} {_version(name)}" for name in _LIBRARIES)))
+    versions = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
+    return "\n".join((*versions, *(f"{name} {_version(name)}" for name in _LIBRARIES)))
 
 
 def _version(name: str) -> str:
@@ -205,12 +205,12 @@ class ReviewRoom(QWidget):
     def enter(self) -> None:
         """Open the newest session where none is open."""
         self._list()
-        if self.analyst is None and (listed := recent_sessions()):
-            self.open(listed[0])
+        if self.analyst is None and (recent := recent_sessions()):
+            self.open(recent[0])
 
     def choose(self) -> None:
-        listed = recent_sessions()
-        name = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(listed[0].parent) if listed else ".")
+        recent = recent_sessions()
+        name = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(recent[0].parent) if recent else ".")
         if name:
             self.open(Path(name))
 
@@ -286,7 +286,7 @@ class Rooms(QStackedWidget):
         """Show nothing yet: the room of the session in hand is the first widget that is added."""
         super().__init__()
         self._bridge, self._rail, self._menus = bridge, rail, menus
-        self._kept: str | None = None  # folder of the session that was put among the recent ones
+        self._recent_folder: str | None = None  # folder of the session that was put among the recent ones
         self.review = ReviewRoom()  # added when it is first entered
 
     @property
@@ -333,8 +333,8 @@ class Rooms(QStackedWidget):
     def show_state(self) -> None:
         """Show in rail and menu what can be done now, and keep a session that has ended among the recent ones."""
         session = self._bridge.state.session
-        if session is not None and session.over and session.folder != self._kept:
-            self._kept = session.folder
+        if session is not None and session.over and session.folder != self._recent_folder:
+            self._recent_folder = session.folder
             remember_session(Path(session.folder))
         in_hand = self._bridge.view.course is not None
         self._rail.show_room(self.room, in_hand=in_hand, over=self.over)

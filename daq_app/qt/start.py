@@ -154,8 +154,8 @@ def _tablet(address: str | None) -> "TabletScreen":
 
 def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     """Show the window that is made until it is closed; return the exit code, or say what is missing."""
-    if missing := what_is_missing():
-        return _fail(missing)
+    if problem := what_is_missing():
+        return _fail(problem)
     try:
         from PySide6.QtCore import QTimer
         from PySide6.QtWidgets import QApplication

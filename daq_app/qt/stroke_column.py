@@ -36,8 +36,8 @@ class StrokeColumn(QWidget):
         self._stroke: StrokeFinding | None = None
         self._play_next = False
         self._moving = False  # an edge was let go elsewhere, and what came of it is not known yet
-        self._read: m.Read | None = None
-        self._wanted: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
+        self._excerpt: m.Excerpt | None = None
+        self._request: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
         self.stroke = StrokeView(tokens)
         self.stroke.moved.connect(self._drag)
         self.player = TransportBar(tr("the recorded readings"))
@@ -60,7 +60,7 @@ class StrokeColumn(QWidget):
         self.tabs.addTab(self._scroll, tr("Numbers"))
         self.tabs.addTab(self.readings, tr("Readings"))
         self.friction = TextTable(tr("friction of every stroke"), [tr(words) for words in FRICTION_HEAD])
-        self.friction.chosen.connect(self._choose)
+        self.friction.row_chosen.connect(self._choose)
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
         row = hbox((self.player, 1), self.save)
@@ -73,12 +73,12 @@ class StrokeColumn(QWidget):
             self._stroke = stroke
             self.stroke.show_stroke(stroke)
             self.save.set_name("" if stroke is None else f"stroke {stroke.number}")
-            self._read = None
+            self._excerpt = None
         elif self._moving and state.step is None:  # it was not recorded: the sentence below says why
             self.stroke.show_edges()
         self._moving = self._moving and state.step is not None
-        decided = () if stroke is None else stroke.decided.values()
-        self.decisions.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in decided))
+        sentences = () if stroke is None else stroke.decided.values()
+        self.decisions.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
         self.decisions.show_history(state.history)
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
@@ -94,8 +94,8 @@ class StrokeColumn(QWidget):
         """Go to the first reading of the steady window."""
         self.tabs.setCurrentIndex(_READINGS)
         self.readings.table.setFocus()
-        if self._read is not None and self._stroke is not None and self._stroke.steady is not None:
-            readings = self._read.readings
+        if self._excerpt is not None and self._stroke is not None and self._stroke.steady is not None:
+            readings = self._excerpt.readings
             self.readings.go_to(int(readings.block.time.searchsorted(self._stroke.steady[0])))
 
     def _choose(self, row: int) -> None:
@@ -110,18 +110,18 @@ class StrokeColumn(QWidget):
         self._play_next = True
 
     def _show_readings(self, state: AnalystState) -> None:
-        stroke, read = self._stroke, state.read
-        wanted = None if stroke is None else (stroke.number, state.version)
-        if wanted != self._wanted:
-            self._wanted = wanted  # first, for asking comes back here
+        stroke, excerpt = self._stroke, state.excerpt
+        request = None if stroke is None else (stroke.number, state.version)
+        if request != self._request:
+            self._request = request  # first, for asking comes back here
             if stroke is not None:
                 self._ask(m.ShowReadings(stroke.number))
-        if read is not None and (stroke is None or read.stroke != stroke.number):
-            read = None
-        if read is self._read and not (read is None and self.player.slider.maximum()):
+        if excerpt is not None and (stroke is None or excerpt.stroke != stroke.number):
+            excerpt = None
+        if excerpt is self._excerpt and not (excerpt is None and self.player.slider.maximum()):
             return
-        self._read = read
-        readings = None if read is None else read.readings
+        self._excerpt = excerpt
+        readings = None if excerpt is None else excerpt.readings
         self.stroke.show_readings(readings)
         self.readings.show_readings(readings, None if stroke is None else stroke.steady)
         times: list[float] = [] if readings is None else readings.block.time.tolist()
@@ -174,8 +174,8 @@ class DecisionsBar(QWidget):
     def show_history(self, history: History) -> None:
         """Say on each button what it would do next."""
         for widget, decisions, words in (
-            (self.undo, history.done[-1:], tr_noop("undo {decision}, Ctrl+Z")),
-            (self.redo, history.undone[:1], tr_noop("redo {decision}, Ctrl+Shift+Z")),
+            (self.undo, history.undoable[-1:], tr_noop("undo {decision}, Ctrl+Z")),
+            (self.redo, history.redoable[:1], tr_noop("redo {decision}, Ctrl+Shift+Z")),
         ):
             widget.setEnabled(bool(decisions))
             none = tr("{button}: no decision", button=widget.text())

@@ -83,9 +83,9 @@ class EdgeHandle(QPushButton):
             self.setAccessibleName(tr("{name}: no stroke", name=name))
             return
         at = f"{self._time - self._origin:.3f}"
-        mark = "✎ " if placed.decided else "" if placed.present else "○ "
+        mark = "✎ " if placed.decision else "" if placed.present else "○ "
         self.setText(f"{mark}{name} {at}{' ⏎' if self._away else ''}")
-        state = placed.decided or (tr("as found") if placed.present else tr("not found; where it could be"))
+        state = placed.decision or (tr("as found") if placed.present else tr("not found; where it could be"))
         words = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
         self.setToolTip(words)
         spoken = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
@@ -151,7 +151,7 @@ class StrokeView(QWidget):
         self._time = np.empty(0) if trace is None else trace.time
         self._columns = [self._time] * 3 if trace is None else [trace.normal, trace.tangential, trace.mu]
         for plot in self._plots:
-            plot.show_numbers(shown=len(self._time) > 0)
+            plot.show_numbers(visible=len(self._time) > 0)
         self._plots[1].setLabel("bottom", tr("time since contact [s]") if len(self._time) else word)
         self.show_edges()
         if other:
@@ -168,8 +168,8 @@ class StrokeView(QWidget):
             plot.disableAutoRange()
         if len(self._time):
             self._plots[0].setXRange(self._time[0], self._time[-1], padding=0.09)
-            known = self._columns[2][np.isfinite(self._columns[2])]
-            self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
+            finite = self._columns[2][np.isfinite(self._columns[2])]
+            self._plots[1].setYRange(0.0, max(float(finite.max()), 0.01) if len(finite) else 1.0, padding=0.04)
         low, high = self._forces.viewRange()[1]
         self._extent = self._range = low, high
         self._make_room()
@@ -208,27 +208,27 @@ class StrokeView(QWidget):
             curve.setData(self._time[:until], column[:until])
         stop = 0 if raw is None else len(raw.block) if at is None else at + 1
         for curve, name in zip(self._recorded, ("normal", "tangential"), strict=True):
-            shown = () if raw is None else (raw.block.time[:stop] - self._origin, getattr(raw, name)[:stop])
-            curve.setData(*(shown or ([], [])))
+            data = () if raw is None else (raw.block.time[:stop] - self._origin, getattr(raw, name)[:stop])
+            curve.setData(*(data or ([], [])))
         for line in self._now:
             line.setVisible(now is not None)
             if now is not None:
                 line.setPos(now)
 
     def show_edges(self) -> None:
-        placed = {} if self._stroke is None else {one.edge: one for one in edges_of(self._stroke)}
+        by_edge = {} if self._stroke is None else {one.edge: one for one in edges_of(self._stroke)}
         for edge in EDGES:
-            one = placed.get(edge)
+            one = by_edge.get(edge)
             self.handles[edge].show_edge(one, self._origin)
             for line in self._lines[edge]:
                 line.setVisible(one is not None)
                 if one is not None:
-                    style = Qt.PenStyle.DashDotLine if one.decided else Qt.PenStyle.SolidLine
+                    style = Qt.PenStyle.DashDotLine if one.decision else Qt.PenStyle.SolidLine
                     style = style if one.present else Qt.PenStyle.DotLine
-                    line.setPen(pg.mkPen(self._tokens.act, width=3 if one.decided else 1.5, style=style))
+                    line.setPen(pg.mkPen(self._tokens.act, width=3 if one.decision else 1.5, style=style))
                     line.setPos(one.time - self._origin)
             label: Any = self._lines[edge][0].label
-            label.setFormat(f"✎ {tr(edge)}" if one is not None and one.decided else tr(edge))
+            label.setFormat(f"✎ {tr(edge)}" if one is not None and one.decision else tr(edge))
         self._fill()
 
     def _fill(self) -> None:

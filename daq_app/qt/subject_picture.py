@@ -75,16 +75,16 @@ class Thumbnail(SubjectPicture):
 
     def __init__(self) -> None:
         super().__init__(QSize(1000, 640))
-        self._drawn: object = None  # what the picture was drawn from
+        self._source: object = None  # what the picture was drawn from
         self.setFixedHeight(px(THUMBNAIL_HEIGHT, most=1.4))
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_form(self, form: SessionForm, size: QSize) -> None:
         """Show the page of a form as it looks in a subject's window of a size."""
-        drawn = form.protocol, form.study, form.folder, form.language, size
-        if drawn == self._drawn:
+        source = form.protocol, form.study, form.folder, form.language, size
+        if source == self._source:
             return
-        self._drawn = drawn
+        self._source = source
         pages = preview(form, translator(form.language or ENGLISH))
         self.setVisible(not isinstance(pages, Refusal))
         if not isinstance(pages, Refusal):
@@ -133,9 +133,9 @@ def open_preview(form: SessionForm, size: QSize, parent: QWidget) -> str:
     pages = preview(form, translator(form.language or ENGLISH))
     if isinstance(pages, Refusal):
         return " ".join(pages.values())
-    shown = SubjectPreview(pages, size, parent)
-    shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    shown.show()
+    window = SubjectPreview(pages, size, parent)
+    window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    window.show()
     return ""
 
 

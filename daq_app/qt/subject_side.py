@@ -54,8 +54,8 @@ class TabletScreen(QObject):
         """Return what is worth knowing of the tablet, for the experimenter."""
         if not self.server.connected:
             return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
-        checked = tr("checked") if self._pixels else tr("not checked")
-        line = tr("Line of {length:.0f} mm, {checked} with a ruler.", length=LENGTH, checked=checked)
+        state = tr("checked") if self._pixels else tr("not checked")
+        line = tr("Line of {length:.0f} mm, {checked} with a ruler.", length=LENGTH, checked=state)
         return f"{tr('The tablet shows the page.')} {line}"
 
     def picture(self) -> bytes:
@@ -64,12 +64,12 @@ class TabletScreen(QObject):
             return b""
         import segno  # an optional package, which the server has looked for
 
-        drawn = io.BytesIO()
-        segno.make(self.server.link, micro=False).save(drawn, kind="png", scale=4, border=4)
-        return drawn.getvalue()
+        png = io.BytesIO()
+        segno.make(self.server.link, micro=False).save(png, kind="png", scale=4, border=4)
+        return png.getvalue()
 
     @property
-    def missing(self) -> str:
+    def problem(self) -> str:
         """Return why no session can begin; empty where one can."""
         return "" if self.server.connected else self.words
 
@@ -85,22 +85,22 @@ class TabletScreen(QObject):
 
     def line_settings(self) -> tuple[Setting, ...]:
         """Return what a session keeps of the line that is answered on."""
-        shown = Millimetres(self._pixels or USUAL_DPI / 25.4, self._pixels is not None)
-        return (Setting("subject's screen", "web", "", "set"), *line_settings(shown))
+        scale = Millimetres(self._pixels or USUAL_DPI / 25.4, self._pixels is not None)
+        return (Setting("subject's screen", "web", "", "set"), *line_settings(scale))
 
-    def _take(self, said: FromTablet, arrived: float) -> None:
-        match said:
+    def _take(self, message: FromTablet, arrival: float) -> None:
+        match message:
             case Hello(pixels_per_mm=pixels) | Ruler(pixels):
                 self._pixels = pixels
                 self.changed.emit()
             case AnswerGiven():
-                event = self._dialogue.take(said, partial(self._session_time, said.sent, arrived))
+                event = self._dialogue.take(message, partial(self._session_time, message.sent, arrival))
                 if event is not None:
                     self.answered.emit(event)
 
-    def _session_time(self, sent: float, arrived: float, at: float) -> float:
+    def _session_time(self, sent: float, arrival: float, at: float) -> float:
         """Return the session's clock [s] at an instant of the tablet's [ms]: so long before the answer arrived."""
-        return arrived + self.session_offset - max(sent - at, 0.0) * 1e-3
+        return arrival + self.session_offset - max(sent - at, 0.0) * 1e-3
 
 
 class SubjectSide(QObject):
@@ -124,7 +124,7 @@ class SubjectSide(QObject):
         self.keyboard = Keyboard(window, course.plan, subject, act)
         self.keyboard.free.connect(self._bring)
         subject.answered.connect(self._send_answer)
-        subject.ruler.done.connect(lambda: subject.scoring or self.come_back())
+        subject.ruler.finished.connect(lambda: subject.scoring or self.come_back())
         subject.screen_changed.connect(self.line_changed)
         if tablet is not None:
             tablet.answered.connect(bridge.send)

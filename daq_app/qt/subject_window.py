@@ -54,7 +54,7 @@ class SubjectWindow(QWidget):
         self.next.setMinimumSize(px(180), px(64))
         self.ruler = RulerCheck()
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
-        self.ruler.done.connect(self._ruler_done)
+        self.ruler.finished.connect(self._ruler_done)
         self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
         for way in (self.line, self.number, self.choice):
@@ -199,9 +199,9 @@ class SubjectWindow(QWidget):
         self._message_layout = layout = QVBoxLayout(page)
         layout.setContentsMargins(6 * GRID, 6 * GRID, 6 * GRID, 6 * GRID)
         layout.addStretch(1)
-        for shown in (self._title, self._text, self.press):
-            shown.setMaximumWidth(px(TEXT_WIDTH))
-            layout.addLayout(hbox(1, (shown, 100), 1))
+        for widget in (self._title, self._text, self.press):
+            widget.setMaximumWidth(px(TEXT_WIDTH))
+            layout.addLayout(hbox(1, (widget, 100), 1))
             layout.addSpacing(3 * GRID)
         layout.addStretch(2)
         return page
@@ -270,8 +270,8 @@ class _Scale(QWidget):
             end.setMargin(GRID)  # keeps the words apart; Arabic letters reach beyond the height of the label's own font
 
     def show_ends(self, ends: tuple[str, str]) -> None:
-        for shown, words in zip(self._ends, ends, strict=True):
-            say(shown, words)
+        for widget, words in zip(self._ends, ends, strict=True):
+            say(widget, words)
         self.fit()
 
     def set_type(self, size: float) -> None:
@@ -286,9 +286,9 @@ class _Scale(QWidget):
         ends = [line.x() + line.place_of(position).x() for position in (0.0, 100.0)]
         width = int(min(abs(ends[1] - ends[0]), 2 * min(ends)))
         tallest = 0
-        for shown, at in zip(self._ends, ends, strict=True):
-            tallest = max(tallest, shown.heightForWidth(width))
-            shown.setGeometry(int(at - width / 2), line.height(), width, shown.heightForWidth(width))
+        for widget, at in zip(self._ends, ends, strict=True):
+            tallest = max(tallest, widget.heightForWidth(width))
+            widget.setGeometry(int(at - width / 2), line.height(), width, widget.heightForWidth(width))
         self.setFixedHeight(line.height() + tallest + GRID)
         self.setMinimumWidth(line.width())
 
@@ -300,7 +300,7 @@ class _Scale(QWidget):
 class RulerCheck(QWidget):
     """Shows a line, and takes what a ruler says of it."""
 
-    done = Signal()
+    finished = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -309,22 +309,22 @@ class RulerCheck(QWidget):
         self._line.setEnabled(False)
         self._line.setAccessibleName(tr("line of 100 millimetres to be measured"))
         sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
-        self._measured = QLineEdit()
-        self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
-        self._measured.setFixedWidth(px(100))
-        self._measured.returnPressed.connect(self._keep)
+        self._length = QLineEdit()
+        self._length.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
+        self._length.setFixedWidth(px(100))
+        self._length.returnPressed.connect(self._keep)
         self._wrong = label("", "quiet", wrap=True)
         keep = button(tr("Keep"), tr("keep the measured length"), self._keep)
-        leave = button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit)
-        row = hbox(self._measured, label("mm"), keep, leave, 1)
+        leave = button(tr("Leave as it is"), tr("leave the line as it is"), self.finished.emit)
+        row = hbox(self._length, label("mm"), keep, leave, 1)
         vbox(sentence, 1, hbox(1, self._line, 1), 1, row, self._wrong, on=self, margins=4 * GRID)
 
     def begin(self, screen: QScreen) -> None:
         self._screen = screen
         self._line.set_pixels_per_mm(millimetres(screen).pixels)
-        self._measured.setText("100")
-        self._measured.selectAll()
-        self._measured.setFocus(Qt.FocusReason.OtherFocusReason)
+        self._length.setText("100")
+        self._length.selectAll()
+        self._length.setFocus(Qt.FocusReason.OtherFocusReason)
         screen_name = screen.name() or tr("without a name")
         say(self._wrong, tr("Screen: {name}, {words}.", name=screen_name, words=millimetres(screen).words))
 
@@ -334,13 +334,13 @@ class RulerCheck(QWidget):
             super().keyPressEvent(event)
 
     def _keep(self) -> None:
-        length = typed_number(self._measured.text())
+        length = typed_number(self._length.text())
         if self._screen is not None and length is not None and store_ruler_length(self._screen, length) is not None:
-            self.done.emit()
+            self.finished.emit()
             return
         words = tr(
             "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
-            least=LEAST, most=MOST, it=self._measured.text().strip(),
+            least=LEAST, most=MOST, it=self._length.text().strip(),
         )  # fmt: skip
         say(self._wrong, words)
 

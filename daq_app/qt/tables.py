@@ -45,12 +45,12 @@ class CopyableTable(QTableView):
 
     def selected_text(self) -> str:
         """Return the least rectangle of cells that holds the selection; empty where a cell in it is not selected."""
-        chosen = {(at.row(), at.column()): str(at.data()) for at in self.selectedIndexes()}
-        if not chosen:
+        cells = {(at.row(), at.column()): str(at.data()) for at in self.selectedIndexes()}
+        if not cells:
             return ""
-        rows, columns = ({place[part] for place in chosen} for part in (0, 1))
+        rows, columns = ({place[part] for place in cells} for part in (0, 1))
         return as_tsv(
-            [chosen.get((row, column), "") for column in range(min(columns), max(columns) + 1)]
+            [cells.get((row, column), "") for column in range(min(columns), max(columns) + 1)]
             for row in range(min(rows), max(rows) + 1)
         )
 
@@ -63,13 +63,13 @@ class _ByNumber(QSortFilterProxyModel):
 
 
 class TextTable(CopyableTable):
-    """A table of texts: a click on a column's head sorts by it, and `chosen` says which line is current."""
+    """A table of texts: a click on a column's head sorts by it, and `row_chosen` says which line is current."""
 
-    chosen = Signal(int)  # its number before any sorting
+    row_chosen = Signal(int)  # its number before any sorting
 
     def __init__(self, name: str, head: Sequence[str]) -> None:
         super().__init__(name)
-        self._shown: tuple[tuple[str, ...], ...] = ()
+        self._texts: tuple[tuple[str, ...], ...] = ()
         self._cells = QStandardItemModel(0, len(head), self)
         self._cells.setHorizontalHeaderLabels(list(head))
         self._sorted = _ByNumber(self)
@@ -80,8 +80,8 @@ class TextTable(CopyableTable):
         self.selectionModel().currentRowChanged.connect(self._went)
 
     def show_lines(self, lines: tuple[tuple[str, ...], ...], at: int = -1) -> None:
-        if lines != self._shown:
-            self._shown = lines
+        if lines != self._texts:
+            self._texts = lines
             with QSignalBlocker(self.selectionModel()):
                 self._cells.setRowCount(0)
                 right = [_is_of_numbers(column) for column in zip(*lines, strict=True)]
@@ -99,7 +99,7 @@ class TextTable(CopyableTable):
 
     def _went(self, now: QModelIndex, _before: QModelIndex) -> None:
         if now.isValid():
-            self.chosen.emit(self._sorted.mapToSource(now).row())
+            self.row_chosen.emit(self._sorted.mapToSource(now).row())
 
 
 def _is_of_numbers(column: Sequence[str]) -> bool:

@@ -52,8 +52,8 @@ DARK = Tokens(
 
 def chosen_tokens() -> Tokens:
     """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
-    if (chosen := theme()) != "system":
-        return DARK if chosen == "dark" else LIGHT
+    if (name := theme()) != "system":
+        return DARK if name == "dark" else LIGHT
     scheme = QGuiApplication.styleHints().colorScheme()
     if scheme == Qt.ColorScheme.Unknown:
         return DARK if QGuiApplication.palette().window().color().lightness() < 128 else LIGHT
@@ -120,7 +120,7 @@ def style_sheet(t: Tokens) -> str:
 
 def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
     """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
-    drawn, characters = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
+    metrics, characters = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
     return "".join(
-        sorted(c for c in characters if not (c.isspace() or category(c) == "Cf" or drawn.inFontUcs4(ord(c))))
+        sorted(c for c in characters if not (c.isspace() or category(c) == "Cf" or metrics.inFontUcs4(ord(c))))
     )

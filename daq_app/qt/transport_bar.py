@@ -26,7 +26,7 @@ class TransportBar(QWidget):
         super().__init__()
         self._what = what
         self._times: Sequence[float] = ()
-        self._shown = -1
+        self._index = -1
         self.play = button("▶", tr("play {what}", what=what), self.toggle, "small")
         self.back = button("◀|", tr("one step back in {what}", what=what), lambda: self.step(-1), "small")
         self.forward = button("|▶", tr("one step forward in {what}", what=what), lambda: self.step(+1), "small")
@@ -62,7 +62,7 @@ class TransportBar(QWidget):
         with QSignalBlocker(self.slider):
             self.slider.setRange(0, max(len(times) - 1, 0))
             self.slider.setPageStep(max(len(times) // 20, 1))
-        self._shown = -1
+        self._index = -1
         self._enable()
         if len(times):
             self.seek(at)
@@ -83,7 +83,7 @@ class TransportBar(QWidget):
         if len(self._times):
             if self.playing:
                 self.toggle()
-            self.seek(min(max(self._shown + by, 0), len(self._times) - 1))
+            self.seek(min(max(self._index + by, 0), len(self._times) - 1))
 
     def seek(self, at: int) -> None:
         self._stand(self._times[at])
@@ -105,7 +105,7 @@ class TransportBar(QWidget):
                 super().keyPressEvent(event)
 
     def _move_to(self, at: int) -> None:
-        if at != self._shown and len(self._times):
+        if at != self._index and len(self._times):
             self.seek(at)
 
     @property
@@ -133,9 +133,9 @@ class TransportBar(QWidget):
 
     def _show(self, place: float) -> None:
         at = max(bisect_right(self._times, place) - 1, 0)
-        if at == self._shown:
+        if at == self._index:
             return
-        self._shown = at
+        self._index = at
         with QSignalBlocker(self.slider):
             self.slider.setValue(at)
         say(self.place, f"{self._times[at] - self._times[0]:.3f} s")

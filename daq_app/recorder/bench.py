@@ -172,10 +172,10 @@ class Bench:
 
     def _open(self, uri: str) -> None:
         with ExitStack() as stack:
-            opened = stack.enter_context(connect(uri, self._clock))
+            connection = stack.enter_context(connect(uri, self._clock))
             self._stack = stack.pop_all()
-        self.connected, self.uri = opened, uri
-        self._display.device(opened.transducer.info)
+        self.connected, self.uri = connection, uri
+        self._display.device(connection.transducer.info)
 
     def _close(self) -> None:
         self.end_tare("the transducer is no longer connected")

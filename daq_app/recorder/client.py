@@ -52,11 +52,11 @@ class Recorder:
         self._wake = wake
         self._requests = Codec(REQUESTS)
         self._reports = Codec(REPORTS)
-        self._arrived: deque[Report] = deque()
+        self._queue: deque[Report] = deque()
         self._to_send: SimpleQueue[bytes | None] = SimpleQueue()
         self._news = threading.Event()
         self._asked_to_end = False
-        self._heard = time.monotonic()
+        self._last_report_time = time.monotonic()
         self._reader = threading.Thread(target=self._read, name="recorder's reports", daemon=True)
         self._reader.start()
         threading.Thread(target=self._write, name="requests to the recorder", daemon=True).start()
@@ -98,7 +98,7 @@ class Recorder:
     @property
     def silence(self) -> float:
         """Return how long nothing was heard of the recorder [s]; more than 1 means that it hangs or sleeps."""
-        return time.monotonic() - self._heard
+        return time.monotonic() - self._last_report_time
 
     def send(self, request: Request) -> None:
         """Ask for something, or tell what was done. To a recorder that is gone it is sent in vain: `Gone` says so."""
@@ -107,10 +107,10 @@ class Recorder:
 
     def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
         """Return all reports since the last call, in order, waiting up to `timeout` [s] for the first."""
-        if not self._arrived and timeout > 0.0:
+        if not self._queue and timeout > 0.0:
             self._news.wait(timeout)
         self._news.clear()
-        return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
+        return tuple(self._queue.popleft() for _ in range(len(self._queue)))
 
     def close(self, patience: float = _PATIENCE) -> None:
         """End session and recorder, and wait for that; after `patience` [s] it is left to end by itself.
@@ -137,24 +137,24 @@ class Recorder:
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        said = ""
+        detail = ""
         with self._process.stdout as pipe:
             try:
                 for report in self._reports.read(pipe):
-                    self._heard = time.monotonic()
+                    self._last_report_time = time.monotonic()
                     self._arrive(report)
             except BrokenMessage as error:
-                said = f"; it said {error}"
+                detail = f"; it said {error}"
             except OSError:
                 pass
-        self._arrive(self._end_message(said))
+        self._arrive(self._end_message(detail))
 
     def _arrive(self, report: Report) -> None:
-        self._arrived.append(report)
+        self._queue.append(report)
         self._news.set()
         self._wake()
 
-    def _end_message(self, said: str) -> Gone:
+    def _end_message(self, detail: str) -> Gone:
         """Return the message that says how the recorder ended."""
         if self._asked_to_end:
             return Gone(True, "the recorder has ended")
@@ -165,7 +165,7 @@ class Recorder:
         why = f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
         return Gone(
             False,
-            f"the recorder has ended unexpectedly ({why}){said}: all that it had acknowledged is safe;"
+            f"the recorder has ended unexpectedly ({why}){detail}: all that it had acknowledged is safe;"
             " resume the session to go on at the same trial",
         )
 

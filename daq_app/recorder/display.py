@@ -31,14 +31,14 @@ class Display:
         self._factor = factor
         self._info: TransducerInfo | None = None
         self._stream = 0
-        self._waiting: list[ReadingBlock] = []
+        self._blocks: list[ReadingBlock] = []
         self._zero: Six = _UNLOADED
         self._load = self._peak = np.zeros(7)
         self._overload_told = False
         self._saturated_before = self._saturated_now = 0
-        self._arrived: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
+        self._arrivals: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
         self._live_due = self._health_due = 0.0
-        self._heard = 0.0  # when the newest reading came, or the stream began [real s]
+        self._newest_time = 0.0  # when the newest reading came, or the stream began [real s]
 
     def device(self, info: TransducerInfo | None) -> None:
         """Show this transducer from now on, or none. Zero and peaks stay: it may be the one of before."""
@@ -47,7 +47,7 @@ class Display:
         self._load = np.zeros(7)
         self._count_anew()
         self._health_due = 0.0
-        self._heard = time.monotonic()
+        self._newest_time = time.monotonic()
 
     def forget(self) -> None:
         """Forget the zero and the greatest loads: another transducer will be shown."""
@@ -58,8 +58,8 @@ class Display:
         """Take what comes next as a new stream, whose time and numbers begin anew."""
         self._flush()
         self._stream += 1
-        self._heard = time.monotonic()
-        self._arrived.clear()
+        self._newest_time = time.monotonic()
+        self._arrivals.clear()
         self._count_anew()
 
     def _count_anew(self) -> None:
@@ -82,9 +82,9 @@ class Display:
     def take(self, block: ReadingBlock) -> None:
         """Take readings, of the stream that runs."""
         if len(block) and self._info is not None:
-            self._waiting.append(block)
-            self._heard = time.monotonic()
-            self._arrived.append((self._heard, len(block)))
+            self._blocks.append(block)
+            self._newest_time = time.monotonic()
+            self._arrivals.append((self._newest_time, len(block)))
 
     def look(self, health: Health, *, streaming: bool = True) -> None:
         """Send what is due; where it is not `streaming`, nobody waits for readings."""
@@ -94,11 +94,11 @@ class Display:
             self._flush()
         if now >= self._health_due:
             self._health_due = now + HEALTH_EVERY
-            self._tell_health(health, now, now - self._heard if streaming and self._info is not None else 0.0)
+            self._tell_health(health, now, now - self._newest_time if streaming and self._info is not None else 0.0)
 
     def _flush(self) -> None:
-        info, block = self._info, ReadingBlock.concatenate(self._waiting)
-        self._waiting = []
+        info, block = self._info, ReadingBlock.concatenate(self._blocks)
+        self._blocks = []
         if info is None or not len(block):
             return
         calibration = info.calibration
@@ -121,11 +121,11 @@ class Display:
         )
 
     def _tell_health(self, health: Health, now: float, silence: float) -> None:
-        while self._arrived and now - self._arrived[0][0] > RATE_OVER:
-            self._arrived.popleft()
-        span = now - self._arrived[0][0] if self._arrived else 0.0
+        while self._arrivals and now - self._arrivals[0][0] > RATE_OVER:
+            self._arrivals.popleft()
+        span = now - self._arrivals[0][0] if self._arrivals else 0.0
         # The first readings of the span came before it began.
-        count = sum(readings for _, readings in self._arrived) - (self._arrived[0][1] if self._arrived else 0)
+        count = sum(readings for _, readings in self._arrivals) - (self._arrivals[0][1] if self._arrivals else 0)
         self._saturated_now = health.saturated + health.doubtful
         rated = np.full(6, np.nan) if self._info is None else self._info.calibration.rated
         unknown = np.isnan(np.append(rated, rated.sum()))

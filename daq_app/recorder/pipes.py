@@ -22,7 +22,7 @@ class Inbox:
     def __init__(self, reading: int) -> None:
         """Read from this file descriptor."""
         self._reading = reading
-        self._arrived: deque[m.Request] = deque()
+        self._queue: deque[m.Request] = deque()
         self._nudging = threading.Lock()
         self.client_gone = threading.Event()
         self.stop_wanted = threading.Event()
@@ -31,7 +31,7 @@ class Inbox:
 
     def take_requests(self) -> tuple[m.Request, ...]:
         """Return what was asked for since the last call, in order."""
-        return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
+        return tuple(self._queue.popleft() for _ in range(len(self._queue)))
 
     def answer_stop(self) -> None:
         """End the nudging: what comes next is not to be broken off."""
@@ -46,7 +46,7 @@ class Inbox:
                         self.leaving.set()
                     self.stop_wanted.set()
                     threading.Thread(target=self._nudge, name="nudge", daemon=True).start()
-                self._arrived.append(request)
+                self._queue.append(request)
         # A client that cannot be understood is as good as gone.
         self.client_gone.set()
         self.leaving.set()
@@ -68,7 +68,7 @@ class Outbox:
         """Write to this file descriptor."""
         self._file = os.fdopen(writing, "wb", closefd=False)
         self._codec = m.Codec(m.REPORTS)
-        self._waiting: Queue[m.Report] = Queue()
+        self._reports: Queue[m.Report] = Queue()
         self._live = 0  # messages of readings among them
         self._left_out = 0  # readings
         self._lock = threading.Lock()
@@ -85,17 +85,17 @@ class Outbox:
             if isinstance(report, m.Live) and self._left_out:
                 report = structs.replace(report, left_out=self._left_out)
                 self._left_out = 0
-            self._waiting.put(report)
+            self._reports.put(report)
 
     def flush(self, patience: float) -> None:
         """Wait until everything was taken by the client, but not longer than `patience` [s]."""
-        with self._waiting.all_tasks_done:
-            self._waiting.all_tasks_done.wait_for(lambda: not self._waiting.unfinished_tasks, patience)
+        with self._reports.all_tasks_done:
+            self._reports.all_tasks_done.wait_for(lambda: not self._reports.unfinished_tasks, patience)
 
     def _write(self) -> None:
         client_there = True
         while True:
-            report = self._waiting.get()
+            report = self._reports.get()
             with self._lock:
                 self._live -= isinstance(report, m.Live | m.HealthReport)
             try:
@@ -104,7 +104,7 @@ class Outbox:
                     self._file.flush()
             except OSError:
                 client_there = False
-            self._waiting.task_done()
+            self._reports.task_done()
 
     def _encode(self, report: m.Report) -> bytes:
         """Return the bytes of a report, or of a sentence where it cannot be encoded, so that others still go out."""

@@ -99,7 +99,7 @@ class SessionSetup:
     people: m.People
     info: TransducerInfo | None
     clock_offset_ns: int = 0
-    resumed: Continuation | None = None
+    continuation: Continuation | None = None
     before: tuple[LoggedEvent, ...] = ()  # all that was recorded before
 
 
@@ -149,9 +149,9 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
     writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
-    resumed = Continuation(at, resuming.resumed_data(gap, info, software_versions()), last)
+    continuation = Continuation(at, resuming.resumed_data(gap, info, software_versions()), last)
     return SessionSetup(
-        recording.plan, writer, going_on, people, info, going_on.offset_ns, resumed, tuple(recording.events)
+        recording.plan, writer, going_on, people, info, going_on.offset_ns, continuation, tuple(recording.events)
     )
 
 
@@ -170,7 +170,7 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
             writer,
             operator,
             bench.lent(prepared.clock_offset_ns) if prepared.plan.forces else None,
-            resumed=prepared.resumed,
+            resumed=prepared.continuation,
             stop=operator.stop,
             progress=send,
         )
@@ -268,13 +268,13 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
     connected = bench.connected if prepared.plan.forces else None
     if people.kind == "people":
         return None
-    subject, known = SimulatedSubject(people.seed), _index_of(prepared.plan, prepared.writer.folder)
+    subject, index_of = SimulatedSubject(people.seed), _index_of(prepared.plan, prepared.writer.folder)
 
     if people.kind == "simulated people":
         return SimulatedPeople(
-            subject, prepared.clock, connected, lambda trial: simulated_surface(known(trial), people.friction)
+            subject, prepared.clock, connected, lambda trial: simulated_surface(index_of(trial), people.friction)
         )
-    return SimulatedHand(subject, connected, lambda trial: simulated_surface(known(trial), people.friction))
+    return SimulatedHand(subject, connected, lambda trial: simulated_surface(index_of(trial), people.friction))
 
 
 def _index_of(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:

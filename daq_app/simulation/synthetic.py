@@ -67,8 +67,8 @@ def conduct(
     writer = kind.create(folder, plan, info, came_from, subject_simulated=True, clock=people.clock)
 
     def show(status: Status) -> None:
-        done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
-        console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
+        part = 0.0 if status.trial is None else (status.trial - 1) / status.trials
+        console.progress(part, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
     end = run_session(plan, writer, people, transducer, settings=run, progress=show)
     if end.cause not in RESUMABLE:
@@ -115,7 +115,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
 
     Raises RecordingError where `out` cannot be used, StudyCutShort where a visit did not come to its end.
     """
-    chosen = protocol(PROTOCOL)
+    study_protocol = protocol(PROTOCOL)
 
     def visit(session_plan: SessionPlan, folder: Path, people: SimulatedPeople) -> SessionEnd:
         end = conduct(session_plan, folder, people, console, settings=[_study_seed(seed)])
@@ -127,12 +127,14 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
     for number in range(1, SUBJECTS + 1):
         subject, own = f"S{number:02d}", _seed(seed, number)
         scores.append(out / f"{subject}-scores")
-        visit(plan(chosen, subject, own, forces=False), scores[-1], SimulatedPeople(SimulatedSubject(own), clock))
+        visit(
+            plan(study_protocol, subject, own, forces=False), scores[-1], SimulatedPeople(SimulatedSubject(own), clock)
+        )
     subject, own = f"S{STROKING:02d}", _seed(seed, STROKING)
     folder = out / f"{subject}-forces"
     with connect(f"sim:?seed={seed}&rate=200", clock) as bench:
         people = SimulatedPeople(SimulatedSubject(own), clock, bench)
-        end = visit(plan(chosen, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
+        end = visit(plan(study_protocol, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
         ground_truth = tuple(
             GroundTruth(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
             for trial, stroke in people.strokes.items()

@@ -173,9 +173,9 @@ class SimulatedPeople(SimulatedHand):
     def poll(self) -> tuple[steps.Event, ...]:
         """Return what has come up by now, once, in the order it was put in."""
         now_ns = self.clock.now_ns()
-        done = tuple(event for due, event in self._due if due <= now_ns)
+        events = tuple(event for due, event in self._due if due <= now_ns)
         self._due = [(due, event) for due, event in self._due if due > now_ns]
-        return done
+        return events
 
     def show(self, command: steps.Command) -> None:
         """Do what the command asks for."""

@@ -18,7 +18,7 @@ Short = Annotated[str, Meta(max_length=200)]
 PixelsPerMm = Annotated[float, Meta(ge=1.0, le=40.0)]
 
 # ---- from the tablet
-Answered = Scored | MagnitudeEstimate | PairedChoice
+AnswerEvent = Scored | MagnitudeEstimate | PairedChoice
 _ANSWERS: Mapping[Kind, tuple[type, ...]] = {
     "read": (), "line": (Scored,), "number": (MagnitudeEstimate,), "choice": (PairedChoice,),
 }  # fmt: skip
@@ -100,10 +100,10 @@ class Force(Struct, frozen=True, tag="force"):
 
 ToTablet = Welcome | Refused | Page | Stored | Force
 
-read = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError for what no tablet says
+decode = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError for what no tablet says
 
 
-def written(message: ToTablet) -> str:
+def encode(message: ToTablet) -> str:
     """Return a message as it is sent."""
     return msgspec.json.encode(message).decode()
 
@@ -116,7 +116,7 @@ class Dialogue:
         self._send = send
         self._page: Page | None = None
         self._session: SessionState | None = None
-        self._waiting: set[str] = set()  # keys of answers that were handed on and are not yet stored
+        self._open_keys: set[str] = set()  # keys of answers that were handed on and are not yet stored
 
     def show(self, view: SubjectView, session: SessionState | None, say: Translate, *, mirrored: bool) -> None:
         """Show a page, in the language that `say` makes of English, and acknowledge the answers that are stored.
@@ -125,8 +125,8 @@ class Dialogue:
         """
         self._session = session
         if session is None or session.over:
-            self._waiting.clear()  # what the recorder has not stored is sent again
-        for key in tuple(self._waiting):
+            self._open_keys.clear()  # what the recorder has not stored is sent again
+        for key in tuple(self._open_keys):
             self._acknowledge(key)
         key = _key(session, *view.key) if view.asks and session is not None else ""
         words = {word.name.lower(): say(word) for word in _WORDS}
@@ -141,11 +141,11 @@ class Dialogue:
         `clock` makes of the tablet's clock [ms] the session's [s]. An answer no longer asked for is kept as a note.
         """
         session, page, key = self._session, self._page, answer.key
-        if session is None or session.over or page is None or key in self._waiting or self._acknowledge(key):
+        if session is None or session.over or page is None or key in self._open_keys or self._acknowledge(key):
             return None
         event = event_of(answer.acts, clock, session.plan.answering_hand)
         if key == page.key and isinstance(event, _ANSWERS[page.view.kind]):
-            self._waiting.add(key)
+            self._open_keys.add(key)
             return event
         self._send(Stored(key))
         return Note(f"The tablet gave an answer that was no longer asked for ({key}): {structs.astuple(event)[0]}")
@@ -157,12 +157,12 @@ class Dialogue:
             return False
         stored = any(of.answer is not None and _key(session, of.trial.number, of.takes) == key for of in session.trials)
         if stored:
-            self._waiting.discard(key)
+            self._open_keys.discard(key)
             self._send(Stored(key))
         return stored
 
 
-def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | None) -> Answered:
+def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | None) -> AnswerEvent:
     """Return the answer that the acts of a subject make."""
     line, choice = Answer(), Choice()
     for act in acts:

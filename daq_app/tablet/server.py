@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from daq_app.tablet.dialogue import LARGEST, FromTablet, Hello, Refused, ToTablet, Welcome, read, written
+from daq_app.tablet.dialogue import LARGEST, FromTablet, Hello, Refused, ToTablet, Welcome, decode, encode
 
 if TYPE_CHECKING:  # an optional package
     from websockets.http11 import Request, Response
@@ -45,20 +45,20 @@ class TabletServer:
     """A server in a thread of its own. All methods may be called from any thread."""
 
     def __init__(
-        self, address: str, port: int, received: Callable[[FromTablet, float], None], changed: Callable[[], None]
+        self, address: str, port: int, on_message: Callable[[FromTablet, float], None], on_change: Callable[[], None]
     ) -> None:
         """Listen at an address of this machine. Raises NoTabletServer.
 
-        `received` takes each message of the tablet that was let in and the machine's monotonic clock [s] at its
-        arrival; `changed` is called when a tablet comes or goes, or the code changes. A taken port becomes a free one.
+        `on_message` takes each message of the tablet that was let in, and its arrival by the monotonic clock [s].
+        `on_change` is called when a tablet comes or goes or the code changes. A free port replaces a taken one.
         """
         try:
             import segno  # noqa: F401  # pyright: ignore[reportUnusedImport]  the window draws the link with it
             from websockets.sync.server import serve
         except ImportError as error:
             raise NoTabletServer(_MISSING) from error
-        self._received = received
-        self._changed = changed
+        self._on_message = on_message
+        self._on_change = on_change
         self._lock = threading.Lock()
         self._door = threading.Lock()  # one guess at a time, however many ask at once
         self._admitted: ServerConnection | None = None  # of the tablet that was let in
@@ -94,7 +94,7 @@ class TabletServer:
 
     def send(self, message: ToTablet) -> None:
         """Send something to the tablet; one that comes later gets the last message of each kind that tells a state."""
-        text = written(message)
+        text = encode(message)
         with self._lock:  # so that a tablet that comes now does not hear of it too early
             self._last[type(message)] = text
             if self._admitted is not None:
@@ -107,7 +107,7 @@ class TabletServer:
             self.code, self._wrong = _new_code(), 0
         if admitted is not None:
             admitted.close()
-        self._changed()
+        self._on_change()
 
     def close(self) -> None:
         """Listen no more."""
@@ -131,19 +131,19 @@ class TabletServer:
         from websockets.exceptions import ConnectionClosed
 
         with suppress(ConnectionClosed, TimeoutError, msgspec.DecodeError):
-            hello = read(connection.recv(_PATIENCE))
+            hello = decode(connection.recv(_PATIENCE))
             if not isinstance(hello, Hello) or not self._let_in(connection, hello):
                 return
             try:
-                self._received(hello, time.monotonic())
+                self._on_message(hello, time.monotonic())
                 while True:
-                    self._received(read(connection.recv()), time.monotonic())
+                    self._on_message(decode(connection.recv()), time.monotonic())
             finally:
                 with self._lock:
                     if gone := self._admitted is connection:
                         self._admitted = None
                 if gone:
-                    self._changed()
+                    self._on_change()
 
     def _let_in(self, connection: "ServerConnection", hello: Hello) -> bool:
         """Say whether a tablet is the one; a tablet that comes back takes the place of its own lost connection."""
@@ -153,36 +153,36 @@ class TabletServer:
             if self._admit(connection, hello.code, by_code=True):
                 return True
             why = self._refuse_code(hello)
-        _tell(connection, written(Refused(why)))
+        _tell(connection, encode(Refused(why)))
         return False
 
-    def _admit(self, connection: "ServerConnection", said: str, *, by_code: bool) -> bool:
+    def _admit(self, connection: "ServerConnection", secret: str, *, by_code: bool) -> bool:
         """Let a tablet in that says the token, or the code while there is no token yet; return whether it did."""
         with self._lock:
             right = self.code if by_code else self._token
-            if by_code == bool(self._token) or not secrets.compare_digest(said.encode(), right.encode()):
+            if by_code == bool(self._token) or not secrets.compare_digest(secret.encode(), right.encode()):
                 return False
             before, self._admitted = self._admitted, connection
             self._token = self._token or secrets.token_urlsafe()
-            for text in (written(Welcome(self._token)), *self._last.values()):
+            for text in (encode(Welcome(self._token)), *self._last.values()):
                 _tell(connection, text)
         if before is not None:
             before.close(REPLACED)
-        self._changed()
+        self._on_change()
         return True
 
     def _refuse_code(self, hello: Hello) -> str:
         """Return after a pause why a tablet is refused; after several wrong codes the code is replaced."""
         time.sleep(WRONG_CODE)
         with self._lock:
-            taken = bool(self._token)
+            in_use = bool(self._token)
             self._wrong += bool(hello.code)
-            renewed = self._wrong >= TRIES and not taken
+            renewed = self._wrong >= TRIES and not in_use
             if renewed:
                 self.code, self._wrong = _new_code(), 0
         if renewed:
-            self._changed()
-        if taken:
+            self._on_change()
+        if in_use:
             return "Another device shows this page. Ask for a new code."
         return "This is not the code." if hello.code else "Another code holds now."
 
@@ -208,12 +208,12 @@ def _listening(address: str, port: int) -> socket.socket:
             f"{address} is no address of a private network: the subject's page is served in the lab alone;"
             " give --subject-address with this machine's address there"
         )
-    for wanted in (port, 0):
+    for candidate in (port, 0):
         try:
-            return socket.create_server((address, wanted))
+            return socket.create_server((address, candidate))
         except OSError as error:
-            refused = error
-    raise NoTabletServer(f"{address} is no address of this machine ({refused.strerror}); give --subject-address")
+            refusal = error
+    raise NoTabletServer(f"{address} is no address of this machine ({refusal.strerror}); give --subject-address")
 
 
 def _new_code() -> str:

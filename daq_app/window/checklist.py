@@ -47,8 +47,8 @@ def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
 
 def first_missing(cards: tuple[Card, ...]) -> Card | None:
     """Return the card that comes next: without a transducer that one, else the first that is not ready."""
-    missing = [card for card in cards if not card.ready]
-    return next((card for card in missing if card.field == "forces"), missing[0] if missing else None)
+    gaps = [card for card in cards if not card.ready]
+    return next((card for card in gaps if card.field == "forces"), gaps[0] if gaps else None)
 
 
 def headline(cards: tuple[Card, ...], subject: str) -> str:
@@ -98,11 +98,11 @@ def studies_in(folder: Path) -> tuple[str, ...]:
 
 def _study_note(form: SessionForm) -> str:
     name = form.study.strip()
-    said = enrolment(form)
+    record = enrolment(form)
     if not name:
         return ""
-    if said is not None:
-        return tr("A study of protocol {protocol}.", protocol=said.protocol)
+    if record is not None:
+        return tr("A study of protocol {protocol}.", protocol=record.protocol)
     there = ", ".join(studies_in(place_of(form).parent))
     elsewhere = tr(" Studies there: {there}.", there=there) if there else ""
     words = tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name)
@@ -110,9 +110,9 @@ def _study_note(form: SessionForm) -> str:
 
 
 def _subject_note(form: SessionForm) -> str:
-    said = enrolment(form)
-    if said is not None:
-        return said.words
+    record = enrolment(form)
+    if record is not None:
+        return record.words
     subject = form.subject.strip()
     if not (before := codes_in(place_of(form)).count(subject)):
         return ""

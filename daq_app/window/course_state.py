@@ -82,12 +82,12 @@ class TrialState:
     answer: str | None = None  # in words; None: none was asked for yet
     quality: Quality | None = None
     discarded: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
-    chosen: bool = True  # False: answers to come choose its stimulus
+    has_stimulus: bool = True  # False: answers to come choose its stimulus
 
     @property
     def code(self) -> str:
         """Return the label of its stimulus, or dots where that is not chosen yet."""
-        return self.trial.stimulus.code if self.chosen else "…"
+        return self.trial.stimulus.code if self.has_stimulus else "…"
 
     earlier: tuple["TrialState", ...] = ()  # as it was when each of its takes was discarded
 
@@ -124,7 +124,7 @@ class SessionState:
     people: Kind
     simulated: str | None
     trials: tuple[TrialState, ...]
-    begun: float  # when the window heard of it [s]
+    start: float  # when the window heard of it [s]
     phase: Phase = "idle"
     since: float = 0.0  # when this phase began [s]
     before_pause: Phase = "idle"
@@ -133,22 +133,22 @@ class SessionState:
     command: steps.Command | None = None  # what is waited for
     notice: str | None = None  # the last sentence that needs no answer, or that refuses one
     redone: tuple[int, ...] = ()  # numbers of the trials whose redo can still be undone
-    judged: int | None = None  # number of the trial whose stroke was looked at last
+    judged_trial: int | None = None  # number of the trial whose stroke was looked at last
     time_offset: float = 0.0  # of the times in the log to those of the stream that is shown, after a resumption [s]
     marks: tuple[Mark, ...] = ()  # the last ones, in the time of the session's stream; none once it is over
     notes: tuple[str, ...] = ()
     status: Status | None = None
     saved_ns: int = 0  # instant of the last thing that is safe [ns, session clock]
-    saved: float | None = None  # when the window heard of it [s]
+    saved_at: float | None = None  # when the window heard of it [s]
     end: SessionEnd | None = None
     resumable: bool = False
-    broken: str | None = None  # why nothing is recorded any more, where no end was written
+    fault: str | None = None  # why nothing is recorded any more, where no end was written
     sealing: Literal["no", "running", "cut short", "sealed"] = "no"
 
     @property
     def over(self) -> bool:
         """Say whether nothing is recorded any more."""
-        return self.end is not None or self.broken is not None
+        return self.end is not None or self.fault is not None
 
     def of(self, number: int | None) -> TrialState | None:
         """Return the trial of that number."""
@@ -156,15 +156,17 @@ class SessionState:
 
     def with_trial(self, number: int | None, **changes: Any) -> "SessionState":  # noqa: ANN401  as `replace` takes
         """Return the session with one trial changed."""
-        changed = tuple(replace(t, **changes) if t.trial.number == number else t for t in self.trials)
-        return replace(self, trials=changed)
+        trials = tuple(replace(t, **changes) if t.trial.number == number else t for t in self.trials)
+        return replace(self, trials=trials)
 
 
-def begin_session(begun: m.SessionBegun, now: float) -> SessionState:
+def begin_session(message: m.SessionBegun, now: float) -> SessionState:
     """Return the state of a session that begins, or goes on, at `now` [s]."""
-    trials = tuple(TrialState(t, chosen=t.standard or not b.candidates) for b in begun.plan.blocks for t in b.trials)
-    session = SessionState(begun.folder, begun.plan, begun.people, begun.simulated, trials, now, since=now)
-    for event in begun.events:
+    trials = tuple(
+        TrialState(t, has_stimulus=t.standard or not b.candidates) for b in message.plan.blocks for t in b.trials
+    )
+    session = SessionState(message.folder, message.plan, message.people, message.simulated, trials, now, since=now)
+    for event in message.events:
         session = _fold_event(session, event)
     return replace(session, marks=())  # theirs is the clock of a stream that has ended
 
@@ -180,9 +182,9 @@ def _after(session: SessionState, message: object, now: float) -> SessionState:
         case LoggedEvent():
             return _fold_event(session, message)
         case Status():
-            saved = now if message.safe.time_ns != session.saved_ns else session.saved
+            saved_at = now if message.safe.time_ns != session.saved_ns else session.saved_at
             phase = cast("Phase", message.state) if message.state in REPORTED else session.phase
-            return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
+            return replace(session, status=message, saved_ns=message.safe.time_ns, saved_at=saved_at, phase=phase)
         case Judged(trial, take, quality):
             return _judge(session, trial, take, quality)
         case m.Sealing():
@@ -198,7 +200,7 @@ def _fold_end(session: SessionState, message: object) -> SessionState:
         case m.SessionEnded(folder, end, resumable):
             return replace(_over(session), folder=folder, end=end, resumable=resumable)
         case m.Gone(requested, sentence) if not requested and not session.over:
-            return replace(_over(session), broken=sentence, resumable=True)
+            return replace(_over(session), fault=sentence, resumable=True)
         case m.Gone(False) | m.Failed("ResumeSession") if session.phase == "resuming":
             return replace(session, phase="ended")
         case m.ResumeSession():
@@ -208,7 +210,7 @@ def _fold_end(session: SessionState, message: object) -> SessionState:
         case m.Gone() | m.Failed("StartSession" | "ResumeSession") if session.sealing == "running":
             return replace(session, sealing="cut short")
         case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
-            return replace(_over(session), broken=sentence)
+            return replace(_over(session), fault=sentence)
         case _:
             return session
 
@@ -239,7 +241,7 @@ def _fold_command(session: SessionState, message: object) -> SessionState:
         case steps.AskBegin():
             return replace(session, phase="idle", command=message)
         case steps.AskMount(trial):
-            session = session.with_trial(trial.number, trial=trial, chosen=True)
+            session = session.with_trial(trial.number, trial=trial, has_stimulus=True)
             return replace(session, phase="mounting", trial=trial.number, command=message, notice=None)
         case steps.MeasureZero():
             return replace(session, phase="taring", command=message, notice=None)
@@ -305,7 +307,7 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
         case "left_out":
             return session.with_trial(number, outcome="skipped")
         case "take_started":
-            return session.with_trial(number, takes=data["take"], outcome="coming", chosen=True)
+            return session.with_trial(number, takes=data["take"], outcome="coming", has_stimulus=True)
         case "take_kept":
             return session.with_trial(number, outcome="done")
         case "take_discarded":
@@ -331,8 +333,8 @@ def _restore(session: SessionState, number: int | None, take: int) -> SessionSta
     was = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
     if was is None:
         return session
-    known = {name: getattr(was, name) for name in ("takes", "answer", "quality", "discarded")}
-    return session.with_trial(number, outcome="coming", **known)
+    values = {name: getattr(was, name) for name in ("takes", "answer", "quality", "discarded")}
+    return session.with_trial(number, outcome="coming", **values)
 
 
 def _judge(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:
@@ -340,7 +342,7 @@ def _judge(session: SessionState, trial: int, take: int, quality: Quality) -> Se
     of = session.of(trial)
     if of is None or of.takes != take:
         return session
-    session = replace(session.with_trial(trial, quality=quality), judged=trial)
+    session = replace(session.with_trial(trial, quality=quality), judged_trial=trial)
     if quality.stroke is None or quality.stroke.steady is None or session.over:
         return session
     return _add_mark(session, Mark("steady", *quality.stroke.steady))
@@ -353,5 +355,5 @@ def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mappin
 
 def _add_mark(session: SessionState, mark: Mark) -> SessionState:
     """Return the session with another mark; a new steady window replaces the earlier one that it overlaps."""
-    kept = [m for m in session.marks if m.kind != "steady" or mark.kind != "steady" or m.stop < mark.start]
-    return replace(session, marks=(*kept, mark)[-_MARKS:])
+    marks = [m for m in session.marks if m.kind != "steady" or mark.kind != "steady" or m.stop < mark.start]
+    return replace(session, marks=(*marks, mark)[-_MARKS:])

@@ -11,7 +11,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live, Report
-from daq_app.window.live_trace import CHANNELS, LiveTrace, broken
+from daq_app.window.live_trace import CHANNELS, LiveTrace, with_gaps
 from daq_app.wording import tr_noop
 from drivers.calibration import LIMITS, WARNING
 from drivers.calibration_file import AXES
@@ -40,8 +40,8 @@ class Load:
     @property
     def over(self) -> tuple[str, ...]:
         """Return the names of what is beyond its rated load."""
-        named = zip(LOADS, self.shares, LIMITS, strict=True)
-        return tuple(name for name, share, limit in named if share > limit)
+        loads = zip(LOADS, self.shares, LIMITS, strict=True)
+        return tuple(name for name, share, limit in loads if share > limit)
 
     @property
     def near(self) -> tuple[str, ...]:
@@ -99,12 +99,12 @@ class LiveFeed:
             self.trace.clear()
         before = live.sequence[0] - 1 if self._sequence is None else self._sequence
         gaps = np.flatnonzero(np.diff(live.sequence, prepend=before) > 1)  # before these, others are missing
-        time, drawn = broken(live.time, self._channels(live, frame), gaps)
+        time, values = with_gaps(live.time, self._channels(live, frame), gaps)
         self._sequence = int(live.sequence[-1])
         self._take.append(live)
         while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > _KEPT:
             self._take.popleft()
-        self.trace.add(time, drawn)
+        self.trace.add(time, values)
 
     def take(self) -> ReadingBlock:
         """Return the readings of the take in hand, as a wrench: N, N mm."""
@@ -124,11 +124,11 @@ class LiveFeed:
             ratio = np.where(pressed, tangential / normal, np.nan)
         position = np.where(pressed[:, None], centre_of_pressure(wrench, frame.height), np.nan)
         self._tail, speed = self._tail.onward(live.time, position)
-        drawn = np.empty((len(CHANNELS), len(normal)))
-        drawn[:6] = wrench.T
-        drawn[6], drawn[7], drawn[8], drawn[9] = normal, tangential, ratio, speed
-        drawn[10:] = position.T
-        return np.where(live.status == 0, drawn, np.nan)
+        values = np.empty((len(CHANNELS), len(normal)))
+        values[:6] = wrench.T
+        values[6], values[7], values[8], values[9] = normal, tangential, ratio, speed
+        values[10:] = position.T
+        return np.where(live.status == 0, values, np.nan)
 
 
 @dataclass(frozen=True, slots=True)

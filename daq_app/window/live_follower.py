@@ -102,8 +102,8 @@ class Follower:
         self._reached = False  # by finite strain, at the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
-        self._said: deque[tuple[float, float]] = deque()
-        self._seen: deque[_Observation] = deque(maxlen=SEEN)
+        self._seds: deque[tuple[float, float]] = deque()
+        self._observations: deque[_Observation] = deque(maxlen=SEEN)
 
     def follows(self, use: Use) -> bool:
         """Say whether it follows just this finger already."""
@@ -113,32 +113,32 @@ class Follower:
         """Return what the model says of a batch."""
         if forces.stream != self._stream:
             self._stream = forces.stream
-            self._said.clear()
-            self._seen.clear()
+            self._seds.clear()
+            self._observations.clear()
             self._forget_contact()
         steps = [self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)]
-        sed = np.array([said for said, _ in steps])
+        sed = np.array([value for value, _ in steps])
         instead = np.array([len(self._models) > 1 and not reached for _, reached in steps])
-        self._said += zip(forces.time.tolist(), sed.tolist(), strict=True)
-        while self._said and self._said[0][0] < forces.time[-1] - _KEPT:
-            self._said.popleft()
-        shown = self._models[1 if self._reached and len(self._models) > 1 else 0]
-        row, now, (picture, rest) = shown.stepper.row(), float(forces.time[-1]), shown.picture_and_rest()
-        if sed[-1] > 0.0 and (not self._seen or abs(now - self._seen[-1].time) >= SEEN_EVERY):
-            self._seen.append(_Observation(now, row, picture, rest, shown.stepper.depth))
+        self._seds += zip(forces.time.tolist(), sed.tolist(), strict=True)
+        while self._seds and self._seds[0][0] < forces.time[-1] - _KEPT:
+            self._seds.popleft()
+        model = self._models[1 if self._reached and len(self._models) > 1 else 0]
+        row, now, (picture, rest) = model.stepper.row(), float(forces.time[-1]), model.picture_and_rest()
+        if sed[-1] > 0.0 and (not self._observations or abs(now - self._observations[-1].time) >= SEEN_EVERY):
+            self._observations.append(_Observation(now, row, picture, rest, model.stepper.depth))
         return Provisional(
-            forces.time, sed, row, picture, shown.stepper.depth, self._mu,
+            forces.time, sed, row, picture, model.stepper.depth, self._mu,
             self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
     def settling(self, request: Settle) -> Callable[[], SettledSolve]:
         """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
         first, last = request.steady
-        said = np.array([sed for time, sed in self._said if first <= time <= last])
-        said = said[np.isfinite(said)]
-        provisional = float(said.mean()) if len(said) else None
-        seen = next((seen for seen in reversed(self._seen) if first <= seen.time <= last), None)
-        return lambda: _solve_settled(request, self._kinematics, provisional, seen)
+        values = np.array([sed for time, sed in self._seds if first <= time <= last])
+        values = values[np.isfinite(values)]
+        provisional = float(values.mean()) if len(values) else None
+        observation = next((one for one in reversed(self._observations) if first <= one.time <= last), None)
+        return lambda: _solve_settled(request, self._kinematics, provisional, observation)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
         """Return the SED under forces [N], and whether it is of finite strain; nothing that touches is within reach."""
@@ -165,7 +165,7 @@ class Follower:
 
 
 def _solve_settled(
-    request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Observation | None
+    request: Settle, kinematics: Kinematics, provisional: float | None, last: _Observation | None
 ) -> SettledSolve:
     """Solve a stroke in full; where that fails, return why, with the last state that was followed in its window."""
     scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
@@ -176,9 +176,9 @@ def _solve_settled(
         why, failed = str(failure.in_a_sentence()), True
     if prediction is None:
         row, picture, depth = np.full(len(ROW), np.nan), None, None
-        if seen is not None:
-            lost = place_of_greatest_shortening(seen.rest, seen.picture.nodes, seen.picture.faces) if failed else None
-            row, picture, depth = seen.row, replace(seen.picture, lost=lost), seen.depth
+        if last is not None:
+            lost = place_of_greatest_shortening(last.rest, last.picture.nodes, last.picture.faces) if failed else None
+            row, picture, depth = last.row, replace(last.picture, lost=lost), last.depth
         return SettledSolve(request.steady, None, None, provisional, row, picture, depth, kinematics, why)
     fields = fields_of(prediction)
     sed = fields.sed[fields.triangles].mean(axis=1)
@@ -191,9 +191,9 @@ def _solve_settled(
 
 def _greatest_effect(prediction: Prediction) -> str:
     """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
-    known = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
-    name = max(known, key=lambda one: known[one], default="")
-    return name and f"{name} {percent(known[name])} of the SED"
+    sizes = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
+    name = max(sizes, key=lambda one: sizes[one], default="")
+    return name and f"{name} {percent(sizes[name])} of the SED"
 
 
 def place_of_greatest_shortening(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:

@@ -148,7 +148,7 @@ class ModelWords:
 
 
 def model_words(
-    said: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
+    provisional: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
 ) -> ModelWords:
     """Return what is said of the picture that is shown; where the transducer is `silent`, nothing is measured now."""
     if problem:
@@ -157,39 +157,39 @@ def model_words(
         return ModelWords(_settled_words(settled), "failed" if settled.sed is None else "settled")
     if silent:
         return ModelWords(tr("Nothing is measured that the model could follow."), "none")
-    if said is None:
+    if provisional is None:
         return ModelWords(tr("The live model is starting."), "none")
-    if said.beyond:
+    if provisional.beyond:
         return ModelWords(tr("These forces are beyond the reach of the model."), "beyond")
-    if said.sed[-1] <= 0.0:
-        words = tr("Model at {kinematics}: nothing touches.", kinematics=tr(_KINEMATICS[said.kinematics]))
+    if provisional.sed[-1] <= 0.0:
+        words = tr("Model at {kinematics}: nothing touches.", kinematics=tr(_KINEMATICS[provisional.kinematics]))
         return ModelWords(words, "none")
-    known = tr(
+    start = tr(
         "PROVISIONAL  SED {kpa}{errors} · at the measured force, {depth:.1f} mm deep · ",
-        kpa=_kpa(float(said.sed[-1])), errors=errors_words(None), depth=said.depth,
+        kpa=_kpa(float(provisional.sed[-1])), errors=errors_words(None), depth=provisional.depth,
     )  # fmt: skip
-    if said.instead[-1]:
-        words = tr("{known}small strain: these forces are beyond the reach of finite strain", known=known)
+    if provisional.instead[-1]:
+        words = tr("{known}small strain: these forces are beyond the reach of finite strain", known=start)
         return ModelWords(words, "instead")
-    return ModelWords(known + tr(_KINEMATICS[said.kinematics]), "provisional")
+    return ModelWords(start + tr(_KINEMATICS[provisional.kinematics]), "provisional")
 
 
 def _settled_words(settled: SettledSolve) -> str:
-    shown = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
+    live = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
     how, picture, depth = tr(_KINEMATICS[settled.kinematics]), settled.picture, settled.depth
     if settled.sed is None:
         lost = picture is not None and picture.lost is not None
-        marked = tr("; ⊗ marks its most squeezed tissue") if lost else ""
+        note = tr("; ⊗ marks its most squeezed tissue") if lost else ""
         last = tr_noop(" Shown is the last state that was followed, {depth:.1f} mm deep{marked}.")
-        kept = "" if depth is None else tr(last, depth=depth, marked=marked)
+        last_state = "" if depth is None else tr(last, depth=depth, marked=note)
         return tr(
-            "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=shown, reason=settled.reason, kept=kept
+            "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=live, reason=settled.reason, kept=last_state
         )
     if (by := settled.difference) is not None:
-        shown += f" ({100 * by:+.1f} %)".replace("-", "−")
+        live += f" ({100 * by:+.1f} %)".replace("-", "−")
     return tr(
         "Full solve  SED {kpa}{errors} · at the measured force, {how}{shown}",
-        kpa=_kpa(settled.sed), errors=errors_words(settled.error, settled.effect), how=how, shown=shown,
+        kpa=_kpa(settled.sed), errors=errors_words(settled.error, settled.effect), how=how, shown=live,
     )  # fmt: skip
 
 
@@ -204,10 +204,10 @@ class ModelTrace(LiveTrace):
         super().__init__(1.0 / _STEP, channels=len(MODEL_CHANNELS), gap=_GAP)
         self._stream: int | None = None
 
-    def add_prediction(self, said: Provisional) -> None:
+    def add_prediction(self, latest: Provisional) -> None:
         """Add a prediction to the trace."""
-        if said.stream != self._stream:
-            self._stream = said.stream
+        if latest.stream != self._stream:
+            self._stream = latest.stream
             self.clear()
-        sed = 1000.0 * said.sed
-        self.add(said.time, np.stack([np.where(said.instead, np.nan, sed), np.where(said.instead, sed, np.nan)]))
+        sed = 1000.0 * latest.sed
+        self.add(latest.time, np.stack([np.where(latest.instead, np.nan, sed), np.where(latest.instead, sed, np.nan)]))

@@ -69,13 +69,13 @@ class LiveModel:
     """The live model as the window sees it. `add` and `poll` never wait for it."""
 
     def __init__(self) -> None:
-        self.said: Provisional | None = None  # the newest
+        self.provisional: Provisional | None = None  # the newest
         self.settled: SettledSolve | None = None  # of the last stroke; None again once another begins
         self.problem = ""  # why nothing is said; empty where all is well
         self.predictions = 0  # that came so far
         self._child: Child | None = None
         self._under_way = 0
-        self._waiting: list[Forces] = []
+        self._unsent: list[Forces] = []
         self._requests: list[Use | Forces | Settle] = []
         self._settling: tuple[float, float] | None = None  # steady window of the last stroke, until another touch
         self._plan: SessionPlan | None = None
@@ -113,17 +113,17 @@ class LiveModel:
         forces = None if self._child is None else forces_of(live, frame)
         if forces is None:
             return
-        if self._waiting and self._waiting[-1].stream != forces.stream:
-            self._waiting.clear()
-        self._waiting.append(forces)
-        while len(self._waiting) > 1 and forces.time[-1] - self._waiting[0].time[0] > _WAITING:
-            self._waiting.pop(0)
+        if self._unsent and self._unsent[-1].stream != forces.stream:
+            self._unsent.clear()
+        self._unsent.append(forces)
+        while len(self._unsent) > 1 and forces.time[-1] - self._unsent[0].time[0] > _WAITING:
+            self._unsent.pop(0)
 
     def settle(self, request: Settle) -> None:
         """Ask for the full solve of a stroke, once all that was added until now was followed."""
         if self._child is not None:
-            self._requests += [join_forces(self._waiting), request] if self._waiting else [request]
-            self._waiting = []
+            self._requests += [join_forces(self._unsent), request] if self._unsent else [request]
+            self._unsent = []
 
     def poll(self) -> tuple[Provisional, ...]:
         """Take what came, and send what waits; return the predictions that are new."""
@@ -133,7 +133,7 @@ class LiveModel:
         try:
             while (message := self._child.receive()) is not None:
                 self._under_way -= not isinstance(message, SettledSolve)  # it comes when it comes
-                self._heard(message)
+                self._take(message)
                 news += [message] if isinstance(message, Provisional) else []
             if not self._under_way:
                 self._send(self._child)
@@ -142,12 +142,12 @@ class LiveModel:
             self.problem = tr("the live model has stopped; it starts again with the next session")
         return tuple(news)
 
-    def _heard(self, message: Ready | Provisional | SettledSolve) -> None:
+    def _take(self, message: Ready | Provisional | SettledSolve) -> None:
         match message:
             case Ready(problem):
                 self.problem = problem
             case Provisional():
-                self.said = message
+                self.provisional = message
                 self.predictions += 1
                 if message.sed.any():  # its forces came after the stroke: something touches again
                     self.settled = self._settling = None
@@ -164,13 +164,13 @@ class LiveModel:
             if isinstance(request, Settle):
                 self.settled, self._settling = None, request.steady
                 return
-        elif self._waiting and not self.problem:
-            child.send(join_forces(self._waiting))
-            self._waiting = []
+        elif self._unsent and not self.problem:
+            child.send(join_forces(self._unsent))
+            self._unsent = []
         else:
             return
         self._under_way = 1
 
     def _use(self) -> None:
-        self.said = None  # of another finger
+        self.provisional = None  # of another finger
         self._requests = [Use(self._plan, self.kinematics)]

@@ -50,11 +50,11 @@ class LiveTrace:
         if n > self._capacity:
             time, values, n = time[-self._capacity :], values[:, -self._capacity :], self._capacity
         if self._end + n > len(self._time):
-            kept = min(self._end - self._start, self._capacity - n)
-            source = slice(self._end - kept, self._end)
-            self._time[:kept] = self._time[source].copy()
-            self._values[:, :kept] = self._values[:, source].copy()
-            self._start, self._end = 0, kept
+            rest = min(self._end - self._start, self._capacity - n)
+            source = slice(self._end - rest, self._end)
+            self._time[:rest] = self._time[source].copy()
+            self._values[:, :rest] = self._values[:, source].copy()
+            self._start, self._end = 0, rest
         self._time[self._end : self._end + n] = time
         self._values[:, self._end : self._end + n] = values
         self._end += n
@@ -90,7 +90,7 @@ class LiveTrace:
         a, b = self._positions(first, last)
         if b - a <= 2 * count:
             time, values = self._time[a:b].copy(), self._values[:, a:b].astype(np.float64)
-            return Columns(*broken(time, values, np.flatnonzero(np.diff(time) > self._gap) + 1))
+            return Columns(*with_gaps(time, values, np.flatnonzero(np.diff(time) > self._gap) + 1))
         width = (last - first) / count
         if self._columns.width != width or self._columns.first > first:
             self._columns = self._no_columns(width, first)
@@ -102,8 +102,8 @@ class LiveTrace:
         return _Columns(width, first, np.empty(0, np.int64), np.empty((len(self._values), 0), np.float32))
 
     def _positions(self, first: float, last: float) -> tuple[int, int]:
-        kept = self._time[self._start : self._end]
-        a, b = np.searchsorted(kept, [first, last], side="left")
+        times = self._time[self._start : self._end]
+        a, b = np.searchsorted(times, [first, last], side="left")
         return self._start + int(a), self._start + int(b)
 
 
@@ -134,7 +134,7 @@ class _Columns:
         """Return the least and the greatest value of each column, with gaps where readings are missing."""
         behind = np.flatnonzero(np.diff(self.numbers) > 1 + gap / self.width)
         at = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
-        return Columns(*broken(at, self.pairs.astype(np.float64), 2 * (behind + 1)))
+        return Columns(*with_gaps(at, self.pairs.astype(np.float64), 2 * (behind + 1)))
 
 
 def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -151,7 +151,7 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
     return pairs
 
 
-def broken(time: Array, values: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
+def with_gaps(time: Array, values: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return times (n,) and values (channels, n) with a nan before the places `at`: a line there is no reading."""
     if not len(at):
         return time, values
@@ -166,7 +166,7 @@ class PlotScale:
     low: float
     high: float
     least: float  # the smallest span that is shown [unit of the data]
-    used: float = 0.0  # when the scale was last needed [s]
+    last_use: float = 0.0  # when the scale was last needed [s]
 
     def following(self, least: float, greatest: float, now: float) -> "PlotScale":
         """Return the scale after data from `least` to `greatest` were shown at `now` [s].
@@ -189,7 +189,7 @@ class PlotScale:
         wide = self.high - self.low > self.least
         if not wide or greatest > SHRINK * self.high or least < SHRINK * self.low:
             return PlotScale(self.low, self.high, self.least, now)
-        if now - self.used < _PATIENCE:
+        if now - self.last_use < _PATIENCE:
             return self
         low = 0.0 if self.low == 0.0 else -max(_step(-least), self.least / 2)
         return PlotScale(low, max(_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
@@ -201,12 +201,12 @@ def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
     >>> ticks(-5.0, 5.0, 8.0), ticks(-5.0, 5.0, 3.0), ticks(-5.0, 5.0, 1.2), ticks(-0.5, 5.0, 6.0)
     ((-5.0, -2.5, 0.0, 2.5, 5.0), (-5.0, 0.0, 5.0), (-5.0, 5.0), (0.0, 2.5, 5.0))
     """
-    taken: list[float] = []
+    values: list[float] = []
     for value in (high, 0.0, low, high / 2, low / 2):  # the more informative first
-        apart = min((abs(value - other) for other in taken), default=np.inf)
+        apart = min((abs(value - other) for other in values), default=np.inf)
         if low <= value <= high and apart * room >= high - low:
-            taken.append(value)
-    return tuple(sorted(taken))
+            values.append(value)
+    return tuple(sorted(values))
 
 
 def times(seconds: float, room: float) -> tuple[float, ...]:

@@ -109,13 +109,13 @@ def check_form(
     if wrong := _refusals(form, bench):
         return wrong
     phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
-    phases: list[Phase] = [phase for phase, wanted in phases_wanted.items() if wanted]
+    phases: list[Phase] = [phase for phase, on in phases_wanted.items() if on]
     frame, area = (bench.frame, _number(form.area)) if form.forces else (None, None)
     setting = VisitSetting(frame, area, form.stroking_hand, form.answering_hand, form.language or None)
     try:
-        chosen, seed, body, place = _choose_protocol(form, new_seed)
-        planned = plan(
-            chosen, form.subject.strip(), seed, forces=form.forces, setting=setting,
+        session_protocol, seed, body, place = _choose_protocol(form, new_seed)
+        session_plan = plan(
+            session_protocol, form.subject.strip(), seed, forces=form.forces, setting=setting,
             phases=phases if len(phases) > 1 else None, body=body, place=place,
         )  # fmt: skip
     except StudyError as error:
@@ -123,20 +123,20 @@ def check_form(
     except (SettingsError, OSError) as error:
         return Refusal({"protocol": _sentence(error)})
     if form.forces and form.height.strip():
-        face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
-        planned = replace(planned, frame=face)
+        face = replace(session_plan.frame, height=_number(form.height) or 0.0, height_origin="measured")
+        session_plan = replace(session_plan, frame=face)
     if form.forces and form.normal in SIGNED_AXES:
-        planned = replace(planned, frame=replace(planned.frame, normal=form.normal, normal_origin="set"))
+        session_plan = replace(session_plan, frame=replace(session_plan.frame, normal=form.normal, normal_origin="set"))
     # In a study the folder's name tells what the visit is for: the protocol is the same in all.
-    what = planned.protocol if place is None else "forces" if planned.forces else "scores"
+    what = session_plan.protocol if place is None else "forces" if session_plan.forces else "scores"
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)
     folder = parent / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
     hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
-    people = People("simulated people" if form.simulated else hand, seed, chosen.simulated_friction)
+    people = People("simulated people" if form.simulated else hand, seed, session_protocol.simulated_friction)
     own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
     if form.study.strip() and not form.pilot:
         own.append(Setting("study", form.study.strip(), "", "set"))
-    return StartSession(planned, str(folder), people, (*own, *settings))
+    return StartSession(session_plan, str(folder), people, (*own, *settings))
 
 
 def refusals(form: SessionForm, bench: Bench) -> Refusal:
@@ -144,14 +144,14 @@ def refusals(form: SessionForm, bench: Bench) -> Refusal:
     wrong = _refusals(form, bench)
     if form.tablet and not form.simulated:
         wrong["tablet"] = form.tablet
-    said = enrolment(form)
-    if said is None:
+    record = enrolment(form)
+    if record is None:
         try:
             protocol(form.protocol)
         except (SettingsError, OSError) as error:
             wrong["protocol"] = _sentence(error)
-    elif not said.enrolled:
-        wrong.setdefault("subject" if said.protocol else "study", said.words)
+    elif not record.enrolled:
+        wrong.setdefault("subject" if record.protocol else "study", record.words)
     if wrong:
         return wrong
     session = check_form(form, bench, datetime.now(), 0)
@@ -175,12 +175,14 @@ def optional_phases(form: SessionForm) -> tuple[Phase, ...]:
 def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the languages that the form's protocol has, its own first, and what of it is read in the form's."""
     try:
-        chosen = _protocol(form)
-        read = chosen.in_language(form.language) if form.language in chosen.languages else chosen
+        original = _protocol(form)
+        version = original.in_language(form.language) if form.language in original.languages else original
     except (StudyError, SettingsError, OSError):
         return (), ()
-    texts = [text for block in read.blocks for text in (block.instruction, block.question, *(block.scale_ends or ()))]
-    return chosen.languages, tuple(texts)
+    texts = [
+        text for block in version.blocks for text in (block.instruction, block.question, *(block.scale_ends or ()))
+    ]
+    return original.languages, tuple(texts)
 
 
 def enrolment(form: SessionForm) -> Enrolment | None:
@@ -273,11 +275,11 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
         except (RecordingError, OSError):
             continue
         subject, trials = recording.plan.subject, recording.trials
-        done = sum(record.outcome not in ("open", "skipped") for record in trials)
-        begun = _local_time(recording.provenance.get("created_utc"))
+        number = sum(record.outcome not in ("open", "skipped") for record in trials)
+        start = _local_time(recording.provenance.get("created_utc"))
         words = tr(
             "{subject}, {begun}: trials done {done} of {count}",
-            subject=subject, begun=begun, done=done, count=len(trials),
+            subject=subject, begun=start, done=number, count=len(trials),
         )  # fmt: skip
         unfinished.append(UnfinishedSession(place.parent, words))
     return tuple(unfinished)

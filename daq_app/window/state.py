@@ -172,7 +172,7 @@ class AppState:
     """Everything the window knows."""
 
     now: float = 0.0  # [s] of the machine's monotonic clock
-    heard: float | None = None  # when the recorder was last heard [s]
+    last_report: float | None = None  # when the recorder was last heard [s]
     bench: BenchState = field(default_factory=BenchState)
     session: SessionState | None = None
     failed: m.Failed | None = None  # the last request that could not be met
@@ -184,7 +184,7 @@ class AppState:
 def fold(state: AppState, message: Message) -> AppState:
     """Return the state after a message: what was sent to the recorder, what came from it, or the window's own."""
     if type(message) in _FROM_RECORDER:
-        state = replace(state, heard=state.now)
+        state = replace(state, last_report=state.now)
     bench = _fold_readings(_fold_link(state.bench, message), message)
     session = state.session and session_after(state.session, message, state.now)
     if bench is not state.bench or session is not state.session:

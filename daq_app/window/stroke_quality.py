@@ -77,8 +77,8 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
 
 def in_newtons(info: TransducerInfo) -> TransducerInfo:
     """Return the transducer as if it gave its wrench: for readings that were already made newtons."""
-    known = info.calibration
-    as_wrench = Calibration(known.serial, "N, N mm", np.eye(6), known.rated, known.source)
+    calibration = info.calibration
+    as_wrench = Calibration(calibration.serial, "N, N mm", np.eye(6), calibration.rated, calibration.source)
     return replace(info, calibration=as_wrench)
 
 
@@ -118,7 +118,7 @@ class Judge:
         if self._worker is not None:
             self._worker.shutdown(wait=False, cancel_futures=True)
 
-    def heard(self, report: m.Report, feed: LiveFeed) -> None:
+    def follow(self, report: m.Report, feed: LiveFeed) -> None:
         """Follow the course: a take begins, the finger lifts."""
         match report:
             case steps.StartTake(trial, take):
@@ -154,17 +154,17 @@ class Judge:
         except BrokenProcessPool:  # it ended while it had nothing to do
             self._worker = None
             future = self.prepare().submit(stroke_quality, *words)
-        future.add_done_callback(lambda done: self._report_quality(number, take, done))
+        future.add_done_callback(lambda answer: self._report_quality(number, take, answer))
 
-    def _report_quality(self, number: int, take: int, done: "Future[Quality]") -> None:
-        if done.cancelled():
+    def _report_quality(self, number: int, take: int, answer: "Future[Quality]") -> None:
+        if answer.cancelled():
             return
-        if error := done.exception():
+        if error := answer.exception():
             self._worker = None  # the next stroke gets another
             name = type(error).__name__
             self._say(DrawingFailed(tr("the last stroke was not looked at: {name} {error}", name=name, error=error)))
             return
-        self._say(Judged(number, take, done.result()))
+        self._say(Judged(number, take, answer.result()))
 
 
 def _warm() -> None:

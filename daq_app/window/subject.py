@@ -140,9 +140,9 @@ def mirror_view(session: SessionState, translate: Translate = str) -> SubjectVie
     The bar of the force is left out too: in a picture that stands still it would show none.
     """
     plan = session.plan
-    kept = {"forces", *({"trial count"} - set(plan.shown.experimenter))}
-    shown = replace(plan.shown, subject=tuple(one for one in plan.shown.subject if one not in kept))
-    return subject_view(replace(session, plan=replace(plan, shown=shown)), translate)
+    hidden = {"forces", *({"trial count"} - set(plan.shown.experimenter))}
+    visibility = replace(plan.shown, subject=tuple(one for one in plan.shown.subject if one not in hidden))
+    return subject_view(replace(session, plan=replace(plan, shown=visibility)), translate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,14 +153,14 @@ class _Page:
     say: Translate
 
     def view(self) -> SubjectView:
-        session, shown = self.session, self.session.plan.shown.subject
+        session, visible = self.session, self.session.plan.shown.subject
         phase = "ended" if session.phase == "closing" else session.phase
         match phase:
             case "mounting" | "taring":
                 return self._read(self.say(SubjectText.WAIT), self._notice(self.say(SubjectText.HANDS_OFF)))
             case "ready" | "stroking":
-                force = session.plan.forces and "forces" in shown
-                instruction = session.block.instruction if session.block and "instruction" in shown else ""
+                force = session.plan.forces and "forces" in visible
+                instruction = session.block.instruction if session.block and "instruction" in visible else ""
                 return replace(self._read(self._stroke(), self._notice(instruction)), force=force)
             case "scoring":
                 return self._question()
@@ -173,19 +173,19 @@ class _Page:
 
     def _stroke(self) -> str:
         trial = self.session.of(self.session.trial)
-        allowed = 1 if trial is None else self.session.plan.stroke_limit(trial.trial)
-        return self.say(SubjectText.STROKE) if allowed == 1 else self.say(SubjectText.STROKES).format(number=allowed)
+        limit = 1 if trial is None else self.session.plan.stroke_limit(trial.trial)
+        return self.say(SubjectText.STROKE) if limit == 1 else self.say(SubjectText.STROKES).format(number=limit)
 
     def _notice(self, to_do: str) -> str:
         """Return the instruction for the finger, and the progress that the protocol shows the subject."""
         session = self.session
-        shown, trial = session.plan.shown.subject, session.of(session.trial)
+        visible, trial = session.plan.shown.subject, session.of(session.trial)
         parts = [to_do]
         if session.block is not None and session.block.phase == "practice":
             parts.insert(0, self.say(SubjectText.PRACTICE))
-        if trial is not None and "trial count" in shown:
+        if trial is not None and "trial count" in visible:
             parts.append(self.say(SubjectText.COUNT).format(number=trial.trial.number, count=len(session.trials)))
-        if trial is not None and "code" in shown:
+        if trial is not None and "code" in visible:
             parts.append(self.say(SubjectText.SAMPLE).format(code=trial.trial.stimulus.code))
         return " ".join(part for part in parts if part)
 

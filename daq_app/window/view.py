@@ -154,8 +154,8 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
     if bench.peak.over:
         return "wrong", tr("overloaded")
     if bench.saturated:
-        said = ", ".join(bench.health.flagged)
-        return "wrong", tr("invalid readings: {said}", said=said) if said else tr("invalid readings")
+        flags = ", ".join(bench.health.flagged)
+        return "wrong", tr("invalid readings: {said}", said=flags) if flags else tr("invalid readings")
     if near := bench.peak.near:
         return "look", tr("near the rated load: {axes}", axes=", ".join(tr(axis) for axis in near))
     return _losses(bench)
@@ -243,7 +243,7 @@ class Lamp:
 
     grade: Literal["off", "on", "wrong"]
     words: str
-    saved: str  # how old the last acknowledged thing is; empty where there is no session
+    age: str  # how old the last acknowledged thing is; empty where there is no session
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,25 +293,25 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
 
 def _unheard(state: AppState) -> float:
     """Return for how long nothing was heard from the recorder [s]."""
-    return 0.0 if state.heard is None else state.now - state.heard
+    return 0.0 if state.last_report is None else state.now - state.last_report
 
 
 def _lamp(state: AppState) -> Lamp:
     session = state.session
     if session is None:
         return Lamp("off", tr("not recording"), "")
-    if session.broken is not None:
+    if session.fault is not None:
         return Lamp("wrong", tr("NOT RECORDING"), "")
     if session.end is not None:
         return Lamp("off", tr(ENDED[session.sealing]), "")
-    running = duration(state.now - session.begun)
-    if session.saved is None:
+    running = duration(state.now - session.start)
+    if session.saved_at is None:
         return Lamp("off", tr("starting {running}", running=running), tr("not saved yet"))
-    age = state.now - session.saved
-    saved = tr("saved {age:.1f} s ago", age=age)
+    age = state.now - session.saved_at
+    words = tr("saved {age:.1f} s ago", age=age)
     if age > UNSAVED or state.gone is not None:
-        return Lamp("wrong", tr("NOT RECORDING {running}", running=running), saved)
-    return Lamp("on", tr("recording {running}", running=running), saved)
+        return Lamp("wrong", tr("NOT RECORDING {running}", running=running), words)
+    return Lamp("on", tr("recording {running}", running=running), words)
 
 
 def _banner(state: AppState) -> Banner | None:
@@ -361,13 +361,13 @@ def _no_readings(bench: BenchState, *, running: bool) -> str:
 
 def _cut_short(state: AppState, session: SessionState) -> str:
     """Return why a session ended before its time; empty where it ended as somebody wished, or is being taken up."""
-    end, bench, kept = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
+    end, bench, rest = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
     if session.phase == "resuming":
         return ""
     if session.resumable and state.failed is not None and state.failed.request == "ResumeSession":
-        return tr("The session was not taken up again: {why}. {kept}", why=state.failed.sentence.rstrip("."), kept=kept)
-    if session.broken is not None:
-        return tr("The recording has stopped: {why}. {kept}", why=session.broken.rstrip("."), kept=kept)
+        return tr("The session was not taken up again: {why}. {kept}", why=state.failed.sentence.rstrip("."), kept=rest)
+    if session.fault is not None:
+        return tr("The recording has stopped: {why}. {kept}", why=session.fault.rstrip("."), kept=rest)
     if end is None or end.cause in ("finished", "aborted", "stopped"):
         return ""
     why = end.reason

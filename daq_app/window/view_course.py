@@ -176,8 +176,8 @@ def _undo_words(session: SessionState) -> str:
 
 
 def _name_trials(trials: tuple[TrialState, ...]) -> str:
-    named = tr(" and ").join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in trials)
-    return tr("trial {named}", named=named) if len(trials) == 1 else tr("trials {named}", named=named)
+    names = tr(" and ").join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in trials)
+    return tr("trial {named}", named=names) if len(trials) == 1 else tr("trials {named}", named=names)
 
 
 def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
@@ -218,8 +218,8 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
         case "taring":
             return tr("Hands off: zero is being measured with sample {code} on.", code=code), None
         case "ready":
-            done = Button(tr("Stroke done"), "Space", sends=steps.StrokeDone())
-            return _stroke_sentence(session, trial), None if session.plan.forces else done
+            stroke_done = Button(tr("Stroke done"), "Space", sends=steps.StrokeDone())
+            return _stroke_sentence(session, trial), None if session.plan.forces else stroke_done
         case "stroking":
             return tr("Stroke on {code} is being recorded.", code=code), None
         case "settling":
@@ -249,8 +249,8 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     hand = session.plan.stroking_hand
     finger = tr("{hand} index finger", hand=hand) if hand else tr("index finger")
     way = tr("away from the body") if trial.direction == PROXIMAL_TO_DISTAL else tr("towards the body")
-    allowed = session.plan.stroke_limit(trial)
-    often = tr("once") if allowed == 1 else tr("at most {allowed}×", allowed=allowed)
+    limit = session.plan.stroke_limit(trial)
+    often = tr("once") if limit == 1 else tr("at most {allowed}×", allowed=limit)
     sentence = tr(
         "Subject strokes {code} {often}, {way}, with the {finger}.",
         code=trial.stimulus.code, often=often, way=way, finger=finger,
@@ -264,8 +264,8 @@ def _ending(session: SessionState) -> tuple[str, Button | None]:
     if session.resumable:
         resume = Button(tr("Resume session"), "Space", sends=m.ResumeSession(session.folder))
         return tr("The session was cut short and can go on at the same trial."), resume
-    done = sum(t.outcome == "done" for t in session.trials)
-    sentence = tr("Session ended. Trials done: {done} of {count}.", done=done, count=len(session.trials))
+    count = sum(t.outcome == "done" for t in session.trials)
+    sentence = tr("Session ended. Trials done: {done} of {count}.", done=count, count=len(session.trials))
     return sentence, Button(tr("New session"), "Space", sends=NewSession())
 
 
@@ -288,10 +288,10 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
         return PlanRow("skipped", "–", name, tr("skipped"))
     if trial.outcome == "coming":
         return PlanRow("coming", " ", name)
-    shown = session.plan.shown.experimenter
+    visible = session.plan.shown.experimenter
     quality = trial.quality
-    mu = _mu(quality.stroke) if quality is not None and "forces" in shown else ""
-    answer = trial.answer if "answer" in shown else ""
+    mu = _mu(quality.stroke) if quality is not None and "forces" in visible else ""
+    answer = trial.answer if "answer" in visible else ""
     flawed = "!" if quality is not None and quality.words else ""
     return PlanRow("done", "✓", name, "   ".join(filter(None, (mu, answer, flawed))))
 
@@ -305,10 +305,10 @@ def _mu(stroke: Stroke | None) -> str:
 
 
 def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
-    judged = session.of(session.judged)
-    if judged is None or judged.quality is None:
+    trial = session.of(session.judged_trial)
+    if trial is None or trial.quality is None:
         return StrokeView("none", tr("No stroke yet."))
-    quality, code = judged.quality, judged.trial.stimulus.code
+    quality, code = trial.quality, trial.trial.stimulus.code
     parts, share = [tr("Stroke on {code}", code=code)], 100 * (quality.fell or 0.0)
     if (stroke := quality.stroke) is not None:
         steady = stroke.steady
@@ -319,7 +319,7 @@ def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
         words = tr_noop("N fell {share:.0f} %") if share >= 0 else tr_noop("N rose {share:.0f} %")
         parts.append(tr(words, share=abs(share)))
     parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
-    redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
+    redo = steps.Redo(quality.words[0]) if quality.words and trial in again else None
     return StrokeView(quality.grade, " · ".join(parts), quality.sentences, redo)
 
 
@@ -336,12 +336,12 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
     state = tr(TILES[_kind(session, trial)][1])
     heading = tr("Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=state)
-    shown = session.plan.shown.experimenter
-    if trial.answer is not None and "answer" in shown:
+    visible = session.plan.shown.experimenter
+    if trial.answer is not None and "answer" in visible:
         heading = f"{heading}, {trial.answer}"
     details = tr("Its take before was discarded: {why}.", why=trial.discarded.rstrip(".")) if trial.discarded else ""
     quality = trial.quality
-    if "forces" not in shown:
+    if "forces" not in visible:
         return Inspection(number, heading, tr(NO_FORCES), details)
     if quality is None:
         return Inspection(number, heading, _why_none(session, trial), details)

@@ -100,7 +100,8 @@ def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state)
     chosen_third = fold(fold(AnalystState(Path("x")), m.ReportReady("analysed", bare)), m.Choose(1))
     assert selected_row(chosen_third).trial == 3
     prediction = replace(state.report.predictions[1], stroke=None, sed=None)
-    for message in (m.Answered(prediction, None), m.ReportReady("predicted", replace(bare, predictions=(prediction,)))):
+    ready = m.ReportReady("predicted", replace(bare, predictions=(prediction,)))
+    for message in (m.TrialAnswer(prediction, None), ready):
         after = fold(chosen_third, message)
         assert [row.trial for row in rows(after)] == list(range(1, 11))
         assert rows(after)[1].stroke is None
@@ -165,7 +166,7 @@ def test_nothing_is_shown_of_a_session_before_it_is_open():
 def test_answers_are_shown_as_they_come_and_stay_when_the_work_is_stopped(state):
     bare = fold(AnalystState(Path("x")), m.ReportReady("analysed", replace(state.report, predictions=())))
     prediction = state.report.predictions[1]
-    after = fold(fold(bare, m.Answered(prediction, FINGER)), m.Cancelled())
+    after = fold(fold(bare, m.TrialAnswer(prediction, FINGER)), m.Cancelled())
     assert after.report.predictions == (prediction,)
     assert after.fingers == {(prediction.trial, prediction.stroke): FINGER}
     assert after.halted
@@ -175,7 +176,7 @@ def test_answers_are_shown_as_they_come_and_stay_when_the_work_is_stopped(state)
 def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady):
     with_fingers = state
     for prediction in state.report.predictions:
-        with_fingers = fold(with_fingers, m.Answered(prediction, FINGER))
+        with_fingers = fold(with_fingers, m.TrialAnswer(prediction, FINGER))
     changed_stroke = replace(steady, mu_dynamic=steady.mu_dynamic + 0.01)
     strokes = tuple(changed_stroke if s is steady else s for s in state.report.strokes)
     after = fold(with_fingers, m.ReportReady("analysed", replace(state.report, strokes=strokes, predictions=())))
@@ -192,7 +193,7 @@ def test_edges_stand_in_order_of_time_and_say_who_moved_them(steady):
     edges = edges_of(decided)
     assert [edge.edge for edge in edges] == list(EDGES)
     assert [edge.time for edge in edges] == sorted(edge.time for edge in edges)
-    assert [bool(edge.decided) for edge in edges] == [False, True, True, False]
+    assert [bool(edge.decision) for edge in edges] == [False, True, True, False]
 
 
 def test_a_stroke_without_a_steady_window_is_offered_one(steady):
@@ -247,7 +248,7 @@ def test_the_history_names_what_undo_and_redo_would_do_next():
     for step in (undo, undo, redo):
         decisions = decisions.with_line(step(decisions, "E03"))
         histories.append(history(decisions))
-    assert [(entry.done, entry.undone) for entry in histories] == [
+    assert [(entry.undoable, entry.redoable) for entry in histories] == [
         ((onset, lift), ()),
         ((onset,), (lift,)),
         ((), (onset, lift)),
@@ -313,7 +314,7 @@ def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_fol
 def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
     work, states = at_work
     work.do(m.Compare(str(SESSION)))
-    other = states[-1].compared
+    other = states[-1].other
     predictions = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
     assert set(other.fingers) == set(predictions) != set()
     for key, finger in other.fingers.items():
@@ -336,7 +337,7 @@ def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):
 def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):
     work, states = at_work
     work.do(m.ShowReadings(1))
-    readings = states[-1].read.readings
+    readings = states[-1].excerpt.readings
     with h5py.File(SESSION / "session.h5") as file:
         first, last = map(int, readings.place.split("rows ")[1].split(" to "))
         np.testing.assert_array_equal(file["readings/raw"][first : last + 1], readings.block.raw)

@@ -71,7 +71,7 @@ def test_the_window_shows_the_kept_prediction_and_draws_every_surface(prediction
     work = Work(folder, messages.append)
     work.go_on()
     report = next(r.report for r in messages if isinstance(r, m.ReportReady) and r.stage == "predicted")
-    answers = [message for message in messages if isinstance(message, m.Answered)]
+    answers = [message for message in messages if isinstance(message, m.TrialAnswer)]
     assert len(answers) == 10
     assert report.model.startswith(f"{strain} strain")
     assert [p.sed for p in report.predictions] == pytest.approx([row["sed"] for row in document["trials"]])

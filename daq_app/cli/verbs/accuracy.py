@@ -35,24 +35,24 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.progress(0.0, "loading")
     make_place(options.out)  # said before three minutes are spent
     _docs(options, {})
-    measured = _measure_or_restore(options, console)
-    if measured.stopped:
+    results = _measure_or_restore(options, console)
+    if results.stopped:
         unfilled = "; the docs stay as they are" if options.docs else ""
         console.note(f"stopped; drawing what was measured until then{unfilled}")
     console.progress(0.99, "drawing")
-    write(measured, options.out)
-    console.result({"page": str(options.out / PAGE), **measured.to_dict()})
-    page_tables = tables(measured)
-    if not measured.stopped:
+    write(results, options.out)
+    console.result({"page": str(options.out / PAGE), **results.to_dict()})
+    page_tables = tables(results)
+    if not results.stopped:
         for page, text in _docs(options, page_tables).items():
             page.write_text(text, encoding="utf-8")
     if "targets" in page_tables:
         rows = [[cell for n, cell in enumerate(row) if n != 7] for row in page_tables["targets"].rows]
         console.say(table(rows, head=list(page_tables["targets"].header[:7])))
     console.say(*(page_tables[name].caption for name in ("hard-small", "hard-finite") if name in page_tables))
-    console.note(*(f"note: {sentence}" for sentence in measured.left_out))
+    console.note(*(f"note: {sentence}" for sentence in results.left_out))
     console.say(f"{options.out / PAGE}")
-    return STOPPED if measured.stopped and options.data is None else DONE
+    return STOPPED if results.stopped and options.data is None else DONE
 
 
 def _docs(options: argparse.Namespace, page_tables: "Mapping[str, Table]") -> dict[Path, str]:

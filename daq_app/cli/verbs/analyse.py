@@ -68,5 +68,5 @@ def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
         f"{number(a)}° ({number(low)} to {number(high)}) to +{axis}"
         for axis, a, (low, high) in zip("xy", tilt.lean, ends, strict=True)
     ]
-    done = f"levelled by {levelled[0]:g}° and {levelled[1]:g}°" if levelled != (0.0, 0.0) else "not levelled"
-    return f"tilt of the face, if the hand pressed straight down: {', '.join(rows)}; {tilt.kind}; {done}"
+    levelling = f"levelled by {levelled[0]:g}° and {levelled[1]:g}°" if levelled != (0.0, 0.0) else "not levelled"
+    return f"tilt of the face, if the hand pressed straight down: {', '.join(rows)}; {tilt.kind}; {levelling}"

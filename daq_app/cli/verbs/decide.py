@@ -61,14 +61,14 @@ def run(options: argparse.Namespace, console: Console) -> int:
     check_code("--by", options.by)
     if options.choose and options.trial is None:
         raise WrongValue("--choose is of a trial, whose stroke --stroke names: give --trial N")
-    stored = stored_document(recording.folder, ANALYSIS)
+    document = stored_document(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
-    analysis = analyse(recording, settings_of(stored or {}), before)
+    analysis = analyse(recording, settings_of(document or {}), before)
     decision = _decision(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_present(analysis, decision)
     after = preview(recording, decision, before, analysis)
     line = append(recording, decision)
-    if stored is not None:
+    if document is not None:
         analyse_session(recording, console)
     older = (recording.folder / PREDICTION).is_file()
     changes = _changes(analysis, after)

@@ -43,14 +43,14 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _source(recording: Recording, console: Console) -> ExportSource:
     """Return the session with the numbers kept in it; those made under other decisions are made anew."""
-    decided = read(recording.folder)
+    decisions = read(recording.folder)
     made_by = {"made_by": software_versions()}
     analysis, prediction = (derived.stored_document(recording.folder, name) for name in (ANALYSIS, PREDICTION))
-    if analysis is None or not derived.is_current(analysis, decided):
+    if analysis is None or not derived.is_current(analysis, decisions):
         settings = analysis or {"gain_error": gain_error_set(recording.folder)}
-        analysis = made_by | derived.repeat(ANALYSIS, settings, recording, decided)
-    if prediction is not None and not derived.is_current(prediction, decided):
+        analysis = made_by | derived.repeat(ANALYSIS, settings, recording, decisions)
+    if prediction is not None and not derived.is_current(prediction, decisions):
         console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
-        prediction = made_by | derived.repeat(PREDICTION, prediction, recording, decided)
+        prediction = made_by | derived.repeat(PREDICTION, prediction, recording, decisions)
     console.note(derived.outdated_prediction(recording, derived.settings_of(analysis)))
     return ExportSource(recording, analysis, prediction)

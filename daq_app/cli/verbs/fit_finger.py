@@ -142,8 +142,8 @@ def _fit(
     holds = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
     if options.relaxation and not holds:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
-    stated, _ = (None, "") if options.finger is None else finger_in(options.finger)
-    finger = template(with_own_finger(PredictionOptions(scene=stated), plan))
+    scene, _ = (None, "") if options.finger is None else finger_in(options.finger)
+    finger = template(with_own_finger(PredictionOptions(scene=scene), plan))
     progress = console.reporter("solving presses")
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, progress)
     if options.relaxation:
@@ -157,7 +157,7 @@ def _fit(
 
 
 def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
-    finger_fit, checked = outcome.fit, outcome.check
+    finger_fit, own = outcome.fit, outcome.check
     rows = [
         [
             one.name,
@@ -167,7 +167,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
             _ends(one.prior),
             f"{100 * share:.0f} %",
         ]
-        for one, share in zip(finger_fit.layers, checked.shares, strict=True)
+        for one, share in zip(finger_fit.layers, own.shares, strict=True)
     ]
     console.say(table(rows, head=["E [kPa]", "found", "95 % interval", "by likelihood alone", "prior", "share of N"]))
     overall, (low, high) = finger_fit.overall, (finger_fit.overall.low or 0.0, finger_fit.overall.high or 0.0)
@@ -188,10 +188,8 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         f"Assumed: friction {options.mu:g}, width {finger_fit.scene.finger.width:g} mm, a prior of a factor "
         f"{options.prior:g}. The stiffness is by the width: a finger twice as wide is half as stiff."
     )
-    agree = "agree with" if checked.deviation <= AGREE else "DIFFER from"
-    console.say(
-        f"The solver's own forces {agree} those fitted: by {number(checked.deviation, 1, factor=100)} % at most."
-    )
+    agree = "agree with" if own.deviation <= AGREE else "DIFFER from"
+    console.say(f"The solver's own forces {agree} those fitted: by {number(own.deviation, 1, factor=100)} % at most.")
     if options.scene is not None:
         console.say(f"finger: {options.scene}, for 'daq-app predict SESSION --scene {options.scene}'")
 

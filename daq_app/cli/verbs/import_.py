@@ -63,9 +63,9 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
     from sessions.exchange.exported import import_session
     from sessions.recording.archive import seal
 
-    stated = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
-    if stated:
-        raise WrongValue(f"--{stated[0]} says nothing of an export, which holds all that is known: leave it out")
+    names = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
+    if names:
+        raise WrongValue(f"--{names[0]} says nothing of an export, which holds all that is known: leave it out")
     folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
         imported = import_session(session, folder)
@@ -84,7 +84,7 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     units = _parts(options.units)
     if units is not None and len(units) != 2:
         raise WrongValue(f"--units {options.units} is not allowed: give two, of forces and torques, such as N,Nmm")
-    stated = ImportOptions(
+    import_options = ImportOptions(
         units=None if units is None else (units[0], units[-1]),
         axes=_parts(options.axes),
         normal=options.normal,
@@ -95,7 +95,7 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     )
     folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
-        imported = import_csv(options.file, folder, stated)
+        imported = import_csv(options.file, folder, import_options)
         seal(imported.folder)
         list_in_manifest(imported.folder, (ORIGINAL_FILE,))
     console.result({"session": str(imported.folder), **{k: v for k, v in asdict(imported).items() if k != "folder"}})

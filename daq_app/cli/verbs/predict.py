@@ -52,8 +52,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = _afferent(options)
     scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
     console.note(ignored or None)
-    stated = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
-    choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **stated)
+    values = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
+    choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **values)
     recording, _, unreadable = open_visit(options.session, options.subject, console)
     analysis = analyse_session(recording, console, area_law(options), gain_error=options.calibration_error)
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)

@@ -26,9 +26,9 @@ EXAMPLE = "daq-app replay recordings/P07 --fast"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
     pace = parser.add_mutually_exclusive_group()
-    read = within("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as it goes")
+    parse = within("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as it goes")
     meaning = "times as fast as it was recorded (1)"
-    pace.add_argument("--speed", type=read, default=1.0, metavar="X", help=meaning)
+    pace.add_argument("--speed", type=parse, default=1.0, metavar="X", help=meaning)
     pace.add_argument("--fast", action="store_true", help="as fast as the machine goes")
     parser.add_argument("--no-prediction", action="store_true", help="leave the solver's numbers out")
 
@@ -38,38 +38,36 @@ def run(options: argparse.Namespace, console: Console) -> int:
     with tempfile.TemporaryDirectory(prefix="daq-app-replay-") as room:
         began = time.perf_counter()
         try:
-            replayed = replay(
-                recording, Path(room) / "replay", None if options.fast else options.speed, console.progress
-            )
+            copy = replay(recording, Path(room) / "replay", None if options.fast else options.speed, console.progress)
         except Stopped:
             raise KeyboardInterrupt from None
-        taken = time.perf_counter() - began
+        wall_s = time.perf_counter() - began
         differences = [
-            *different_readings(recording, replayed),
-            *first_sentences(list(different_events(recording, replayed))),
+            *different_readings(recording, copy),
+            *first_sentences(list(different_events(recording, copy))),
         ]
-        compared = ["readings", "events", ANALYSIS]
-        decided = read(recording.folder)  # people decided about the recording, not about its replay
+        parts = ["readings", "events", ANALYSIS]
+        decisions = read(recording.folder)  # people decided about the recording, not about its replay
         analysis = stored_document(options.session, ANALYSIS)
         if analysis is None:
-            analysis = json.loads(json.dumps(repeat(ANALYSIS, {}, recording, decided)))
-        differences += changes(ANALYSIS, analysis, repeat(ANALYSIS, analysis, replayed, decided))
+            analysis = json.loads(json.dumps(repeat(ANALYSIS, {}, recording, decisions)))
+        differences += changes(ANALYSIS, analysis, repeat(ANALYSIS, analysis, copy, decisions))
         prediction = None if options.no_prediction else stored_document(options.session, PREDICTION)
         if prediction is not None:
             console.progress(0.9, f"making {PREDICTION} again")
-            differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, replayed, decided, recording))
-            compared.append(PREDICTION)
+            differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, copy, decisions, recording))
+            parts.append(PREDICTION)
     events = recording.events
     lasted = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
     notes = list(_notes(recording))
     console.result(
         {
             "session": str(options.session),
-            "compared": compared,
+            "compared": parts,
             "differences": differences,
             "notes": notes,
             "duration_s": lasted,
-            "wall_s": taken,
+            "wall_s": wall_s,
         }
     )
     outcome = "identical" if not differences else "not identical, as named above"
@@ -77,8 +75,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         recording.simulated_sentence,
         *notes,
         *differences,
-        f"{options.session}: {outcome} ({', '.join(compared)} compared)",
-        f"{lasted:.1f} s of session in {taken:.2f} s, the comparison not counted",
+        f"{options.session}: {outcome} ({', '.join(parts)} compared)",
+        f"{lasted:.1f} s of session in {wall_s:.2f} s, the comparison not counted",
     )
     return FLAWED if differences else DONE
 

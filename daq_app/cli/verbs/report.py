@@ -69,8 +69,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     # What was asked before is asked again, so that nothing kept is lost, and what a page shows.
     before = stored_options(recording) or PredictionOptions()
     variants = max(before.variants, options.variants, key=("none", "small", "both").index)
-    wanted = replace(before, intervals=True, variants=variants, course="history")
-    prediction = predict_session(recording, analysis, console, wanted, afferent)
+    choices = replace(before, intervals=True, variants=variants, course="history")
+    prediction = predict_session(recording, analysis, console, choices, afferent)
     from sessions.report import findings
 
     reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
@@ -97,8 +97,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _check_scores(visit: Recording, recording: Recording) -> None:
     """Raise WrongValue where a visit named by --scores adds nothing to a report, not even a sentence."""
-    judged = {(trial.stimulus.descriptor, trial.stimulus.index) for trial in recording.plan.trials}
+    stimuli = {(trial.stimulus.descriptor, trial.stimulus.index) for trial in recording.plan.trials}
     table = score_table(visit)
-    if not table.other_answers and judged.isdisjoint((score.descriptor, score.index) for score in table.scores):
+    if not table.other_answers and stimuli.isdisjoint((score.descriptor, score.index) for score in table.scores):
         which = "a stimulus of this session" if table.scores else "any stimulus"
         raise WrongValue(f"--scores {visit.folder} is not allowed: it holds no score of {which}; leave it out")

@@ -55,9 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     simulated_bench = options.device is not None and options.device.startswith("sim:")
     _refuse_mixtures(options, simulated_bench=simulated_bench)
-    chosen, seed, body, place = _choices(options)
-    planned = plan(
-        chosen,
+    session_protocol, seed, body, place = _choices(options)
+    session_plan = plan(
+        session_protocol,
         options.subject,
         seed,
         forces=options.device is not None,
@@ -69,17 +69,19 @@ def run(options: argparse.Namespace, console: Console) -> int:
         place=place,
     )
     stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
-    what = planned.protocol if place is None else "forces" if planned.forces else "scores"
+    what = session_plan.protocol if place is None else "forces" if session_plan.forces else "scores"
     folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{what}_{stamp}"
-    console.note(own_sentence(planned))
+    console.note(own_sentence(session_plan))
     simulated = options.simulate_subject
-    people = People() if simulated is None else People("simulated people", simulated, chosen.simulated_friction)
+    people = (
+        People() if simulated is None else People("simulated people", simulated, session_protocol.simulated_friction)
+    )
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = open_device(recorder, options.device) if options.device else None
-        frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
+        frame = _frame(options, session_plan.frame if bench is None else bench.frame or session_plan.frame)
         request = StartSession(
-            replace(planned, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
+            replace(session_plan, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
         )
         outcome = attend_session(recorder, request, console)
     end = outcome.end
@@ -118,10 +120,10 @@ def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> N
         raise WrongValue(f"--pace {options.pace:g} is not allowed: 0.1 to 200, and only with --simulate-subject")
 
 
-def _frame(options: argparse.Namespace, stated: Frame) -> Frame:
+def _frame(options: argparse.Namespace, frame: Frame) -> Frame:
     """Return the frame as stated by bench or protocol, save for what the command line states."""
     if options.normal is not None:
-        stated = replace(stated, normal=options.normal, normal_origin="set")
+        frame = replace(frame, normal=options.normal, normal_origin="set")
     if options.height is not None:
-        stated = replace(stated, height=options.height, height_origin="set")
-    return stated
+        frame = replace(frame, height=options.height, height_origin="set")
+    return frame

@@ -121,7 +121,7 @@ class _WatchedRecorder:
         self.safe = 0  # readings acknowledged
         self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
         self._over = False
-        self._waiting: list[m.Report] = []
+        self._queue: list[m.Report] = []
 
     def until(self, kind: type[AReport]) -> AReport:
         """Return the next report of a kind."""
@@ -147,9 +147,9 @@ class _WatchedRecorder:
         """Yield what comes within so many seconds, each noted; what nobody takes any more waits for the next call."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
-            self._waiting += self.recorder.poll(0.01)
-            while self._waiting:
-                report = self._waiting.pop(0)
+            self._queue += self.recorder.poll(0.01)
+            while self._queue:
+                report = self._queue.pop(0)
                 match report:
                     case LoggedEvent():
                         self.events.append(report)
@@ -176,15 +176,15 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
     folder = room / "killed-0"
     for number in range(KILLS):
         progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
-        with closing(_WatchedRecorder()) as watched:
-            trial = _begin_or_resume(watched, folder)
-            watched.hear(chance.uniform(*RUNNING))
+        with closing(_WatchedRecorder()) as witness:
+            trial = _begin_or_resume(witness, folder)
+            witness.hear(chance.uniform(*RUNNING))
         recording = Recording.open(folder)
-        _check_recording(recording, watched, trial)
+        _check_recording(recording, witness, trial)
         block = recording.last_block()
         if len(block):
-            most_lost = max(most_lost, (watched.shown_ns - int(block.received_ns[-1])) * 1e-9)
-        readings, events = readings + watched.safe, events + len(watched.events)
+            most_lost = max(most_lost, (witness.shown_ns - int(block.received_ns[-1])) * 1e-9)
+        readings, events = readings + witness.safe, events + len(witness.events)
         copies.append(room / f"copy-{number}")
         shutil.copytree(folder, copies[-1])
         if recording.end is not None:
@@ -193,43 +193,43 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
     return kills, copies
 
 
-def _begin_or_resume(watched: _WatchedRecorder, folder: Path) -> int | None:
+def _begin_or_resume(witness: _WatchedRecorder, folder: Path) -> int | None:
     """Have a session running, and return the trial at which it was resumed."""
     if not folder.exists():
-        watched.recorder.send(m.Connect("sim:?seed=1"))
-        watched.until(m.Device)
-        watched.recorder.send(m.StartSession(_PLAN, str(folder), m.People("simulated people", 1), any_folder=True))
-        watched.until(m.SessionBegun)
+        witness.recorder.send(m.Connect("sim:?seed=1"))
+        witness.until(m.Device)
+        witness.recorder.send(m.StartSession(_PLAN, str(folder), m.People("simulated people", 1), any_folder=True))
+        witness.until(m.SessionBegun)
         return None
-    watched.recorder.send(m.ResumeSession(str(folder)))
-    watched.until(m.SessionBegun)
-    return watched.until(Status).trial
+    witness.recorder.send(m.ResumeSession(str(folder)))
+    witness.until(m.SessionBegun)
+    return witness.until(Status).trial
 
 
-def _check_recording(recording: Recording, watched: _WatchedRecorder, trial: int | None) -> None:
+def _check_recording(recording: Recording, witness: _WatchedRecorder, trial: int | None) -> None:
     """Raise SelfTestFailed unless all that was acknowledged is in the file, and the session went on where it was."""
     rows = {event.number: event_row(event) for event in recording.events}
-    if any(rows.get(event.number) != event_row(event) for event in watched.events):
+    if any(rows.get(event.number) != event_row(event) for event in witness.events):
         raise SelfTestFailed("an event that had been acknowledged was not in the file after a kill")
     block = recording.readings()
-    if len(block) < watched.safe or (np.diff(block.sequence) != 1).any():
-        raise SelfTestFailed(f"of {watched.safe} readings that had been acknowledged {len(block)} were left by a kill")
-    first = watched.events[0].number if watched.events else 1
-    done = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < first}
-    if trial is not None and trial != len(done) + 1:
-        raise SelfTestFailed(f"the session went on at trial {trial}, and had been killed in trial {len(done) + 1}")
+    if len(block) < witness.safe or (np.diff(block.sequence) != 1).any():
+        raise SelfTestFailed(f"of {witness.safe} readings that had been acknowledged {len(block)} were left by a kill")
+    first = witness.events[0].number if witness.events else 1
+    trials = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < first}
+    if trial is not None and trial != len(trials) + 1:
+        raise SelfTestFailed(f"the session went on at trial {trial}, and had been killed in trial {len(trials) + 1}")
 
 
 def _try_stops(room: Path) -> float:
     """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
     took: list[float] = []
     for number in range(STOPS):
-        with closing(_WatchedRecorder()) as watched:
-            _begin_or_resume(watched, room / str(number))
-            watched.hear(0.3)
+        with closing(_WatchedRecorder()) as witness:
+            _begin_or_resume(witness, room / str(number))
+            witness.hear(0.3)
             began = time.monotonic()
-            watched.recorder.send(m.Stop())
-            watched.until(m.SessionEnded)
+            witness.recorder.send(m.Stop())
+            witness.until(m.SessionEnded)
             took.append(time.monotonic() - began)
         if Recording.open(room / str(number)).end is None:
             raise SelfTestFailed("a session that was stopped had no written end")

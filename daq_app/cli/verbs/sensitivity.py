@@ -110,8 +110,8 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     changes = sign_map.single_changes(options.kinematics)
     mapped = sign_map.map_trials(options.kinematics)
     points = saltelli_points(sign_map.DESIGN, samples, options.seed)
-    drawn = sign_map.drawn_fingers(points, options.kinematics)
-    trials = [*changes.values(), *mapped.values(), *drawn]
+    fingers = sign_map.drawn_fingers(points, options.kinematics)
+    trials = [*changes.values(), *mapped.values(), *fingers]
     try:
         progress = console.counter("fingers", len(trials))
         answers = sign_map.answers_of(trials, progress, options.keep, options.workers, options.scheduler)
@@ -125,10 +125,10 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     random = answers[len(changes) + len(mapped) :]
     published = single["as published"]
     assert not isinstance(published, str)  # a finger that can be
-    kept = sign_map.kept_signs(random, published)
-    shares = {name: sign_map.share(column) for name, column in zip(_NAMES, kept.T, strict=True)}
+    signs = sign_map.kept_signs(random, published)
+    shares = {name: sign_map.share(column) for name, column in zip(_NAMES, signs.T, strict=True)}
     indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
-    without_answer = int(np.isnan(kept[:, at]).sum())
+    without_answer = int(np.isnan(signs[:, at]).sum())
     console.result(
         {
             "quantity": options.quantity,
@@ -149,7 +149,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     _print_map(radii, at, console)
     _print_shares(shares, len(random), without_answer, console)
     if moving := next((computed[0].name for computed, _ in indices.values() if computed), None):
-        _print_thirds(moving, points, kept[:, at], label, console)
+        _print_thirds(moving, points, signs[:, at], label, console)
     for name, (computed, count) in indices.items():
         console.say(f"\nWhat moves the change of the {label} over {name} (Sobol indices, {count} fingers):")
         if computed:
@@ -215,12 +215,12 @@ def _mark(answer: Answer | str, place: int, at: int) -> str:
     return "".join("·" if one is None else "+" if one > 0.0 else "\N{MINUS SIGN}" for one in numbers)
 
 
-def _print_thirds(name: str, points: Array, kept: Array, label: str, console: Console) -> None:
+def _print_thirds(name: str, points: Array, signs: Array, label: str, console: Console) -> None:
     """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
     values = points[:, list(sign_map.DESIGN).index(name)]
     rows = [
         f"{100 * part:.0f} % at {number(low)} to {number(high)}"
-        for low, high, part in sign_map.shares_by_thirds(kept, values)
+        for low, high, part in sign_map.shares_by_thirds(signs, values)
         if part is not None
     ]
     console.say(f"The {label} keeps both signs, by {name}: {', '.join(rows)}.")

@@ -127,16 +127,16 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
         console.say(table(lines, head=["arc [mm]", *NAMES]).lstrip("\n"))
-    left = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
+    effects = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
     )
-    console.say(table(left, head=["", ""]).lstrip("\n"))
+    console.say(table(effects, head=["", ""]).lstrip("\n"))
     console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")
-    shown = [
+    audits = [
         [label, number(prediction.audits[name] + 0.0, 2)] for name, label in AUDITS.items() if name in prediction.audits
     ]
-    console.say(table(shown, head=["", ""]).lstrip("\n"))
+    console.say(table(audits, head=["", ""]).lstrip("\n"))
     console.note(*(f"note: {warning}" for warning in prediction.warnings))
 
 

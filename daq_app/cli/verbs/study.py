@@ -53,8 +53,8 @@ def add_power(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
     meaning = "with --power: how often a study whose subjects press each surface to these depths tells --quantity from"
     meaning += " its rivals; some minutes"
-    read = within("--depths", float, 0.5, 3.0)
-    parser.add_argument("--depths", nargs="+", type=read, metavar="MM", help=meaning)
+    parse = within("--depths", float, 0.5, 3.0)
+    parser.add_argument("--depths", nargs="+", type=parse, metavar="MM", help=meaning)
     add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated per design (400)", 400, "N")
     add_seed(parser, "with --power: of the simulated studies (0)")
 
@@ -193,12 +193,14 @@ def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console
     # What is wrong with these is said before hours of work.
     exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
     shelf = Shelf(out / "results", visit_options)
-    done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
+    results, failed = visits(
+        sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers
+    )
     if truth is not None and options.quantity == SED.name:
         from daq_app.simulation.synthetic import population_relations  # loaded only where it is needed
 
         truth["relation"] = population_relations(truth["people"], visit_options.prediction, visit_options.area)
-    study = pool_visits(done, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
+    study = pool_visits(results, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})

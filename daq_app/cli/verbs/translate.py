@@ -45,11 +45,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     except NotAllowed as wrong:
         raise WrongValue(str(wrong)) from wrong
     if options.window:
-        text, missing = program_texts(EXPERIMENTER, window_texts(), options.language)
+        text, gaps = program_texts(EXPERIMENTER, window_texts(), options.language)
     elif options.program:
-        text, missing = program_texts(SUBJECT, SubjectText, options.language)
+        text, gaps = program_texts(SUBJECT, SubjectText, options.language)
     else:
-        text, missing = protocol_texts(protocol(options.protocol), options.language)
+        text, gaps = protocol_texts(protocol(options.protocol), options.language)
     if options.out is None:
         console.say(text.rstrip())
     else:
@@ -58,8 +58,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         with name_failure(RecordingError, f"{options.out} cannot be written", new=True):
             write_whole(options.out, text.encode())
     where = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
-    console.result({"language": options.language, "missing": missing, **where})
-    console.note(f"texts yet to be translated: {missing}" if missing else "every text is translated")
+    console.result({"language": options.language, "missing": gaps, **where})
+    console.note(f"texts yet to be translated: {gaps}" if gaps else "every text is translated")
     return DONE
 
 
@@ -101,7 +101,7 @@ def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[st
     about = {"original": context, "datatype": "plaintext", "source-language": ENGLISH, "target-language": language}
     file = ElementTree.SubElement(root, "file", about)
     units = ElementTree.SubElement(file, "body")
-    missing = 0
+    gaps = 0
     for number, text in enumerate(texts, 1):
         unit = ElementTree.SubElement(units, "trans-unit", id=str(number))
         ElementTree.SubElement(unit, "source").text = text
@@ -111,7 +111,7 @@ def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[st
             unit.set("approved", "yes")
         else:
             target.set("state", "needs-translation")
-            missing += 1
+            gaps += 1
     ElementTree.indent(root)
     body = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n', missing
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n', gaps

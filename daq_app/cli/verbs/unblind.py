@@ -35,17 +35,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
     key = study_key(folder) if whole or sessions[0].plan.blinded else None
     if key is None:
         raise StudyError(f"{path} is not blinded: there is nothing to open")
-    chosen, refused = _select(sessions, key)
-    refused += unreadable
-    if not whole and refused:
-        raise RecordingError(refused[0])
-    if whole and open_study(folder).unblinded and not chosen:
-        rest = f": {'; '.join(refused)}" if refused else ", and so was each of its sessions"
+    recordings, refusals = _select(sessions, key)
+    refusals += unreadable
+    if not whole and refusals:
+        raise RecordingError(refusals[0])
+    if whole and open_study(folder).unblinded and not recordings:
+        rest = f": {'; '.join(refusals)}" if refusals else ", and so was each of its sessions"
         raise StudyError(f"{folder} was unblinded before{rest}")
     utc = datetime.now(UTC).isoformat(timespec="seconds")
     note(folder, "unblinded", {"by": options.by, "session": None if whole else path.resolve().name})
     names: list[str] = []
-    for recording in chosen:
+    for recording in recordings:
         # Numbers and pages that were made of it while it was blinded.
         derived = [path for path in sorted(recording.folder.iterdir()) if path.is_file() and path.name not in RECORDED]
         results = [path for path in derived if path.suffix in (".json", ".jsonl", ".html")]
@@ -57,28 +57,30 @@ def run(options: argparse.Namespace, console: Console) -> int:
         except RecordingError as error:
             if not whole:
                 raise
-            refused.append(str(error))
-    console.result({"study": str(folder), "sessions": names, "left_out": refused, "by": options.by, "utc": utc})
-    console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refused)
+            refusals.append(str(error))
+    console.result({"study": str(folder), "sessions": names, "left_out": refusals, "by": options.by, "utc": utc})
+    console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refusals)
     if not whole:
         console.say("labels are the same throughout the study: whoever saw this session's stimuli knows them all")
-    return FLAWED if refused else DONE
+    return FLAWED if refusals else DONE
 
 
 def _select(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], list[str]]:
     """Return the sessions to be unblinded, and a sentence for each that cannot be."""
-    chosen: list[Recording] = []
-    refused: list[str] = []
+    recordings: list[Recording] = []
+    refusals: list[str] = []
     for recording in sessions:
         name = recording.folder.name
         if not recording.plan.blinded:
-            refused += [] if len(sessions) > 1 else [f"{name} is not blinded"]
+            refusals += [] if len(sessions) > 1 else [f"{name} is not blinded"]
         elif load_derived(recording.folder, UNBLINDING) is not None:
-            refused += [] if len(sessions) > 1 else [f"{name} was unblinded before"]
+            refusals += [] if len(sessions) > 1 else [f"{name} was unblinded before"]
         elif recording.plan.key_sha256 != key.sha256:
-            refused.append(f"{name} was blinded with another key: name its study with --study")
+            refusals.append(f"{name} was blinded with another key: name its study with --study")
         elif not is_sealed(recording.folder):
-            refused.append(f"{name} stays blinded: it has not ended; end it ('daq-app resume --end') and unblind again")
+            refusals.append(
+                f"{name} stays blinded: it has not ended; end it ('daq-app resume --end') and unblind again"
+            )
         else:
-            chosen.append(recording)
-    return chosen, refused
+            recordings.append(recording)
+    return recordings, refusals

@@ -28,29 +28,29 @@ def run(options: argparse.Namespace, console: Console) -> int:
     flaws = list(problems(folder))
     recording = Recording.open(folder)
     flaws += doubtful_readings(recording)
-    checked = ["files"]
-    decided = read(folder)
-    flaws += decided.problems
-    checked += [DECISIONS] if decided.lines or decided.problems else []
+    parts = ["files"]
+    decisions = read(folder)
+    flaws += decisions.problems
+    parts += [DECISIONS] if decisions.lines or decisions.problems else []
     try:
-        checked += [] if gain_error_set(folder) is None else [GAIN_ERROR]
+        parts += [] if gain_error_set(folder) is None else [GAIN_ERROR]
     except RecordingError as damaged:
         flaws.append(str(damaged))
     for name in (ANALYSIS, PREDICTION):
         console.progress(0.5, f"making {name} again")
         try:
-            stored = stored_document(folder, name)
-            if stored is None:
+            document = stored_document(folder, name)
+            if document is None:
                 continue
-            if not is_current(stored, decided):
+            if not is_current(document, decisions):
                 flaws.append(f"{name} was made under other decisions than those in force: make it anew")
-            fresh = repeat(name, stored, recording, decisions_of(stored))
+            fresh = repeat(name, document, recording, decisions_of(document))
         except (RecordingError, SettingsError) as damaged:
             flaws.append(" ".join(str(damaged).split()))
             continue
-        flaws += changes(name, stored, fresh)
-        checked.append(name)
-    console.result({"session": str(folder), "checked": checked, "problems": flaws})
+        flaws += changes(name, document, fresh)
+        parts.append(name)
+    console.result({"session": str(folder), "checked": parts, "problems": flaws})
     outcome = "readable, with the above" if flaws else "whole"
-    console.say(*flaws, f"{folder}: {outcome} ({', '.join(checked)} checked)")
+    console.say(*flaws, f"{folder}: {outcome} ({', '.join(parts)} checked)")
     return FLAWED if flaws else DONE

@@ -212,9 +212,9 @@ def test_the_enter_that_keeps_the_rulers_length_begins_no_session(driver):
     window = driver.window
     QTest.keyClicks(window.page.subject, "P07")
     window.act("ruler")
-    measured = window.subject.ruler._measured
-    QTest.keyClicks(measured, "100")
-    QTest.keyClick(measured, ENTER)
+    length = window.subject.ruler._length
+    QTest.keyClicks(length, "100")
+    QTest.keyClick(length, ENTER)
     driver.until(lambda: not window.subject.measuring, "the end of the measuring")
     end = time.monotonic() + 0.5
     driver.until(lambda: time.monotonic() > end)

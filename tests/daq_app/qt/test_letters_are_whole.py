@@ -109,7 +109,7 @@ def test_the_name_of_a_vertical_axis_is_whole_in_the_lowest_plot_of_a_stroke(app
     view.resize(view.minimumSizeHint())
     view.show()
     for plot in view.findChildren(ZoomedPlot):
-        plot.show_numbers(shown=True)
+        plot.show_numbers(visible=True)
         for _ in range(5):  # the axes have found their sizes
             application.processEvents()
         name = plot.getPlotItem().getAxis("left").label.sceneBoundingRect()

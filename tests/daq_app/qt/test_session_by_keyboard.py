@@ -200,7 +200,7 @@ def test_after_the_ruler_the_experimenters_window_is_in_front_on_one_screen(driv
     QTest.keyClick(window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
     assert window.subject.isVisible()
     assert window.subject.measuring
-    window.subject.ruler.done.emit()
+    window.subject.ruler.finished.emit()
     assert not window.subject.isVisible()
     driver.until(window.isActiveWindow, "the experimenter's window")
 

@@ -168,7 +168,7 @@ def test_what_the_live_model_says_of_the_readings_stands_in_the_window(driver):
     driver.window.resize(1920, 1080)  # the cards of a new session leave the finger no place in less
     model.prepare()
     driver.until(lambda: finger.accessibleName().endswith("Model at small strain: nothing touches."), "the model")
-    assert len(model.said.row) > 0
+    assert len(model.provisional.row) > 0
     model.close()
 
 

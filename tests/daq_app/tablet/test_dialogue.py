@@ -5,7 +5,7 @@ import json
 import pytest
 from session_messages import BEGUN, FIRST, PLAN, SCORE, after, log
 
-from daq_app.tablet.dialogue import Act, Dialogue, Page, Stored, event_of, read
+from daq_app.tablet.dialogue import Act, Dialogue, Page, Stored, decode, event_of
 from daq_app.window.subject import subject_view
 from sessions.run import steps
 
@@ -13,7 +13,7 @@ ACTS = [[1000.0, "press", 20.0, "touch"], [1500.0, "drag", 60.0, "touch"], [1600
 
 
 def answer_given(key, acts=ACTS):
-    return read(json.dumps({"type": "given", "key": key, "acts": acts, "sent": 2000.0}))
+    return decode(json.dumps({"type": "given", "key": key, "acts": acts, "sent": 2000.0}))
 
 
 class Tablet:
@@ -79,7 +79,7 @@ def test_an_answer_waits_on_the_tablet_while_no_session_runs():
 def test_an_answer_of_another_kind_than_asked_for_is_no_answer():
     tablet = Tablet()
     key = tablet.show(*SCORE).key
-    other = read(json.dumps({"type": "given", "key": key, "acts": [[1.0, "choose", "first", "touch"]], "sent": 2.0}))
+    other = decode(json.dumps({"type": "given", "key": key, "acts": [[1.0, "choose", "first", "touch"]], "sent": 2.0}))
     assert isinstance(tablet.dialogue.take(other, float), steps.Note)
 
 

@@ -147,12 +147,12 @@ def test_many_who_guess_at_once_wait_for_each_other(server, monkeypatch):
 
 
 def test_an_error_of_ours_ends_one_conversation_and_no_other(server):
-    server._received = None  # no function
+    server._on_message = None  # no function
     with socket(server, code=server.code) as talk:
         token = receive(talk)["token"]
         with pytest.raises(ConnectionClosed):
             talk.recv(5.0)
-    server._received = lambda *_: None
+    server._on_message = lambda *_: None
     with socket(server, token=token) as talk:
         assert receive(talk)["type"] == "welcome"
 

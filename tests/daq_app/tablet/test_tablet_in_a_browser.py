@@ -196,7 +196,7 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     assert browser.value("location.href") == f"{server.url}/"
     browser.click("skip")
     driver.until(lambda: server.connected and window.page.screen_fields.camera.isHidden())
-    driver.until(lambda: not window.tablet.missing)
+    driver.until(lambda: not window.tablet.problem)
     window.act("primary")
     driver.phase("idle")
     ask(driver)

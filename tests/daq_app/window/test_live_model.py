@@ -292,5 +292,5 @@ def test_a_slow_full_solve_is_never_shown_beside_another_stroke(follower, monkey
     model.poll()
     child.answers.append(follower.take(child.requests[-1]))
     model.poll()
-    assert model.said.beyond
+    assert model.provisional.beyond
     assert model.settled is None

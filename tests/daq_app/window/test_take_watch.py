@@ -41,10 +41,10 @@ def test_a_process_that_ended_while_it_waited_for_strokes_is_replaced_at_the_nex
     judge = Judge(messages.append)
     judge.prepare()
     feed.device(INFO)
-    judge.heard(steps.StartTake(1, 1), feed)
+    judge.follow(steps.StartTake(1, 1), feed)
     number = np.arange(700)
     feed.add(Live(1, number, number / 100.0, number, np.zeros((700, 6)), number * 0, (0.0,) * 6), Frame())
-    judge.heard(log("finger_lifted", 1, time=3.6), feed)
+    judge.follow(log("finger_lifted", 1, time=3.6), feed)
     judge.look(feed, after(*SCORE))
     assert messages == [Judged(1, 1, GOOD)]
 

@@ -155,7 +155,7 @@ def test_the_recording_lamp_is_fed_by_what_the_disk_acknowledged_and_by_nothing_
     lamp = derive_view(state).lamp
     assert lamp.grade == "wrong"
     assert lamp.words == "NOT RECORDING 00:00:05"
-    assert lamp.saved == "saved 5.0 s ago"
+    assert lamp.age == "saved 5.0 s ago"
     assert derive_view(after(status(2_000), state=state)).lamp.grade == "on"
 
 

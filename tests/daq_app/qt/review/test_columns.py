@@ -278,7 +278,7 @@ def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, w
 
 def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
     stroke = selected_row(window.state).stroke
-    window.take(m.Read(stroke.number, raw(stroke)))
+    window.take(m.Excerpt(stroke.number, raw(stroke)))
     player, view = window.stroke.player, window.stroke.stroke
     player.seek(20)
     assert len(view._recorded[0].getData()[0]) == 21
@@ -311,7 +311,7 @@ def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
 
 def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window):
     stroke = selected_row(window.state).stroke
-    window.take(m.Read(stroke.number, raw(stroke)))
+    window.take(m.Excerpt(stroke.number, raw(stroke)))
     window._follow("readings")
     table = window.stroke.readings.table
     row = table.currentIndex().row()
@@ -320,8 +320,8 @@ def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window)
 
 
 def test_a_second_session_is_shown_beside_the_first(window):
-    window.take(m.Compared("other", example()))
-    table = window.model.compared.table
+    window.take(m.OtherSession("other", example()))
+    table = window.model.comparison.table
     assert len(texts(table)) == len({(p.experiment, p.index) for p in window.state.report.predictions})
     assert {line[3] for line in texts(table)} == {"+0.000"}
     assert m.Draw("compared") in window._work.requests
@@ -329,11 +329,11 @@ def test_a_second_session_is_shown_beside_the_first(window):
 
 def test_the_comparison_follows_a_decision_that_changes_the_first_session(window):
     report = example()
-    window.take(m.Compared("other", report))
+    window.take(m.OtherSession("other", report))
     count = window._work.requests.count(m.Draw("compared"))
     predictions = tuple(replace(prediction, mu=prediction.mu + 0.1) for prediction in report.predictions)
     window.take(m.ReportReady("predicted", replace(report, predictions=predictions)))
-    assert {line[3] for line in texts(window.model.compared.table)} == {"−0.100"}
+    assert {line[3] for line in texts(window.model.comparison.table)} == {"−0.100"}
     assert window._work.requests.count(m.Draw("compared")) == count + 1
 
 
@@ -347,7 +347,7 @@ def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(windo
 
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     assert [w for w in controls(window) if not w.accessibleName().strip()] == []
     window.activateWindow()
     window.trials.list.setFocus()

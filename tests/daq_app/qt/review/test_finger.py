@@ -26,7 +26,7 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     key = selected_row(window.state).key
     window.model.history.click()
     assert window._work.requests[-1] == m.ShowHistory(key)
-    window.take(m.Filmed(key, film()))
+    window.take(m.FingerHistory(key, film()))
     player, canvas = window.model.player, window.model.finger
     assert "Step 4 of 4" in canvas.accessibleName()
     assert "kPa at small strain; mesh, model: no estimate" in canvas.accessibleName()
@@ -43,7 +43,7 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
 
 def small_finger(application, window):
     """Return the canvas with the triangle of `film`, its settled state, and where it paints a place [mm]."""
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     application.processEvents()
     canvas = window.model.finger
     canvas.sight.look_at(None)
@@ -166,7 +166,7 @@ def test_an_end_of_the_colours_is_typed_with_a_point_or_a_comma_in_every_country
 
 def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
     key = selected_row(window.state).key
-    window.take(m.Filmed(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
+    window.take(m.FingerHistory(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
     words = window.model.why.text()
     assert "is step 4: at 0.300 s" in words
     assert words.endswith("The drag wedges it.")
@@ -189,7 +189,7 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
     assert not any(isinstance(request, m.Draw) for request in window._work.requests)
     window.model.tabs.setCurrentIndex(1)
     assert [request.name for request in window._work.requests if isinstance(request, m.Draw)] == ["course"]
-    window.take(m.Drawn("course", "forces", window.grab().toImage() and b"\x89PNG"))
+    window.take(m.SessionPicture("course", "forces", window.grab().toImage() and b"\x89PNG"))
     monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: ("out/picture", ""))
     for button in window.model.picture.save.buttons:
         button.click()
@@ -200,7 +200,7 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
 
 
 def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simulated(window, monkeypatch, tmp_path):
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
     field, canvas = FIELD_CHOICES[-1], window.model.finger
     monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
@@ -228,7 +228,7 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
 
 
 def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     for _ in range(5):  # the columns have found their widths
         application.processEvents()
     ranges, show = set(), window.model._show_step
@@ -244,7 +244,7 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
 
 
 def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(window, tmp_path):
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
     assert "Saved" in window._words.accessibleName()
     width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._head()).toTuple())
@@ -259,14 +259,14 @@ def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(window, tmp_path)
 
 def test_a_film_as_mp4_without_its_encoder_is_one_sentence(window, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
     assert "daq-app[film]" in window._words.accessibleName()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_film_that_is_cancelled_leaves_no_file(window, tmp_path):
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     QTimer.singleShot(0, lambda: window.findChildren(QProgressDialog)[-1].cancel())
     window.model.write_film(tmp_path / "film.gif")
     assert "The film was cancelled" in window._words.accessibleName()
@@ -274,7 +274,7 @@ def test_a_film_that_is_cancelled_leaves_no_file(window, tmp_path):
 
 
 def test_a_film_that_fails_unexpectedly_leaves_the_state_and_the_colours_that_were_shown(window, tmp_path, monkeypatch):
-    window.take(m.Filmed(selected_row(window.state).key, film()))
+    window.take(m.FingerHistory(selected_row(window.state).key, film()))
     window.model.fields.ranges.setCurrentIndex(OWN)
     before = window.model.finger.look.range
 
@@ -293,9 +293,9 @@ def test_a_film_that_fails_unexpectedly_leaves_the_state_and_the_colours_that_we
 def two_fingers(application, window, factor=1.5):
     """Show the settled finger of the chosen trial beside one of another session with `factor` times its SED."""
     row = selected_row(window.state)
-    window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    window.take(m.TrialAnswer(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
     other = Finger(PARTS, frame(0.002 * factor), ARCS)
-    window.take(m.Compared("other", replace(example(), session="later"), {row.key: other}))
+    window.take(m.OtherSession("other", replace(example(), session="later"), {row.key: other}))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
     return window.model.finger, window.model.other
@@ -339,10 +339,10 @@ def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
 
 def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
     row = selected_row(window.state)
-    window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    window.take(m.TrialAnswer(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
     missing = row.prediction.experiment, row.prediction.index
     remaining = tuple(p for p in example().predictions if (p.experiment, p.index) != missing)
-    window.take(m.Compared("other", replace(example(), session="later", predictions=remaining)))
+    window.take(m.OtherSession("other", replace(example(), session="later", predictions=remaining)))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
     assert window.model.other.accessibleName() == "B  later has no answer to this stimulus."
