@@ -52,13 +52,13 @@ class RateWatch:
             return False
         self._points.append(self._best[1:])
         self._best, self._ends = (late, count, now), now + self._window
-        return self._judged()
+        return self._rate_changed()
 
     def begin_anew(self) -> None:
         """Forget what has come: what comes next does not go on from it."""
         self._best = None
 
-    def _judged(self) -> bool:
+    def _rate_changed(self) -> bool:
         """Compare two stretches, one after the other, with the rate believed."""
         for windows, most in (_COARSE, _FINE):
             if len(self._points) <= 2 * windows:

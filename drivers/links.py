@@ -117,10 +117,10 @@ class _Call(io.RawIOBase):
 
     def _remaining(self) -> float:
         """Return the time that remains [real s]. Raises TimeoutError, Stopped."""
-        left = self._deadline.remaining
-        if left <= 0.0:
+        remaining_s = self._deadline.remaining
+        if remaining_s <= 0.0:
             raise TimeoutError
-        return left
+        return remaining_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +156,8 @@ def _answer(reader: io.BufferedReader, where: str) -> HttpAnswer:
     status = re.match(rb"HTTP/\S*[ \t]+(\d+)(?!\S)", head)
     if status is None:
         raise no_page
-    stated = re.search(rb"\n[ \t]*content-length[ \t]*:[ \t]*(\d+)[ \t]*\r\n", head, re.IGNORECASE)
-    length = None if stated is None else int(stated[1][:12])
+    length_field = re.search(rb"\n[ \t]*content-length[ \t]*:[ \t]*(\d+)[ \t]*\r\n", head, re.IGNORECASE)
+    length = None if length_field is None else int(length_field[1][:12])
     too_long = (length or 0) > MOST_BODY
     body = b"" if too_long else reader.read(MOST_BODY + 1 if length is None else length)
     if too_long or len(body) > MOST_BODY:
@@ -180,8 +180,8 @@ def resolve(host: str, deadline: Deadline) -> str:
 
     looking = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
     looking.start()
-    while looking.is_alive() and (left := deadline.remaining) > 0.0:
-        looking.join(min(left, TICK))
+    while looking.is_alive() and (remaining_s := deadline.remaining) > 0.0:
+        looking.join(min(remaining_s, TICK))
     if not hosts:
         raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1")
     return hosts[0]

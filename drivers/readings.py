@@ -49,11 +49,11 @@ class ReadingBlock:
     @staticmethod
     def concatenate(blocks: Iterable["ReadingBlock"]) -> "ReadingBlock":
         """Return the readings of all blocks, in the order given."""
-        kept = [block for block in blocks if len(block)]
-        if not kept:
+        non_empty = [block for block in blocks if len(block)]
+        if not non_empty:
             return ReadingBlock.empty()
         names = [f.name for f in fields(ReadingBlock)]
-        return ReadingBlock(**{name: np.concatenate([getattr(block, name) for block in kept]) for name in names})
+        return ReadingBlock(**{name: np.concatenate([getattr(block, name) for block in non_empty]) for name in names})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

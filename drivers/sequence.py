@@ -25,7 +25,7 @@ Relation = Literal["same", "next", "frozen", "behind", "off"]
 class Accounting:
     """The verdict on a batch of records: k of them are kept."""
 
-    kept: NDArray[np.intp]  # (k,) their positions in the batch
+    positions: NDArray[np.intp]  # (k,) in the batch
     sequence: Indices  # (k,) their numbers, unwrapped; a missing number is a lost record
     counter: Indices  # (k,) the device's counter, unwrapped and never running backwards
     undecided: bool  # the batch's last record: put it at the head of the next batch
@@ -103,40 +103,40 @@ class SequenceAccount:
         return Accounting(np.arange(len(numbers)), sequence, counter, undecided=False)
 
     def _one_by_one(self, records: list[_Record], end: bool) -> Accounting:
-        kept: list[int] = []
+        positions: list[int] = []
         places: list[tuple[int, int]] = []
-        undecided: int | None = None
+        candidate: int | None = None
 
         def keep(position: int) -> None:
-            kept.append(position)
+            positions.append(position)
             places.append((self._sequence, self._counter))
 
         for position, record in enumerate(records):
             relation = "off" if self._last is None else self._relation(self._last, record)
             if relation == "off":
-                if undecided is None:
-                    undecided = position
+                if candidate is None:
+                    candidate = position
                     continue
-                relation = self._relation(records[undecided], record, learning=True)
+                relation = self._relation(records[candidate], record, learning=True)
                 if relation == "off":
-                    self._reject(records[undecided])
-                    undecided = position
+                    self._reject(records[candidate])
+                    candidate = position
                     continue
                 if relation in ("next", "frozen"):
-                    self._adopt(records[undecided])
-                    keep(undecided)
-                    undecided = None
+                    self._adopt(records[candidate])
+                    keep(candidate)
+                    candidate = None
                     self._learn(record)
-            elif undecided is not None:
-                self._reject(records[undecided])
-                undecided = None
+            elif candidate is not None:
+                self._reject(records[candidate])
+                candidate = None
             if self._move(record, relation):
                 keep(position)
-        if end and undecided is not None:
-            self._reject(records[undecided])
-            undecided = None
+        if end and candidate is not None:
+            self._reject(records[candidate])
+            candidate = None
         table = np.array(places, np.int64).reshape(-1, 2)
-        return Accounting(np.array(kept, np.intp), table[:, 0], table[:, 1], undecided=undecided is not None)
+        return Accounting(np.array(positions, np.intp), table[:, 0], table[:, 1], undecided=candidate is not None)
 
     def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
         """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""

@@ -72,8 +72,8 @@ class SerialLink:
                 self._port.timeout = timeout
                 self._timeout = timeout
             data = self._port.read(1)
-            while data and len(data) < _MOST and (waiting := self._port.in_waiting):  # the system shows 4 KB at a time
-                data += self._port.read(waiting)
+            while data and len(data) < _MOST and (available := self._port.in_waiting):  # at most 4 KB at a time
+                data += self._port.read(available)
             return data or None
         except (*_GONE, ValueError):  # the latter from a port that vanishes while its waiting time is set
             raise LinkLost(f"{self._where} is gone; check that its plug is in") from None

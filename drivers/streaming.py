@@ -52,11 +52,11 @@ class Conversation(Protocol):
 
 
 def measured_rate(
-    link: Link, conversation: Conversation, clock: Clock, seconds: float, deadline: Deadline, stated: float = math.nan
+    link: Link, conversation: Conversation, clock: Clock, seconds: float, deadline: Deadline, nominal: float = math.nan
 ) -> float:
     """Return how many records a second of the session's clock come [Hz], from `seconds` of streaming [real s].
 
-    Good to a few per cent. Where it is not the rate `stated`, and the last half of the time says another than all
+    Good to a few per cent. Where it is not the rate `nominal`, and the last half of the time says another than all
     before it, the computer may have been busy: the stream is watched for longer, up to the deadline. Raises LinkLost
     when hardly any records come, and what `conversation.begin` raises.
     """
@@ -76,7 +76,7 @@ def measured_rate(
                 if part.remaining <= 0.0:
                     break
             before, latest, rate = rate, rate_of_least_late(came[earlier:]), rate_of_least_late(came)
-            alike = look and (abs(rate / stated - 1.0) < _ALIKE or abs(latest / before - 1.0) < _ALIKE)
+            alike = look and (abs(rate / nominal - 1.0) < _ALIKE or abs(latest / before - 1.0) < _ALIKE)
             if alike or deadline.remaining <= 0.0:
                 break
     finally:

@@ -58,14 +58,14 @@ class ThreadedTransducer(ABC):
         """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no reading comes in time."""
         self.reset()
         patience, self._spent = deadline.CONNECTING - self._spent, 0.0
-        waiting, self.begin_by = Deadline(patience), Deadline(patience, self.stopping)
+        first_reading_by, self.begin_by = Deadline(patience), Deadline(patience, self.stopping)
         name = f"{self.info.driver} {self.info.serial}".strip()
         thread = self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         try:
             thread.start()
             while not self.has_come() and self.ended is None and thread.is_alive():
-                if waiting.remaining <= 0.0:
-                    self.ended = LinkLost(self.never_came(waiting.spent))
+                if first_reading_by.remaining <= 0.0:
+                    self.ended = LinkLost(self.never_came(first_reading_by.spent))
                 self.news.wait(deadline.TICK)
                 self.news.clear()
             self.check_first()

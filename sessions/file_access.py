@@ -26,7 +26,7 @@ MOST_PACKED = 300  # how many times a packed table may grow [-]: readings grow t
 # What opening or reading a database raises; the second where the name of a damaged table is no text.
 DATABASE_FAILURES = (sqlite3.Error, UnicodeDecodeError, OSError)
 
-_DAMAGED = "restore it from a copy"
+_RESTORE = "restore it from a copy"
 _OF_NEW = dict.fromkeys((errno.ENOENT, errno.EISDIR, errno.ENOTDIR, errno.EEXIST), "check its name") | {
     errno.EFBIG: "raise the limit of the size of files"
 }
@@ -89,7 +89,7 @@ def remedy(error: Exception, *, new: bool = False) -> str:
     """
     if isinstance(error, (sqlite3.Error, UnicodeDecodeError)):
         code: int | None = getattr(error, "sqlite_errorcode", None)  # none where Python itself found the fault
-        return _DAMAGED if code is None else _BY_SQLITE.get(code & 0xFF, _DAMAGED)  # the low byte is the kind
+        return _RESTORE if code is None else _BY_SQLITE.get(code & 0xFF, _RESTORE)  # the low byte is the kind
     number: int | None = getattr(error, "errno", None)
     if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
         number = int(match.group(1))
@@ -178,15 +178,15 @@ def whole_folder(folder: Path) -> Generator[Path]:
 
 
 @contextmanager
-def whole_or_nothing(folder: Path, taken: type[Exception]) -> Generator[None]:
+def whole_or_nothing(folder: Path, unless: type[Exception]) -> Generator[None]:
     """Remove a new folder again where what is done inside fails: all that it holds stands elsewhere too.
 
-    Where it raises `taken`, what the folder holds is another program's, and stays.
+    Where it raises `unless`, what the folder holds is another program's, and stays.
     """
     new = not holds_something(folder)
     try:
         yield
-    except taken:
+    except unless:
         raise
     except BaseException:
         if new:
@@ -284,22 +284,22 @@ def complete(document: Mapping[str, Any], form: type[T]) -> T:
 
     A name may be missing only where nothing is known under it. Raises ValueError as `as_type` does.
     """
-    typed = as_type(document, form)
-    for name in _missing(document, msgspec.to_builtins(typed)):
+    value = as_type(document, form)
+    for name in _missing_keys(document, msgspec.to_builtins(value)):
         raise ValueError(f"Object missing required field `{name}`")
-    return typed
+    return value
 
 
-def _missing(document: object, complete: object, where: str = "") -> Iterator[str]:
+def _missing_keys(document: object, complete: object, where: str = "") -> Iterator[str]:
     """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
     if isinstance(complete, list | tuple):
         for at, (part, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)):
-            yield from _missing(part, item, f"{where}[{at}]")
+            yield from _missing_keys(part, item, f"{where}[{at}]")
     elif isinstance(complete, dict):
         part = cast("Mapping[str, Any]", document)
         for name, item in cast("dict[str, Any]", complete).items():
             path = f"{where}.{name}" if where else name
             if name in part:
-                yield from _missing(part[name], item, path)
+                yield from _missing_keys(part[name], item, path)
             elif item is not None:
                 yield path

@@ -276,14 +276,14 @@ class DirectTransducer:
         numbers = np.arange(self._sent, self._due, dtype=np.int64)
         self._sent += len(numbers)
         start, stop = self._middle(self._lost_stroke)
-        kept = numbers[(numbers / _RATE < start) | (numbers / _RATE >= stop)]
-        self._lost += len(numbers) - len(kept)
-        time = kept / _RATE
+        present = numbers[(numbers / _RATE < start) | (numbers / _RATE >= stop)]
+        self._lost += len(numbers) - len(present)
+        time = present / _RATE
         start, stop = self._middle(self._frozen_stroke)
         sampled = np.where((time >= start) & (time < stop), start, time)
         counts = np.rint(self._bench.wrench(sampled) / _SCALE)
         received = self._began_ns + np.rint(time * 1e9).astype(np.int64)
-        return ReadingBlock(kept, kept, np.zeros_like(kept), time, received, counts)
+        return ReadingBlock(present, present, np.zeros_like(present), time, received, counts)
 
     @property
     def _due(self) -> int:

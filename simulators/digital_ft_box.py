@@ -62,12 +62,12 @@ class DigitalFtBox(LineBox):
 
     def _calibration(self) -> bytes:
         serial = self._bench.serial.encode()[:8]
-        stated = np.vstack([FT32831[:3], FT32831[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
+        matrix = np.vstack([FT32831[:3], FT32831[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
         ratings = np.concatenate([self._rated[:3], self._rated[3:] / 1000.0])
         names = (
             serial.ljust(8, b"\0") + b"SIMULATED SI-36-0.5".ljust(32, b"\0") + b"DIG\0" + b"2026/11/21".ljust(20, b"\0")
         )
-        numbers = struct.pack(">36f", *stated.ravel()) + bytes([2, 3]) + struct.pack(">6f", *ratings)
+        numbers = struct.pack(">36f", *matrix.ravel()) + bytes([2, 3]) + struct.pack(">6f", *ratings)
         return names + numbers + struct.pack(">ii12H", _COUNTS, _COUNTS, *_GAINS_AND_OFFSETS)
 
     def power_up(self, now: float) -> None:

@@ -60,8 +60,8 @@ class Faults:
 
     def put(self, *timetable: Fault) -> None:
         """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""
-        kept = tuple(fault for fault in self._timetable if fault.kind == "slow")
-        self._timetable = (*kept, *timetable)
+        slow = tuple(fault for fault in self._timetable if fault.kind == "slow")
+        self._timetable = (*slow, *timetable)
         self._clock = _device_clock(self._timetable, self._repeat)
 
     def active(self, kind: Kind, time: float) -> bool:
@@ -90,15 +90,16 @@ class Faults:
         """Tell of `times` (n,) [s] whether a fault of the box itself is on."""
         return np.array([self.active(kind, time) for time in times.tolist()], np.bool_)
 
-    def due(self, begun: float, now: float, rate: float, done: int, most: int = 2**31) -> tuple[Array, int]:
+    def due(self, begun: float, now: float, rate: float, previous: int, most: int = 2**31) -> tuple[Array, int]:
         """Return when (n,) [s] the next records of a stream begun at `begun` [s] were due by `now`, and their number.
 
-        `done` were sent before, and count in that number. The device's own clock gives `rate` records a second. Of
-        more than `most` at one go the first are left out: a line would have carried on while the computer was busy.
+        `previous` records were sent before, and count in that number. The device's own clock gives `rate` records a
+        second. Of more than `most` at one go the first are left out: a line would have carried on while the computer
+        was busy.
         """
         since, age = self.device_time(np.array([begun, now])).tolist()
-        total = max(int((age - since) * rate), done)
-        return self.instants(since + np.arange(max(done, total - most), total) / rate), total
+        total = max(int((age - since) * rate), previous)
+        return self.instants(since + np.arange(max(previous, total - most), total) / rate), total
 
     def sensed_wrench(self, bench: Bench, times: Array) -> Array:
         """Return the wrench (n, 6) that a drifting or wrongly calibrated device senses at `times` (n,) [s]."""

@@ -150,7 +150,7 @@ class LabJackU6Box:
     def _begin(self) -> None:
         self._streams = True
         self._begun = self.now()
-        self._done = 0  # scans converted since
+        self._scan_count = 0  # scans converted since
         self._sent = 0  # packets of this stream
         self._buffer, self._leaving, self._missed, self._report = [], [], 0, None
 
@@ -159,16 +159,16 @@ class LabJackU6Box:
         if not self._streams or self._scan is None:
             return
         gauges, _, rate = self._scan
-        times, self._done = self._faults.due(self._begun, self.now(), rate, self._done)
+        times, self._scan_count = self._faults.due(self._begun, self.now(), rate, self._scan_count)
         room = (_ROOM - len(self._buffer)) // len(gauges)
         if self._missed and self._report is None and room > _ROOM // len(gauges) // 2:
             # One scan of ones stands for those lost; the guide counts it among them.
             self._report = (len(self._buffer), self._missed)
             self._buffer += [0xFFFF] * len(gauges)
             self._missed = 0
-        kept = 0 if self._missed else min(len(times), room)
-        self._missed += len(times) - kept
-        self._buffer += self._codes(times[:kept])[:, gauges].ravel().tolist()
+        count = 0 if self._missed else min(len(times), room)
+        self._missed += len(times) - count
+        self._buffer += self._codes(times[:count])[:, gauges].ravel().tolist()
 
     def _send(self) -> None:
         """Pack what fills a packet; while some are missing packets say 59, the one that tells how many says 60."""

@@ -29,9 +29,9 @@ class _Stream:
     to: tuple[str, int]
     tick: int  # of the next record
     number: int  # of the next record
-    left: int | None  # records still to be sent; None: until stopped
+    records_to_send: int | None  # None: until stopped
     in_datagram: int  # records a datagram
-    waiting: list[bytes] = field(default_factory=list[bytes])  # records of a datagram not yet full
+    buffer: list[bytes] = field(default_factory=list[bytes])  # records of a datagram not yet full
 
 
 class NetFtBox(ServedBox):
@@ -126,19 +126,19 @@ class NetFtBox(ServedBox):
             return False
         step = self._inside.pages.step
         due = (self._inside.tick(now) - stream.tick) // step + 1
-        count = min(max(due, 0), _BURST if stream.left is None else stream.left)
-        if stream.left is not None:
-            stream.left -= count
+        count = min(max(due, 0), _BURST if stream.records_to_send is None else stream.records_to_send)
+        if stream.records_to_send is not None:
+            stream.records_to_send -= count
         datagrams: list[tuple[float, bytes]] = []
         for reading in self._inside.readings([stream.tick + step * i for i in range(count)]):
-            stream.waiting.append(struct.pack(">I", stream.number % 2**32) + reading)
-            if len(stream.waiting) == stream.in_datagram:
-                datagrams.append((self._inside.time(stream.tick), b"".join(stream.waiting)))
-                stream.waiting.clear()
+            stream.buffer.append(struct.pack(">I", stream.number % 2**32) + reading)
+            if len(stream.buffer) == stream.in_datagram:
+                datagrams.append((self._inside.time(stream.tick), b"".join(stream.buffer)))
+                stream.buffer.clear()
             stream.number += 1
             stream.tick += step
-        if stream.left == 0:
-            datagrams += [(now, b"".join(stream.waiting))] if stream.waiting else []
+        if stream.records_to_send == 0:
+            datagrams += [(now, b"".join(stream.buffer))] if stream.buffer else []
             self._stream = None
         if self.faults.active("steal", now):  # another client has it; whoever asks next takes it back
             self._stream = None
@@ -193,11 +193,11 @@ class NetFtBox(ServedBox):
         try:
             said = caller.recv(4096)
             heard += said
-            reply, done = answer(heard) if said else (b"", True)
+            reply, hang_up = answer(heard) if said else (b"", True)
             caller.sendall(reply)
         except (BlockingIOError, ConnectionError):
-            done = True
-        if done:
+            hang_up = True
+        if hang_up:
             self._selector.unregister(caller)
             caller.close()
 

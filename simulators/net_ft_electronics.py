@@ -60,7 +60,7 @@ class Pages:
         self.product = product
         self._serial = serial
         self._rated = rated  # (6,) [N, N mm]
-        self._kept = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
+        self._values = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
         self._bias = [0] * 6
         self.counting = 1.0  # times as many counts to a unit as usual
         self.force_code = 2
@@ -109,13 +109,13 @@ class Pages:
             "runft": _join(counts),
             "runsg": _join([0] * 6),
             "setbias": _join(self._bias),
-            "setuserfilter": self._kept["setuserfilter"],
-            "setpke": self._kept["setpke"],
+            "setuserfilter": self._values["setuserfilter"],
+            "setpke": self._values["setpke"],
             "setmce": 0,
             "setcfgsel": 0,
             "setrate": int(self.product.ticks),
-            "cfgid": self._kept["cfgid"],
-            "cfgnam": self._kept["cfgnam"],
+            "cfgid": self._values["cfgid"],
+            "cfgnam": self._values["cfgnam"],
             "cfgcalsel": 0,
             "cfgcalsn": self._serial,
             "cfgfu": self.force_code,
@@ -141,7 +141,7 @@ class Pages:
     def _set(self, name: str, text: str) -> None:
         """Take one value, or leave all as it is where the value makes no sense, as the box does."""
         if name in ("cfgid", "cfgnam"):
-            self._kept[name] = text
+            self._values[name] = text
             return
         if name == "comrdte":
             self.streams = text in ("1", "Enabled")
@@ -160,8 +160,8 @@ class Pages:
             self.torque_code = value
         elif name.startswith("setbias") and -32768 <= value <= 32767:
             self._bias[int(name[-1])] = value
-        elif name in self._kept and 0 <= value <= 12:
-            self._kept[name] = text
+        elif name in self._values and 0 <= value <= 12:
+            self._values[name] = text
 
     def _set_rate(self, rate: int) -> None:
         """Send every so-many-th tick, at `rate` readings a second or the next higher rate that divides the ticks."""

@@ -119,8 +119,8 @@ def _surface(entry: _StrokeEntry) -> Surface:
         return Surface(entry.mu, "scripted", 0, tau_max, entry.speed, entry.direction, entry.holds)
     surface = paper_surfaces().get((entry.descriptor or "", -1 if entry.index is None else entry.index))
     if surface is None:
-        known = ", ".join(f"{descriptor} {index}" for descriptor, index in paper_surfaces())
-        raise TimetableError(f"the stroke at {entry.at:g} s needs mu, or a descriptor and an index out of {known}")
+        surfaces = ", ".join(f"{descriptor} {index}" for descriptor, index in paper_surfaces())
+        raise TimetableError(f"the stroke at {entry.at:g} s needs mu, or a descriptor and an index out of {surfaces}")
     return surface
 
 

@@ -30,7 +30,7 @@ class PseudoTerminal:
         self._folder = Path(tempfile.mkdtemp(prefix="daq-app-"))
         self.path = str(self._folder / name)
         self._ours = self._theirs = -1
-        self._waiting = bytearray()
+        self._buffer = bytearray()
         self.plug_in()
 
     @property
@@ -70,7 +70,7 @@ class PseudoTerminal:
         os.close(self._theirs)
         os.close(self._ours)
         self._ours = self._theirs = -1
-        self._waiting.clear()
+        self._buffer.clear()
 
     def heard(self, timeout: float) -> bytes:
         """Return what the other side has sent, waiting up to `timeout` real seconds for it."""
@@ -82,7 +82,7 @@ class PseudoTerminal:
     def say(self, data: bytes) -> None:
         """Send `data`. What the other side has not read beyond ROOM bytes is lost, as on a line."""
         self._obey()
-        self._waiting += data[: max(ROOM - len(self._waiting), 0)]
+        self._buffer += data[: max(ROOM - len(self._buffer), 0)]
         self._flush()
 
     def _read(self) -> bytes:
@@ -96,7 +96,7 @@ class PseudoTerminal:
         if data[:1] == b"\0":
             return data[1:]
         if data and data[0] & termios.TIOCPKT_FLUSHREAD:
-            self._waiting.clear()
+            self._buffer.clear()
         return b""
 
     def _obey(self) -> None:
@@ -107,7 +107,7 @@ class PseudoTerminal:
     def _flush(self) -> None:
         """Pass on what the system's own few kilobytes have room for."""
         with contextlib.suppress(OSError):
-            del self._waiting[: os.write(self._ours, self._waiting)]
+            del self._buffer[: os.write(self._ours, self._buffer)]
 
     def close(self) -> None:
         """Remove the port. Harmless when repeated."""

@@ -185,9 +185,9 @@ def read(link: Link, first: int, count: int) -> bytes:
     """Return `count` registers from `first`, two bytes each. Raises LinkLost or DeviceFault."""
     read_so_far = b""
     while len(read_so_far) < 2 * count:
-        done = len(read_so_far) // 2
-        request = wire.read_registers(first + done, min(count - done, wire.MOST_REGISTERS))
-        read_so_far += _answer(link, request, f"for register {first + done}")
+        offset = len(read_so_far) // 2
+        request = wire.read_registers(first + offset, min(count - offset, wire.MOST_REGISTERS))
+        read_so_far += _answer(link, request, f"for register {first + offset}")
     return read_so_far
 
 
@@ -221,9 +221,9 @@ def _response(link: Link, request: bytes, expected: bytes, patience: float = _AN
     response = b""
     deadline = time.monotonic() + patience
     while True:
-        left = deadline - time.monotonic()
-        response += link.receive(max(left, 0.0)) or b""  # also where this computer was busy until now
-        if left <= 0.0 or (expected in response if expected else wire.answer_in(response, request) is not None):
+        remaining_s = deadline - time.monotonic()
+        response += link.receive(max(remaining_s, 0.0)) or b""  # also where this computer was busy until now
+        if remaining_s <= 0.0 or (expected in response if expected else wire.answer_in(response, request) is not None):
             return response
 
 

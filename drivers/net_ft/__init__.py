@@ -83,16 +83,16 @@ def _prepare(place: _Where, deadline: Deadline) -> TransducerInfo:
         if answer.status not in (200, 302) or not _is_rate(
             configuration := _configuration(place, deadline), place.rate
         ):
-            shown = "shows no rate at all" if math.isnan(configuration.rate) else f"stays at {configuration.rate:g} Hz"
+            state = "shows no rate at all" if math.isnan(configuration.rate) else f"stays at {configuration.rate:g} Hz"
             raise SetupError(
-                f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
+                f"{place.address.uri}: the box was asked for {place.rate} Hz but {state}; "
                 "set the rate on its Communications page"
             )
-    done = _command(place, configuration, deadline) if place.set_bias or place.reset_latch else {}
+    results = _command(place, configuration, deadline) if place.set_bias or place.reset_latch else {}
     if place.buffered:
-        done["streaming"] = "buffered"
+        results["streaming"] = "buffered"
     info = _info(place, configuration)
-    return replace(info, settings={**info.settings, **done})
+    return replace(info, settings={**info.settings, **results})
 
 
 def _command(place: _Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
@@ -105,21 +105,21 @@ def _command(place: _Where, configuration: Configuration, deadline: Deadline) ->
         raise SetupError(
             f"{place.address.uri}: the box's command port does not count as its web page says; check the tcp port"
         )
-    done: dict[str, str] = {}
+    results: dict[str, str] = {}
     if place.reset_latch:
         _wrench(place, wire.RESET_LATCH, deadline)
         still = wire.is_latched(_tcp(place, wire.READ_WRENCH, 16, deadline))
         read_back = "and latched again: its condition holds" if still else "and read back as not latched"
-        done["monitor condition latch"] = f"reset at opening, as the address asks, {read_back}"
+        results["monitor condition latch"] = f"reset at opening, as the address asks, {read_back}"
     if place.set_bias:
         _wrench(place, wire.SET_BIAS, deadline)
         time.sleep(_SETTLING)
         counts = np.array(_wrench(place, wire.READ_WRENCH, deadline)) * np.array(units.scales)
-        left = np.abs(configuration.calibration().matrix @ counts)
-        done["software bias"] = (
-            f"set at opening, as the address asks; at most {left[:3].max():.3g} N and {left[3:].max():.3g} N mm left"
+        force, torque = np.abs(configuration.calibration().matrix @ counts).reshape(2, 3).max(axis=1)
+        results["software bias"] = (
+            f"set at opening, as the address asks; at most {force:.3g} N and {torque:.3g} N mm left"
         )
-    return done
+    return results
 
 
 def _wrench(place: _Where, command: bytes, deadline: Deadline) -> tuple[int, ...]:

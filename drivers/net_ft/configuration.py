@@ -82,8 +82,8 @@ def parse_configuration(page: bytes) -> Configuration:
     )
 
 
-def true_rate(stated: float, ticks: float = COUNTER_RATE) -> float:
-    """Return the rate the box really streams at when it is set to, or shows, `stated` [Hz].
+def true_rate(nominal: float, ticks: float = COUNTER_RATE) -> float:
+    """Return the rate the box really streams at when it is set to, or shows, `nominal` [Hz].
 
     It can only send every k-th of its own readings, `ticks` a second, rounds up to such a rate, and shows it as a whole
     number.
@@ -91,7 +91,7 @@ def true_rate(stated: float, ticks: float = COUNTER_RATE) -> float:
     >>> true_rate(200), round(true_rate(150), 2), round(true_rate(152), 2)
     (200.0, 152.17, 152.17)
     """
-    return ticks / max(math.floor(ticks / stated + 1e-9), 1)
+    return ticks / max(math.floor(ticks / nominal + 1e-9), 1)
 
 
 def _elements(page: bytes) -> dict[str, list[str]]:
@@ -154,10 +154,10 @@ def _rate(text: str, ticks: float) -> float:
 
 def _ticks(text: str) -> float:
     """Return the rate of an Axia's converter [Hz], which it states as a whole number. Raises SetupError for another."""
-    known = {"488": 488.28125, "976": 976.5625, "1953": 1953.125, "3906": 3906.25, "7812": 7812.5}
-    if text not in known:
-        raise SetupError(f"the box says its converter runs at {text[:20]!r} Hz, not at one of {', '.join(known)}")
-    return known[text]
+    rates = {"488": 488.28125, "976": 976.5625, "1953": 1953.125, "3906": 3906.25, "7812": 7812.5}
+    if text not in rates:
+        raise SetupError(f"the box says its converter runs at {text[:20]!r} Hz, not at one of {', '.join(rates)}")
+    return rates[text]
 
 
 def _transform(elements: Mapping[str, list[str]]) -> str:

@@ -178,7 +178,7 @@ class NetFtTransducer(ThreadedTransducer):
         self._account = SequenceAccount(self._step, self.info.counter_rate)
         self._watch = RateWatch(self.info.counter_rate, self.clock.factor, _SILENT_TICKS * self.clock.factor)
         self._breaks = self._changes = 0  # in the device's counter, and of it or the rate, so far
-        self._undecided: list[tuple[bytes, int]] = []
+        self._held_back: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
         self._wrong_length = 0
         self._settings = _SettingsWatch(self.info, self._who, self.clock)
@@ -239,9 +239,9 @@ class NetFtTransducer(ThreadedTransducer):
 
     def digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""
-        if not self._pending and not (end and self._undecided):
+        if not self._pending and not (end and self._held_back):
             return
-        arrived = self._undecided
+        arrived = self._held_back
         while self._pending:
             arrived.append(self._pending.popleft())
         decoded = decode([datagram for datagram, _ in arrived])
@@ -251,16 +251,16 @@ class NetFtTransducer(ThreadedTransducer):
         records = decoded.records
         numbers, counters = records["number"].astype(np.uint32), records["counter"].astype(np.uint32)
         verdict = self._account.take(numbers, counters, received_ns, end=end)
-        self._undecided = [arrived[origin[-1]]] if verdict.undecided else []
-        if not len(verdict.kept):
+        self._held_back = [arrived[origin[-1]]] if verdict.undecided else []
+        if not len(verdict.positions):
             return
         if self._zero is None:
             self._zero = int(verdict.counter[0])
-        kept = records[verdict.kept]
-        status = kept["status"].astype(np.int64)
-        arrived_ns = np.array(received_ns, np.int64)[verdict.kept]
+        valid = records[verdict.positions]
+        status = valid["status"].astype(np.int64)
+        arrived_ns = np.array(received_ns, np.int64)[verdict.positions]
         self._compare_clocks(verdict.counter, arrived_ns)
-        self._compare_settings(int(arrived_ns[-1]), len(kept))
+        self._compare_settings(int(arrived_ns[-1]), len(valid))
         self.hand_over(
             ReadingBlock(
                 sequence=verdict.sequence,
@@ -268,7 +268,7 @@ class NetFtTransducer(ThreadedTransducer):
                 status=status,
                 time=(verdict.counter - self._zero) / self.info.counter_rate,
                 received_ns=arrived_ns,
-                raw=kept["counts"].astype(np.float64),
+                raw=valid["counts"].astype(np.float64),
             )
         )
 
@@ -296,7 +296,7 @@ class NetFtTransducer(ThreadedTransducer):
     def never_came(self, seconds: float) -> str:
         """Return why a start failed."""
         health = self.health
-        if senseless := health.malformed + health.repeated + health.late + len(self._undecided):
+        if senseless := health.malformed + health.repeated + health.late + len(self._held_back):
             return (
                 f"{self.info.uri} sent {senseless} records within {seconds:.1f} s of which none is a reading: of a "
                 "wrong length, or numbers that stand still; switch the box off and on, and check the rdt port"

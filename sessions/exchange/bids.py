@@ -34,7 +34,7 @@ DERIVED = (  # tables that are made of a recording, in their order
     "answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions", "responses", "alternatives",
 )  # fmt: skip
 SOURCE = "sourcedata"  # BIDS lets it hold anything
-_KNOWN = frozenset({"onset", "duration"})  # BIDS itself says what they are
+_BIDS_COLUMNS = frozenset({"onset", "duration"})  # BIDS itself says what they are
 _MARK = Column("simulated", "", "1: transducer or subject were simulated", ())
 
 
@@ -156,16 +156,16 @@ def _events(recording: Recording) -> Table:
 def _write_readings(recording: Recording, folder: Path, names: _Names, progress: Progress) -> None:
     assert recording.info is not None
     calibration = recording.info.calibration
-    described = [*columns(calibration), *([_MARK] if recording.simulated else [])]
+    table_columns = [*columns(calibration), *([_MARK] if recording.simulated else [])]
     mark = (1,) if recording.simulated else ()
     first_ns = recording.events[0].time_ns if recording.events else 0
-    expected = recording.expected_readings or 1
+    total = recording.expected_readings or 1
     several = any(part > 1 for part, _ in _stretches(recording))
-    written = 0
+    count = 0
     for part, blocks in groupby(_stretches(recording), itemgetter(0)):
         stem = f"{names.stem}{f'_recording-{part}' if several else ''}_physio"
         last: int | None = None
-        with _packed(folder / f"{stem}.tsv.gz") as file:
+        with _open_gzip(folder / f"{stem}.tsv.gz") as file:
             for _, block in blocks:
                 if last is None:
                     sidecar = {
@@ -174,17 +174,17 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                         "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
                         "PhysioType": "generic",
                         "TaskName": names.task,
-                        "Columns": [column.heading for column in described],
+                        "Columns": [column.heading for column in table_columns],
                         "Manufacturer": recording.info.driver,
                         "ManufacturersModelName": recording.info.model,
                         "DeviceSerialNumber": recording.info.serial,
-                        **{column.heading: _describe(column) for column in described},
+                        **{column.heading: _describe(column) for column in table_columns},
                     }
                     write_json(folder / f"{stem}.json", sidecar)
-                write_rows(file, _rows_with_gaps(block, last, rows(block, calibration), len(described), mark), "\t")
+                write_rows(file, _rows_with_gaps(block, last, rows(block, calibration), len(table_columns), mark), "\t")
                 last = int(block.sequence[-1])
-                written += len(block)
-                progress(min(written / expected, 1.0))
+                count += len(block)
+                progress(min(count / total, 1.0))
 
 
 def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
@@ -206,8 +206,8 @@ def _stretches(recording: Recording) -> Iterator[tuple[int, ReadingBlock]]:
         if not len(block):
             continue
         steps = np.diff(block.time, prepend=np.nan if last is None else last)
-        missing = np.diff(block.sequence, prepend=block.sequence[0] if previous is None else previous) - 1
-        breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (missing > most))]
+        gaps = np.diff(block.sequence, prepend=block.sequence[0] if previous is None else previous) - 1
+        breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (gaps > most))]
         cuts = [0, *(i for i in breaks if i), len(block)]
         for start, stop in pairwise(cuts):
             part += start in breaks
@@ -220,17 +220,17 @@ def _rows_with_gaps(
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the rows, and a row of n/a for each reading that never arrived; NaN and infinity are written as n/a too."""
     finite = bool(np.isfinite(block.raw).all())
-    expected = None if last is None else last + 1
+    next_number = None if last is None else last + 1
     for row in cells:
-        if expected is not None:
-            for _ in range(row[0] - expected):
+        if next_number is not None:
+            for _ in range(row[0] - next_number):
                 yield (MISSING,) * (width - len(mark)) + mark
         yield (row if finite else tuple(cell if math.isfinite(cell) else MISSING for cell in row)) + mark
-        expected = row[0] + 1
+        next_number = row[0] + 1
 
 
 @contextmanager
-def _packed(path: Path) -> Generator[TextIO]:
+def _open_gzip(path: Path) -> Generator[TextIO]:
     """Open a text to be packed without name and time, so that the same session gives the same bytes."""
     with (
         path.open("wb") as raw,
@@ -262,8 +262,9 @@ def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[s
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
             cells = (MISSING if cell is None or cell == "" else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
             file.write("\t".join(cells) + "\n")
-    described = {column.heading: _describe(column) for column in columns_written if column.heading not in _KNOWN}
-    sidecar = {**recording.mark, "Description": table.meaning, **(more or {}), **described}
+    ours = [column for column in columns_written if column.heading not in _BIDS_COLUMNS]
+    descriptions = {column.heading: _describe(column) for column in ours}
+    sidecar = {**recording.mark, "Description": table.meaning, **(more or {}), **descriptions}
     write_json(stem.with_name(f"{stem.name}.json"), sidecar)
 
 

@@ -64,14 +64,14 @@ def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], r
 def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, progress: Progress) -> None:
     assert recording.info is not None
     calibration = recording.info.calibration
-    expected = recording.expected_readings or 1
-    written = 0
+    total = recording.expected_readings or 1
+    count = 0
     with path.open("w", encoding="utf-8", newline="") as file:
         _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())
         for block in recording.blocks():
             _write_rows(file, mark, [], rows(block, calibration))
-            written += len(block)
-            progress(min(written / expected, 1.0))
+            count += len(block)
+            progress(min(count / total, 1.0))
 
 
 def _read_readings(path: Path) -> Iterator[ReadingBlock]:

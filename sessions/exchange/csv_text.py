@@ -163,8 +163,8 @@ def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Ite
     Rows without a sequence number, of readings that never arrived, are left out; n/a is a NaN. Raises ValueError.
     """
     places = [_place(name, names) for name in STORED]
-    arrived = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
-    while part := list(islice(arrived, _PART)):
+    present = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
+    while part := list(islice(present, _PART)):
         # usecols picks the columns in the order given, whatever their order in the file.
         table: Any = np.atleast_1d(np.loadtxt(part, _EXACT, delimiter=delimiter, usecols=places, comments=None))
         raw = np.column_stack([table[name] for name in RAW])

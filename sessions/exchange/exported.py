@@ -72,19 +72,19 @@ def head_of(description: Mapping[str, Any]) -> Head:
     )
 
 
-def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
+def restore(session: ExportedSession, folder: Path) -> tuple[str, ...]:
     """Write an exported session into a new folder, and return a sentence for each thing that is not as it was.
 
     What had been lost before the export, and what was changed after it, is written into the log and so named ever
     after. Raises RecordingError where the folder cannot be written, ValueError where the export is damaged.
     """
-    head = exported.head
+    head = session.head
     plan = as_type(head.plan, SessionPlan)
     info = info_from_dict(head.transducer) if head.transducer else None
     earlier = cast("list[Any]", head.provenance.get("restored_from", []))
     source = {
-        "format": exported.form,
-        "name": exported.path.name,
+        "format": session.form,
+        "name": session.path.name,
         "restored_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "software": software_versions(),
     }
@@ -94,28 +94,28 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
         info,
         {**head.provenance, "restored_from": [*earlier, source]},
         subject_simulated="subject" in (head.simulated or ""),
-        clock=StillClock(exported.events[-1].time_ns if exported.events else 0),
+        clock=StillClock(session.events[-1].time_ns if session.events else 0),
     )
     with closing(writer):
-        readings = RecordedReadings(exported.blocks())
-        for event in exported.events:  # in the order in which both were recorded
+        readings = RecordedReadings(session.blocks())
+        for event in session.events:  # in the order in which both were recorded
             for block in readings.blocks_up_to(event.readings):
                 writer.readings(block)
             writer.event(event.kind, event.trial, event.data, time_ns=event.time_ns, commit=False)
         for block in readings.blocks_up_to(None):
             writer.readings(block)
         writer.commit()
-        restored = Recording.open(folder)
-        problems = [sentence for sentence in head.losses if sentence not in restored.losses]
-        source_digest = digest_of(exported.blocks(), exported.events)
-        digest = digest_of(restored.blocks(), restored.events)
+        recording = Recording.open(folder)
+        problems = [sentence for sentence in head.losses if sentence not in recording.losses]
+        source_digest = digest_of(session.blocks(), session.events)
+        digest = digest_of(recording.blocks(), recording.events)
         changes = different(head.digest or source_digest, digest)
         problems += [f"since it was exported: {sentence}" for sentence in changes]
         if digest != source_digest:
             problems.append("what was written is not what the export holds")
         for sentence in problems:
             writer.event("not_restored", data={"sentence": sentence}, commit=False)
-    for name, content in exported.side_files.items():
+    for name, content in session.side_files.items():
         write_whole(folder / name, content)
     return tuple(problems)
 
@@ -172,8 +172,8 @@ def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
         raise NotEmpty(folder) from error
     except _DAMAGED as error:
         raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error
-    restored = Recording.open(folder)
-    return RestoreResult(sum(len(block) for block in restored.blocks()), len(restored.events), differences)
+    recording = Recording.open(folder)
+    return RestoreResult(sum(len(block) for block in recording.blocks()), len(recording.events), differences)
 
 
 def _remedy(error: Exception) -> str:

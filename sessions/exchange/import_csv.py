@@ -60,8 +60,8 @@ class Columns:
     @property
     def extra(self) -> tuple[str, ...]:
         """Names of the columns that are neither time nor axis."""
-        used = {self.time, *self.axes}
-        return tuple(name for position, name in enumerate(self.names) if position not in used)
+        places = {self.time, *self.axes}
+        return tuple(name for position, name in enumerate(self.names) if position not in places)
 
 
 def columns(
@@ -85,29 +85,30 @@ def columns(
             twice = f"two columns are headed {name}: give --axes, with - for the one to leave out"
             raise ColumnsUnknown(twice if axes is None else f"--axes names {name} twice")
         places[name] = position
-    missing = [axis for axis in AXES if axis not in places]
-    if missing:
+    missing_axes = [axis for axis in AXES if axis not in places]
+    if missing_axes:
         raise ColumnsUnknown(
-            f"no column for {', '.join(missing)} is named: give --axes, such as --axes t,Fx,Fy,Fz,Tx,Ty,Tz, "
+            f"no column for {', '.join(missing_axes)} is named: give --axes, such as --axes t,Fx,Fy,Fz,Tx,Ty,Tz, "
             "with - for a column that is none of these"
         )
-    headed = {axis: headings[place][1] for axis, place in places.items()} if headings else {}
-    force = _common_unit("forces", {headed.get(axis) for axis in AXES[:3]}, units[0] if units else None, FORCE_UNITS)
-    torque = _common_unit("torques", {headed.get(axis) for axis in AXES[3:]}, units[1] if units else None, TORQUE_UNITS)
-    time_unit = headed.get(TIME) or "s"
+    header_units = {axis: headings[place][1] for axis, place in places.items()} if headings else {}
+    of_force, of_torque = units or (None, None)
+    force = _common_unit("forces", {header_units.get(axis) for axis in AXES[:3]}, of_force, FORCE_UNITS)
+    torque = _common_unit("torques", {header_units.get(axis) for axis in AXES[3:]}, of_torque, TORQUE_UNITS)
+    time_unit = header_units.get(TIME) or "s"
     if time_unit not in TIME_UNITS:
         raise ColumnsUnknown(
             f'the time is in "{time_unit}", which is none of {", ".join(TIME_UNITS)}: convert the file'
         )
     stated_names = [*(axes or ()), *(f"column {i + 1}" for i in range(len(axes or ()), width))]
-    stated = units is not None or axes is not None
+    by_user = units is not None or axes is not None
     return Columns(
         tuple(stated_names if header is None else header),
         places.get(TIME),
         time_unit,
         tuple(places[axis] for axis in AXES),
         (force, torque),
-        "set" if stated else "header",
+        "set" if by_user else "header",
     )
 
 
@@ -125,20 +126,20 @@ def _heading(cell: str) -> tuple[str, str | None]:
     return axis, re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
 
 
-def _common_unit(what: str, headed: set[str | None], stated: str | None, factors: Mapping[str, float]) -> str:
+def _common_unit(what: str, header_units: set[str | None], option: str | None, factors: Mapping[str, float]) -> str:
     """Return the one unit in which the forces, or the torques, are."""
-    names = headed - {None}
+    names = header_units - {None}
     units = ", ".join(factors)
-    if len(names) > 1 or (names and None in headed and stated is None):
+    if len(names) > 1 or (names and None in header_units and option is None):
         raise ColumnsUnknown(f"the header does not name one unit for all {what}: make the file's columns agree")
     (headed_unit,) = names or (None,)
-    unit = headed_unit or stated
+    unit = headed_unit or option
     if unit is None:
         raise ColumnsUnknown(f"nothing says in which unit the {what} are: give --units, such as --units N,Nmm")
     if unit not in factors:
         raise ColumnsUnknown(f'the {what} are in "{unit}", which is none of {units}')
-    if stated is not None and stated != unit:
-        raise ColumnsUnknown(f"the header has the {what} in {unit}, but --units says {stated}: give one of the two up")
+    if option is not None and option != unit:
+        raise ColumnsUnknown(f"the header has the {what} in {unit}, but --units says {option}: give one of the two up")
     return unit
 
 
@@ -196,10 +197,10 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
 
     Raises ImportRefused for the file, SettingsError for an option against it, RecordingError for an unwritable folder.
     """
-    stated = options or ImportOptions()
+    options = options or ImportOptions()
     content = content_of(path)
-    layout, rows, lines = _table(path, content, stated)
-    time, rate, rate_origin = _times(path, layout, rows, lines, stated)
+    layout, rows, lines = _table(path, content, options)
+    time, rate, rate_origin = _times(path, layout, rows, lines, options)
     if rate > FASTEST:
         raise ImportRefused(
             f"{path}: its times hold {rate:.3g} readings a second, more than any device gives ({FASTEST:.0f}); name "
@@ -223,16 +224,16 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         "first_time_s": float(rows[0, layout.time]) * TIME_UNITS[layout.time_unit] if layout.time is not None else None,
     }
     frame = Frame(
-        stated.normal or Frame().normal,
-        _origin(stated.normal),
-        stated.height if stated.height is not None else Frame().height,
-        _origin(stated.height),
+        options.normal or Frame().normal,
+        _origin(options.normal),
+        options.height if options.height is not None else Frame().height,
+        _origin(options.height),
     )
     writer = SessionWriter.create(
         folder,
-        SessionPlan("import", stated.subject, 0, "none", (), forces=True, frame=frame),
-        _info(path, layout, rate, rate_origin, stated, simulated=_says_simulated(content, layout.names)),
-        {**provenance(clock, _settings(layout, frame, rate, rate_origin, stated)), "imported": source},
+        SessionPlan("import", options.subject, 0, "none", (), forces=True, frame=frame),
+        _info(path, layout, rate, rate_origin, options, simulated=_says_simulated(content, layout.names)),
+        {**provenance(clock, _settings(layout, frame, rate, rate_origin, options)), "imported": source},
         clock=clock,
     )
     write_whole(folder / ORIGINAL_FILE, content)
@@ -244,7 +245,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     return ImportResult(folder, len(block), rate, _defaults(frame), layout.extra)
 
 
-def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, Array, list[int]]:
+def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns, Array, list[int]]:
     """Return the columns, the numbers (n, columns; nan in extra ones) and the line each row stands on."""
     rest = records(path, content)
     first = next(rest, None)
@@ -253,29 +254,30 @@ def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, 
     line, cells = first
     header = None if all(number_in(cell) is not None for cell in cells) else [cell.strip() for cell in cells]
     try:
-        layout = columns(header, stated.axes, stated.units, len(cells))
+        layout = columns(header, options.axes, options.units, len(cells))
     except ColumnsUnknown as unknown:
         raise SettingsError(f"{path}, line {line}: {unknown}") from unknown
     body = rest if header is not None else itertools.chain([first], rest)
-    used = {position: layout.names[position] for position in (*layout.axes, layout.time) if position is not None}
+    places = (*layout.axes, layout.time)
+    column_names = {place: layout.names[place] for place in places if place is not None}
     rows: list[list[float]] = []
     lines: list[int] = []
     for number, record in body:
-        rows.append(_row(path, number, record, len(cells), used))
+        rows.append(_row(path, number, record, len(cells), column_names))
         lines.append(number)
     if len(rows) < _FEWEST:
         raise ImportRefused(f"{path} holds {len(rows)} readings: give a file with at least {_FEWEST}")
     return layout, np.array(rows), lines
 
 
-def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int, str]) -> list[float]:
+def _row(path: Path, line: int, cells: Sequence[str], width: int, column_names: dict[int, str]) -> list[float]:
     """Return a row's numbers; nan in columns that are not used."""
     if len(cells) != width:
         raise ImportRefused(
             f"{path}, line {line} has {len(cells)} columns and not {width}: complete the row, or remove it"
         )
     row = [math.nan] * width
-    for position, name in used.items():
+    for position, name in column_names.items():
         value = number_in(cells[position])
         if value is None or not abs(value) <= GREATEST:
             cell = cell_text(cells[position])
@@ -286,13 +288,13 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int
 
 
 def _times(
-    path: Path, layout: Columns, rows: Array, lines: list[int], stated: ImportOptions
+    path: Path, layout: Columns, rows: Array, lines: list[int], options: ImportOptions
 ) -> tuple[Array, float, Origin]:
     """Return times (n,) [s] from 0 on, the rate [Hz], and where that is from."""
     if layout.time is None:
-        if stated.rate is None:
+        if options.rate is None:
             raise SettingsError(f"{path} has no column of times: give --rate, the readings a second")
-        return np.arange(len(rows)) / stated.rate, stated.rate, "set"
+        return np.arange(len(rows)) / options.rate, options.rate, "set"
     time = rows[:, layout.time] * TIME_UNITS[layout.time_unit]
     steps = np.diff(time)
     if (steps <= 0.0).any():
@@ -302,16 +304,16 @@ def _times(
             f"{path}, line {lines[wrong]}: the time {how} that of the row before; mend or remove the row"
         )
     rate = 1.0 / float(np.median(steps))
-    if stated.rate is not None:
+    if options.rate is not None:
         if float(np.ptp(np.percentile(steps, [2, 98]))) * rate > UNEVEN:
             raise SettingsError(
-                f"{path}: --rate {stated.rate:g} is refused, for the file's time steps are uneven "
+                f"{path}: --rate {options.rate:g} is refused, for the file's time steps are uneven "
                 f"({1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms); leave --rate out and its times are taken as "
                 "they are"
             )
-        if abs(stated.rate / rate - 1.0) > RATE_TOLERANCE:
+        if abs(options.rate / rate - 1.0) > RATE_TOLERANCE:
             raise SettingsError(
-                f"{path}: --rate {stated.rate:g} is refused, for the file's times hold {rate:.4g} readings a second; "
+                f"{path}: --rate {options.rate:g} is refused, for the file's times hold {rate:.4g} readings a second; "
                 "leave --rate out, or name the columns with --axes so that its times are not used"
             )
     return time - time[0], rate, "measured"
@@ -330,7 +332,7 @@ def _block(time: Array, raw: Array) -> ReadingBlock:
 
 
 def _info(
-    path: Path, layout: Columns, rate: float, rate_origin: Origin, stated: ImportOptions, *, simulated: bool
+    path: Path, layout: Columns, rate: float, rate_origin: Origin, options: ImportOptions, *, simulated: bool
 ) -> TransducerInfo:
     calibration = Calibration(
         serial="unknown",
@@ -340,7 +342,7 @@ def _info(
         source=f"none: the file holds a wrench, forces in {layout.units[0]} and torques in {layout.units[1]}",
     )
     settings = {"rate": "from the file's times" if rate_origin == "measured" else "stated, the file has no times"}
-    if stated.zeroed:
+    if options.zeroed:
         settings[ZERO_SETTING] = ZERO_STATED
     return TransducerInfo(
         uri=f"import:{path.name}",
@@ -355,7 +357,7 @@ def _info(
     )
 
 
-def _settings(layout: Columns, frame: Frame, rate: float, rate_origin: Origin, stated: ImportOptions) -> list[Setting]:
+def _settings(layout: Columns, frame: Frame, rate: float, rate_origin: Origin, options: ImportOptions) -> list[Setting]:
     units: Origin = "measured" if layout.units_from == "header" else "set"
     return [
         Setting("force unit", layout.units[0], "", units),
@@ -363,16 +365,16 @@ def _settings(layout: Columns, frame: Frame, rate: float, rate_origin: Origin, s
         Setting("normal", frame.normal, "", frame.normal_origin),
         Setting("height", frame.height, "mm", frame.height_origin),
         Setting("rate", rate, "Hz", rate_origin),
-        Setting("zero as recorded is true", stated.zeroed, "", "set" if stated.zeroed else "default"),
+        Setting("zero as recorded is true", options.zeroed, "", "set" if options.zeroed else "default"),
     ]
 
 
-def _origin(stated: object) -> Origin:
-    return "default" if stated is None else "set"
+def _origin(option: object) -> Origin:
+    return "default" if option is None else "set"
 
 
 def _defaults(frame: Frame) -> tuple[str, ...]:
     normal = f"the normal force is taken along {frame.normal} (default; --normal states another)"
     height = f"the face's height is taken as {frame.height:g} mm (default; --height states another)"
-    stated = ((frame.normal_origin, normal), (frame.height_origin, height))
-    return tuple(sentence for origin, sentence in stated if origin == "default")
+    assumptions = ((frame.normal_origin, normal), (frame.height_origin, height))
+    return tuple(sentence for origin, sentence in assumptions if origin == "default")

@@ -128,13 +128,13 @@ def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: st
         comments=f"Unit: {calibration.raw_unit}. wrench = matrix (raw - bias), matrix in the notes of this file.",
     )
     file.add_acquisition(raw)
-    shared = clock if "rate" in clock else {"timestamps": raw}
+    timing = clock if "rate" in clock else {"timestamps": raw}
     for name, axes, unit in (("forces", slice(0, 3), "newtons"), ("torques", slice(3, 6), "N mm")):
         what = f"{mark}{name.capitalize()} of the finger on the stimulus (x y z), nothing subtracted."
-        file.add_acquisition(TimeSeries(name=name, data=wrench[:, axes], unit=unit, description=what, **shared))
+        file.add_acquisition(TimeSeries(name=name, data=wrench[:, axes], unit=unit, description=what, **timing))
     for name, unit, what in _WHOLE:
         data = getattr(block, name)
-        file.add_acquisition(TimeSeries(name=name, data=data, unit=unit, description=f"{mark}{what}", **shared))
+        file.add_acquisition(TimeSeries(name=name, data=data, unit=unit, description=f"{mark}{what}", **timing))
 
 
 def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:

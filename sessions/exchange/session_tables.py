@@ -25,11 +25,11 @@ from sessions.toml_file import from_table, toml_text
 Cell = str | int | float | None
 Columns = Mapping[str, tuple[str, str]]  # by name: unit ("" for none) and meaning
 WRENCH = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
-_LISTED: Mapping[str, Any] = tomllib.loads((Path(__file__).parent / "columns.toml").read_text("utf-8"))
+_COLUMNS: Mapping[str, Any] = tomllib.loads((Path(__file__).parent / "columns.toml").read_text("utf-8"))
 
 
 def _columns_of(name: str) -> Columns:
-    return {column: (unit, meaning) for column, (unit, meaning) in _LISTED[name].items()}
+    return {column: (unit, meaning) for column, (unit, meaning) in _COLUMNS[name].items()}
 
 
 def _prediction_cells(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
@@ -56,7 +56,7 @@ def _prediction_cells(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> 
 
 def _columns(record: type, name: str) -> dict[str, tuple[str, str]]:
     """Return the meanings that the fields of a record have, and further columns behind some of them."""
-    further: Mapping[str, Mapping[str, list[str]]] = _LISTED["further"].get(name, {})
+    further: Mapping[str, Mapping[str, list[str]]] = _COLUMNS["further"].get(name, {})
     columns: dict[str, tuple[str, str]] = {}
     for field, (unit, meaning) in meanings(record).items():
         columns[field] = unit, meaning
@@ -80,7 +80,7 @@ ALTERNATIVE = {
 _PREDICTION = _columns(TrialPrediction, "prediction")
 FLAW, DECISION, _ANSWER, POSITION, RESPONSE = map(_columns_of, ("flaw", "decision", "answer", "position", "response"))
 
-_NESTED = ("solver", "alternatives", "interval", "opposite_interval")
+_SUBTABLES = ("solver", "alternatives", "interval", "opposite_interval")
 _OF_INTERVALS = (
     *("mu", "tau_max", "sed", "opposite_sed", "normal_force", "tangential_force", "indentation", "matching_depth"),
     "mu_dynamic",
@@ -147,7 +147,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     """Return every table of a session but those of events and readings; predictions only where they were stored."""
     analysis = source.analysis
     flaws = [{"flaw": row["name"], **{k: v for k, v in row.items() if k != "name"}} for row in analysis["flaws"]]
-    measured = (
+    of_session = (
         trials(source.recording),
         answers(source.recording),
         positions(source.recording),
@@ -159,15 +159,15 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     )
     if analysis.get("decisions"):
         decisions = _table("decisions", "what people decided, in force", analysis["decisions"], DECISION)
-        measured = (*measured, decisions)
-    return measured if source.prediction is None else (*measured, *_predictions(source.prediction))
+        of_session = (*of_session, decisions)
+    return of_session if source.prediction is None else (*of_session, *_predictions(source.prediction))
 
 
 def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
     """Yield the predictions, the quantities at the ending, and the same trials predicted otherwise, where these are."""
     rows = [
         {
-            **{name: cell for name, cell in row.items() if name not in _NESTED},
+            **{name: cell for name, cell in row.items() if name not in _SUBTABLES},
             **_sed_interval("sed", row.get("interval")),
             **_sed_interval("opposite_sed", row.get("opposite_interval")),
             **_force_intervals(row.get("interval")),
@@ -200,8 +200,8 @@ def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
     """Return the table of every quantity at the ending, where the prediction holds them: older ones do not."""
     rows: list[dict[str, Any]] = []
     for row in prediction["trials"]:
-        solved: Mapping[str, Any] = row.get("solver") or {"responses": {}}
-        responses: Mapping[str, Mapping[str, Any]] = solved.get("responses", {})
+        solver_row: Mapping[str, Any] = row.get("solver") or {"responses": {}}
+        responses: Mapping[str, Mapping[str, Any]] = solver_row.get("responses", {})
         rows += [{"trial": row["trial"], "quantity": name, **response} for name, response in responses.items()]
     meaning = "every quantity at the ending for each predicted trial"
     return (_table("responses", meaning, rows, RESPONSE),) if rows else ()
@@ -348,8 +348,8 @@ def _table(
     names.update(dict.fromkeys(name for row in flat for name in row))
     columns: list[Column] = []
     for column in names:
-        known = meanings.get(column) or meanings.get(column.rsplit("_", 1)[0])
-        unit, what = known or ("", "see docs/session-format.md")
+        description = meanings.get(column) or meanings.get(column.rsplit("_", 1)[0])
+        unit, what = description or ("", "see docs/session-format.md")
         columns.append(Column(column, unit, what, tuple(row.get(column) for row in flat)))
     if flat:  # what is in no row of this session is left out
         columns = [one for one in columns if one.name in flat[0] or any(v is not None for v in one.values)]

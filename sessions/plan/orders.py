@@ -90,9 +90,9 @@ def pairs_with(
     `shuffle` puts into the first half for "name/first/k", and the second has the others first. Pairs come in the order
     `shuffle` gives for `name` in repetition 1, and for "name#repetition" after it.
     """
-    leading = shuffle(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
+    leaders = shuffle(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
     order = shuffle(items, seed, name if repetition == 1 else f"{name}#{repetition}")
-    return tuple((item, standard) if (item in leading) == (repetition % 2 == 1) else (standard, item) for item in order)
+    return tuple((item, standard) if (item in leaders) == (repetition % 2 == 1) else (standard, item) for item in order)
 
 
 def opaque_codes(count: int, seed: int) -> tuple[str, ...]:
@@ -130,8 +130,8 @@ def next_comparison(candidates: Sequence[Stimulus], answers: Sequence[tuple[Stim
     """Return which of the candidates is compared next, from answers: what was compared, and whether it was chosen."""
     chance = _chances(tuple(one.known_index for one in candidates))
     belief = np.zeros(chance.shape[0])
-    for compared, choice in answers:
-        p = chance[:, candidates.index(compared)]
+    for comparison, choice in answers:
+        p = chance[:, candidates.index(comparison)]
         belief += np.log(p if choice else 1.0 - p)
     weight = np.exp(belief - belief.max())
     return candidates[int(np.argmin(np.round(_expected_entropy(weight / weight.sum(), chance) / _SAME)))]
@@ -148,8 +148,8 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
     stimulus = next_comparison(block.candidates, answers)
 
     def choose(trial: Trial) -> Trial:
-        compared = trial.number in (number, number + 1) and not trial.standard
-        return replace(trial, stimulus=stimulus) if compared else trial
+        in_pair = trial.number in (number, number + 1) and not trial.standard
+        return replace(trial, stimulus=stimulus) if in_pair else trial
 
     return plan.with_trials(choose)
 

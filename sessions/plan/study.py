@@ -58,9 +58,9 @@ class Key:
         return {stimulus: code for code, stimulus in self.stimuli.items()}
 
     @staticmethod
-    def unseal(sealed: str) -> "Key":
+    def unseal(text: str) -> "Key":
         """Return the key that `seal` gave the text for. Raises ValueError where it is none."""
-        return Key.from_dict(json.loads(base64.b64decode(sealed, validate=True)))
+        return Key.from_dict(json.loads(base64.b64decode(text, validate=True)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -232,7 +232,7 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
     values = (str(_VERSION), protocol_text, str(seed), "" if key is None else key.sha256)
     head: dict[str, str] = dict(zip(_HEAD, values, strict=True))
     try:
-        with _changing(folder) as connection:
+        with _transaction(folder) as connection:
             for table in _TABLES:
                 connection.execute(table)
             head["crc32"] = str(_check_sum(*head.values()))
@@ -292,8 +292,8 @@ def note(folder: Path, kind: str, data: Mapping[str, Any]) -> Study:
 
 def study_key(folder: Path) -> Key | None:
     """Return the key of a blinded study, for the program alone; None where it is not blinded. Raises StudyError."""
-    expected = open_study(folder).key_sha256
-    if expected is None:
+    sha256 = open_study(folder).key_sha256
+    if sha256 is None:
         return None
     path = folder / KEY_FILE
     with name_failure(StudyError, f"{path} cannot be read"):
@@ -302,7 +302,7 @@ def study_key(folder: Path) -> Key | None:
         key = Key.unseal(json_object(content)["sealed"])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StudyError(f"{path} cannot be read ({error}); restore it from a copy") from error
-    if key.sha256 != expected:
+    if key.sha256 != sha256:
         raise StudyError(f"{path} is not the key that was sealed: its SHA-256 differs; restore it from a copy")
     return key
 
@@ -316,7 +316,7 @@ def _new_key(protocol: Protocol) -> Key:
 def _add_event(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
     """Add the event that `choose` makes of the study as it stands, while nobody else can change it."""
     open_study(folder)  # says what is wrong where it is none
-    with _changing(folder) as connection:
+    with _transaction(folder) as connection:
         kind, data = choose(_study(connection, folder))
         _tell(connection, kind, subject, data)
         return _study(connection, folder)
@@ -377,7 +377,7 @@ def _reading(folder: Path) -> Generator[sqlite3.Connection]:
 
 
 @contextmanager
-def _changing(folder: Path) -> Generator[sqlite3.Connection]:
+def _transaction(folder: Path) -> Generator[sqlite3.Connection]:
     """Lend a connection in a transaction of its own, which is kept as a whole or not at all."""
     path = folder / STUDY_FILE
     with (

@@ -20,7 +20,7 @@ from solver.quantities import NAMES, QUANTITIES, SED
 
 _STEP = 1e-3  # [s]
 ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"
-_SHOWN = 10  # every so many steps the rate is kept
+_THINNING = 10  # every so many steps the rate is kept
 
 
 _EDIN_2004 = "Edin 2004, J. Neurophysiol. 92:3233"
@@ -87,8 +87,8 @@ class Firing:
             "settled_rate_interval": self.settled_interval,
             "peak_rate": float(self.rate.max()),
             "peak_rate_interval": self.peak_interval,
-            "time": self.time[::_SHOWN].tolist(),
-            "rate": self.rate[::_SHOWN].tolist(),
+            "time": self.time[::_THINNING].tolist(),
+            "rate": self.rate[::_THINNING].tolist(),
             "spikes": self.spikes.tolist(),
         }
 
@@ -101,12 +101,12 @@ def firing_rate(time: Array, size: Array, reference: float, settings: AfferentSe
     grid = np.arange(float(time[0]), float(time[-1]) + _STEP / 2, _STEP)
     x = _drive(np.interp(grid, time, size), reference, settings)
     rise = np.diff(x, prepend=x[0]) / _STEP
-    kept = float(np.exp(-_STEP / settings.adaptation_time))
-    adapted = np.zeros_like(x)
+    decay = float(np.exp(-_STEP / settings.adaptation_time))
+    adaptation = np.zeros_like(x)
     for i in range(1, len(x)):
-        adapted[i] = kept * adapted[i - 1] + (1.0 - kept) * (x[i] + x[i - 1]) / 2.0
+        adaptation[i] = decay * adaptation[i - 1] + (1.0 - decay) * (x[i] + x[i - 1]) / 2.0
     rate = settings.background + settings.static_gain * x + settings.dynamic_gain * np.maximum(rise, 0.0)
-    return grid, np.clip(rate - settings.adaptation_gain * adapted, 0.0, settings.greatest_rate)
+    return grid, np.clip(rate - settings.adaptation_gain * adaptation, 0.0, settings.greatest_rate)
 
 
 def _drive(size: Array, reference: float, settings: AfferentSettings) -> Array:
@@ -120,15 +120,15 @@ def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: A
 
     Its shape is 1 / variation^2, so that a steady rate gives intervals of that coefficient of variation.
     """
-    passed = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(time))])
+    integral = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(time))])
     shape = settings.variation**-2
-    thresholds = np.cumsum(draw.gamma(shape, 1.0 / shape, size=int(2 * passed[-1]) + 20))
-    spikes = np.interp(thresholds[thresholds < passed[-1]], passed, time)
-    kept: list[float] = []
+    thresholds = np.cumsum(draw.gamma(shape, 1.0 / shape, size=int(2 * integral[-1]) + 20))
+    spikes = np.interp(thresholds[thresholds < integral[-1]], integral, time)
+    times: list[float] = []
     for spike in spikes.tolist():
-        if not kept or spike - kept[-1] >= settings.refractory:
-            kept.append(spike)
-    return np.array(kept)
+        if not times or spike - times[-1] >= settings.refractory:
+            times.append(spike)
+    return np.array(times)
 
 
 def session_firing(
@@ -138,30 +138,32 @@ def session_firing(
 
     Where tissues relax, courses are known of the SED alone: another quantity makes no firing there.
     """
-    chosen = settings or AfferentSettings()
-    sizes = [abs(value) for row in prediction.trials if (value := _settled_response(row, chosen.quantity)) is not None]
+    settings = settings or AfferentSettings()
+    values = (_settled_response(row, settings.quantity) for row in prediction.trials)
+    sizes = [abs(value) for value in values if value is not None]
     if not sizes:
         return None, ()
     reference = float(np.median(sizes))
     firings: list[Firing] = []
     for number, row in enumerate(prediction.trials):
-        value = _settled_response(row, chosen.quantity)
+        value = _settled_response(row, settings.quantity)
         if row.history is None or value is None:
             continue
-        course = np.abs(row.history.responses[:, NAMES.index(chosen.quantity)])
+        course = np.abs(row.history.responses[:, NAMES.index(settings.quantity)])
         if not np.isfinite(course).all():
             continue
-        time, rate = firing_rate(row.history.time, course, reference, chosen)
-        spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
-        peak = settled = None
-        friction = row.interval if chosen.quantity == SED.name else None  # which the SED alone has an interval of
+        time, rate = firing_rate(row.history.time, course, reference, settings)
+        spikes = spike_times(time, rate, np.random.default_rng([settings.seed, number]), settings)
+        peak = settled_ends = None
+        friction = row.interval if settings.quantity == SED.name else None  # which the SED alone has an interval of
         if friction is not None and friction.low is not None and friction.high is not None:
             ends = friction.low, friction.high
             # The whole course moves with its end: friction is what is uncertain, and presses nothing.
-            peaks = [firing_rate(row.history.time, end / value * course, reference, chosen)[1] for end in ends]
+            peaks = [firing_rate(row.history.time, end / value * course, reference, settings)[1] for end in ends]
             peak = float(peaks[0].max()), float(peaks[1].max())
-            settled = _settled_rate(ends[0], reference, chosen), _settled_rate(ends[1], reference, chosen)
-        firings.append(Firing(row.trial, time, rate, _settled_rate(value, reference, chosen), spikes, peak, settled))
+            settled_ends = _settled_rate(ends[0], reference, settings), _settled_rate(ends[1], reference, settings)
+        level = _settled_rate(value, reference, settings)
+        firings.append(Firing(row.trial, time, rate, level, spikes, peak, settled_ends))
     return reference, tuple(firings)
 
 
@@ -174,8 +176,8 @@ def _settled_response(row: TrialPrediction, quantity: str) -> float | None:
 
 def _settled_rate(value: float, reference: float, settings: AfferentSettings) -> float:
     x = float(_drive(np.array(abs(value)), reference, settings))
-    settled = settings.background + (settings.static_gain - settings.adaptation_gain) * x
-    return float(np.clip(settled, 0.0, settings.greatest_rate))
+    rate = settings.background + (settings.static_gain - settings.adaptation_gain) * x
+    return float(np.clip(rate, 0.0, settings.greatest_rate))
 
 
 def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -> dict[str, Any]:
@@ -205,9 +207,9 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
         rows.append({**of_reference, "standing": "assumed", "basis": basis})
     for name, (unit, basis) in PARAMETERS.items():
         value: float = getattr(settings, name)
-        standing = "assumed" if value == getattr(usual, name) and name != "seed" else "set"
+        origin = "assumed" if value == getattr(usual, name) and name != "seed" else "set"
         rests = f"{_THRESHOLDS[quantity.name][1]}; {basis}" if name == "threshold" else basis
-        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": standing, "basis": rests})
+        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": origin, "basis": rests})
     return rows
 
 

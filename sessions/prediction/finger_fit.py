@@ -140,11 +140,11 @@ class Likelihood:
         mean, misfit, residual, jacobian = self._linear(spline, touch)
         damping = np.full(len(contrast), 1e-3)
         for _ in range(_ROUNDS):  # Levenberg and Marquardt, all contrasts at once
-            moved = touch + _steps(jacobian, residual, damping)[:, 1:]
-            spread = self._linear(spline, moved)
+            new_touch = touch + _steps(jacobian, residual, damping)[:, 1:]
+            spread = self._linear(spline, new_touch)
             better = spread[1] < misfit
             gain = float(np.max(np.where(better, misfit - spread[1], 0.0) / (misfit + self.floor)))
-            for old, new in zip((touch, mean, misfit, residual, jacobian), (moved, *spread), strict=True):
+            for old, new in zip((touch, mean, misfit, residual, jacobian), (new_touch, *spread), strict=True):
                 old[better] = new[better]
             damping = np.where(better, damping / 5.0, damping * 5.0)
             if gain < SETTLED:
@@ -206,9 +206,9 @@ class Likelihood:
         )
         step = np.concatenate([np.full(len(one.mean), one.step) for one in grids])
         log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
-        left = CHI_SQUARED - 2.0 * (fits.max() - fits)  # of the likelihood's fall, for the mean beside its best
-        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(left, 0.0) / self.free))
-        half = np.where(left >= 0.0, wide, -np.inf)
+        slack = CHI_SQUARED - 2.0 * (fits.max() - fits)  # of the likelihood's fall, for the mean beside its best
+        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(slack, 0.0) / self.free))
+        half = np.where(slack >= 0.0, wide, -np.inf)
         ends = [int((log - half).argmin()), int((log + half).argmax())]
         rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
         low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])
@@ -227,18 +227,18 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
     likely = [first, last, _closer(likelihood, first, "likelihood")]
     at, touch, mean = likelihood.maximum(last)
     rng = np.random.default_rng(seed)
-    chosen = rng.choice(len(last.weight), _DRAWS, p=last.weight)
+    rows = rng.choice(len(last.weight), _DRAWS, p=last.weight)
     scale = np.sqrt((last.misfit + likelihood.floor) / likelihood.free * last.variance)
-    means = last.mean[chosen] + scale[chosen] * rng.standard_t(likelihood.free, _DRAWS)
+    means = last.mean[rows] + scale[rows] * rng.standard_t(likelihood.free, _DRAWS)
     means += gain_error * rng.standard_normal(_DRAWS)
     best = model.stiffnesses(np.array([mean]), at[None])[0]
-    draws = model.stiffnesses(means, last.contrast[chosen])
+    draws = model.stiffnesses(means, last.contrast[rows])
     depth = likelihood.displacement - touch[likelihood.which]
-    used = (model.depth >= depth.min()) & (model.depth <= depth.max())
-    used[np.argmin(np.abs(model.depth - np.median(depth)))] = True
-    relative = (model.log_force(np.vstack([at, last.contrast])) - model.log_force(np.zeros((1, 2))))[:, used]
+    inside = (model.depth >= depth.min()) & (model.depth <= depth.max())
+    inside[np.argmin(np.abs(model.depth - np.median(depth)))] = True
+    relative = (model.log_force(np.vstack([at, last.contrast])) - model.log_force(np.zeros((1, 2))))[:, inside]
     ratio = relative.mean(axis=1)
-    low, high = np.exp(np.quantile(means + ratio[1:][chosen], QUANTILES))
+    low, high = np.exp(np.quantile(means + ratio[1:][rows], QUANTILES))
     return FingerFit(
         scene=model.finger(best),
         layers=tuple(_layer(likelihood, likely, number, best, draws) for number in range(len(LAYERS))),
@@ -290,11 +290,11 @@ def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
         nodes = grid.contrast[carry]
         centre = np.average(nodes, axis=0, weights=weight[carry])
         spread = (nodes - centre).T @ ((nodes - centre) * weight[carry, None]) / weight[carry].sum()
-        turned = np.linalg.eigh(spread)[1].T
-        along = (nodes - centre) @ turned.T
+        axes = np.linalg.eigh(spread)[1].T
+        along = (nodes - centre) @ axes.T
         low, high = along.min(axis=0) - grid.step, along.max(axis=0) + grid.step
-        middle, half = (low + high) / 2.0 @ turned, (high - low) / 2.0
-        grid = likelihood.grid(*_nodes(centre + middle, half[:, None] * turned), grid.touch[int(weight.argmax())])
+        middle, half = (low + high) / 2.0 @ axes, (high - low) / 2.0
+        grid = likelihood.grid(*_nodes(centre + middle, half[:, None] * axes), grid.touch[int(weight.argmax())])
     return grid
 
 

@@ -76,15 +76,15 @@ def finger_in(path: Path) -> tuple[Scene, str]:
     text = text_of(path)
     scene = from_toml(text, Scene, str(path), instead=_OF_TRIALS)
     document = tomllib.loads(text)
-    ignored = [f"[{name}]" for name in _OF_TRIALS if name in document]
-    ignored += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
+    keys = [f"[{name}]" for name in _OF_TRIALS if name in document]
+    keys += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
     of_others = ("title", *_OF_TRIALS, *(f"solve.{name}" for name in _OF_OPTIONS))
     if all(name.startswith(of_others) for name, _ in leaves(document)):
         raise SettingsError(f"{path} tells nothing of a finger; give it [finger] or [materials], or name no file")
-    if not ignored:
+    if not keys:
         return scene, ""
-    are = "is" if len(ignored) == 1 else "are"
+    are = "is" if len(keys) == 1 else "are"
     return scene, (
-        f"{path}: {', '.join(ignored)} {are} not taken: each trial brings its own friction and loading, and strain "
+        f"{path}: {', '.join(keys)} {are} not taken: each trial brings its own friction and loading, and strain "
         "and course are options of the verb"
     )

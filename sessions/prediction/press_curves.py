@@ -43,9 +43,9 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
     """Return the loading part of each press without a slide, in trials of every phase."""
     if recording.info is None:
         return PressCurves((), (), (), ("No forces were recorded.",))
-    taken = [record for record in recording.trials if record.take]
+    records = [record for record in recording.trials if record.take]
     parts = (
-        [(record.trial, recording.readings(record.trial.number)) for record in taken]
+        [(record.trial, recording.readings(record.trial.number)) for record in records]
         if recording.plan.blocks
         else [(None, recording.readings())]
     )
@@ -92,14 +92,14 @@ def _loading(stroke: Stroke, when: Array, log: DisplacementLog) -> LoadingCurve 
     travel = np.interp(curve.time[loading], when, displacement)
     force = curve.normal[loading]
     # A stage that stands while the finger relaxes adds nothing but time: it ends where it has arrived.
-    arrived = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
-    travel, force = travel[:arrived], force[:arrived]
+    end = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
+    travel, force = travel[:end], force[:end]
     if travel[-1] - travel[0] < LEAST_TRAVEL:
         return (
             f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
             "mm is no press: displacement must be positive into the finger, on the session's clock"
         )
-    lengths = np.interp(curve.time[loading][:arrived], when, width)  # nan beside every row that has none
+    lengths = np.interp(curve.time[loading][:end], when, width)  # nan beside every row that has none
     return LoadingCurve.of(travel, force, lengths)
 
 
@@ -109,13 +109,13 @@ def _hold(stroke: Stroke, when: Array, displacement: Array) -> HoldCurve | None:
     assert curve is not None
     assert stroke.onset is not None
     finite = np.isfinite(when)
-    followed = (curve.time >= stroke.onset) & (curve.time <= when[finite][-1]) & np.isfinite(curve.normal)
-    time, force = curve.time[followed], curve.normal[followed]
+    inside = (curve.time >= stroke.onset) & (curve.time <= when[finite][-1]) & np.isfinite(curve.normal)
+    time, force = curve.time[inside], curve.normal[inside]
     travel = np.interp(time, when[finite], displacement[finite])
-    standing = np.flatnonzero(travel >= travel.max() - STANDS * np.ptp(travel))
-    if time[standing[-1]] - time[standing[0]] < SHORTEST_HOLD:
+    plateau = np.flatnonzero(travel >= travel.max() - STANDS * np.ptp(travel))
+    if time[plateau[-1]] - time[plateau[0]] < SHORTEST_HOLD:
         return None
-    upto = slice(0, int(standing[-1]) + 1)
+    upto = slice(0, int(plateau[-1]) + 1)
     return HoldCurve(time[upto], travel[upto], force[upto])
 
 

@@ -28,7 +28,7 @@ DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives nobody has: 15
 DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 2 to 13 % over contrasts and depths
 RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
 DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
-CHECKED = 4  # depths at which a fitted finger is solved
+CHECK_DEPTHS = 4  # depths at which a fitted finger is solved
 SHALLOWEST = 0.05  # of the deepest: a contact of few elements is not worth more
 _TOLERANCE = 0.0005  # of the SED: forces are off by 0.04 %; at 0.1 % intervals of a simulated finger hold it too rarely
 
@@ -111,8 +111,8 @@ def press_model(
         errors += [one.normal_force_error or 0.0 for one in presses]
         wide += np.array([one.contact_width_error or 0.0 for one in presses]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
-    known = np.vstack([force, slope[:, 0], slope[:, 1]])
-    coefficients = np.linalg.lstsq(basis, known, rcond=None)[0]
+    targets = np.vstack([force, slope[:, 0], slope[:, 1]])
+    coefficients = np.linalg.lstsq(basis, targets, rcond=None)[0]
     residual = basis[: len(contrast)] @ coefficients - force
     if mu:
         more = np.empty((len(sticking), DEPTHS))
@@ -142,7 +142,7 @@ def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
     """Solve presses to a depth [mm] with layers of a `stiffness` (3,) [MPa] and compare forces. Raises FitError."""
     finger = model.finger(stiffness)
     mean, contrast = model.place(stiffness)
-    upto = np.flatnonzero(model.depth <= deepest)[-CHECKED:]
+    upto = np.flatnonzero(model.depth <= deepest)[-CHECK_DEPTHS:]
     depth = model.depth[upto]
     fitted = model.log_force(contrast[None])[0, upto] + mean
     free = _solve_presses(finger, depth, 0.0)
@@ -171,9 +171,9 @@ def _solve_presses(finger: Scene, depth: Array, mu: float) -> Sequence[Predictio
     """Return presses with friction; without it those of a slide, which are the same states."""
     slide: Slide = "none" if mu else "+x"
     loads = [Loading(float(one), slide) for one in depth]
-    solving = Solve(tolerance=_TOLERANCE, evidence="quick")
+    solve_settings = Solve(tolerance=_TOLERANCE, evidence="quick")
     try:
-        scenes = [replace(finger, friction=Friction(mu), loading=one, solve=solving) for one in loads]
+        scenes = [replace(finger, friction=Friction(mu), loading=one, solve=solve_settings) for one in loads]
     except SceneError as unfit:
         raise FitError(f"The presses do not fit this finger: {unfit}") from unfit
     states = [one for one in settled_predictions(scenes) if one is not None]

@@ -21,7 +21,7 @@ from sessions.prediction.press_model import LAYERS, FitError, PressModel
 from solver import Relaxation, Scene
 
 BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they hang together for about that [s]
-TRIED = 60  # of each number at once, between bounds that are drawn closer ...
+GRID_SIZE = 60  # of each number at once, between bounds that are drawn closer ...
 _ROUNDS = 5  # ... so many times at most, until ...
 _FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
 TURNS, _AGREED = 8, 0.003  # of finger and relaxation at most, and the change of the part that ends them [-]
@@ -50,10 +50,10 @@ class HoldCurve(NamedTuple):
         out[0] = after = self.force[0]
         for at in range(1, len(out)):
             by = float(self.time[at] - self.time[at - 1]) / tau
-            kept, grown = np.exp(-by), -np.expm1(-by) / by
-            rest = self.force[at] - part * (kept * after - grown * out[at - 1])
-            out[at] = rest / (1.0 - part + part * grown)
-            after = kept * after + grown * (out[at] - out[at - 1])
+            decay, growth = np.exp(-by), -np.expm1(-by) / by
+            rest = self.force[at] - part * (decay * after - growth * out[at - 1])
+            out[at] = rest / (1.0 - part + part * growth)
+            after = decay * after + growth * (out[at] - out[at - 1])
         return self._replace(force=out)
 
 
@@ -98,8 +98,8 @@ def relaxing_fit(
         calm: list[LoadingCurve] = []
         for one, hold in zip(presses, holds, strict=True):
             force = hold.at_once(rate.part.value, rate.time.value).force[: one.readings]
-            binned = LoadingCurve.of(hold.displacement[: one.readings], force, np.zeros(one.readings))
-            calm.append(one._replace(force=binned.force))
+            curve = LoadingCurve.of(hold.displacement[: one.readings], force, np.zeros(one.readings))
+            calm.append(one._replace(force=curve.force))
         finger_fit = fit(model, calm, gain_error, seed)
         rate = relaxation(model, finger_fit, holds)
         if abs(rate.part.value - before) < _AGREED:
@@ -123,8 +123,8 @@ def relaxation(model: PressModel, finger_fit: FingerFit, presses: Sequence[HoldC
     bounds, rounds = limits, 0
     while True:
         rounds += 1
-        parts: Array = np.linspace(*bounds[0], TRIED)
-        times = np.geomspace(*bounds[1], TRIED)
+        parts: Array = np.linspace(*bounds[0], GRID_SIZE)
+        times = np.geomspace(*bounds[1], GRID_SIZE)
         log, at_once = _posterior(presses, elastic, parts, times, model.error)
         weight = np.exp(log - log.max())
         marginal: tuple[Array, Array] = (weight.sum(axis=1), weight.sum(axis=0))
@@ -153,7 +153,7 @@ def _posterior(
     count = 0
     for one, calm in zip(presses, elastic, strict=True):
         block = np.floor((one.time - one.time[0]) / BLOCK).astype(np.int64)
-        force, base, after = (_means(block, part) for part in (one.force, calm, _fading(one.time, calm, times)))
+        force, base, after = (_means(block, part) for part in (one.force, calm, _decay(one.time, calm, times)))
         shape = base[:, None, None] + parts[:, None] * (after - base[:, None])[:, None, :]  # (n, g, t)
         square = (shape**2).sum(axis=0)
         factor = np.einsum("n,ngt->gt", force, shape) / square
@@ -167,7 +167,7 @@ def _posterior(
     return -(free * np.log(misfit) + spread) / 2.0, np.exp(size)
 
 
-def _fading(time: Array, elastic: Array, times: Array) -> Array:
+def _decay(time: Array, elastic: Array, times: Array) -> Array:
     """Return h (n, t) for an elastic force (n,) linear between instants, exactly (Taylor, Pister and Goudreau 1970)."""
     out = np.zeros((len(time), len(times)))
     out[0] = elastic[0]

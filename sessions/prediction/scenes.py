@@ -41,8 +41,8 @@ class ModelInput:
 
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
     """Return the scene of each trial that `predict` would solve, by the trial's number."""
-    prepared = model_inputs(analysis, plan, with_own_finger(options, plan))
-    return {one.row.trial: one.scene for one in prepared if one.scene is not None and one.row.trial is not None}
+    inputs = model_inputs(analysis, plan, with_own_finger(options, plan))
+    return {one.row.trial: one.scene for one in inputs if one.scene is not None and one.row.trial is not None}
 
 
 def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Iterator[ModelInput]:
@@ -78,7 +78,7 @@ def _model_input(
     direction = friction.direction if friction is not None else None
     if direction is None and trial is not None:
         direction = trial.direction
-    planned = None if block is None else block.indentation
+    planned_depth = None if block is None else block.indentation
     row = TrialPrediction(
         trial=None if trial is None else trial.number,
         stroke=number,
@@ -87,20 +87,20 @@ def _model_input(
         mu=None if friction is None else friction.mu,
         mu_rule="" if friction is None else friction.rule,
         tau_max=None if friction is None else bound(friction.tau_max, options),
-        indentation=planned if options.indentation is None else options.indentation,
+        indentation=planned_depth if options.indentation is None else options.indentation,
         direction=direction,
         speed=None if friction is None else friction.speed,
         measured_normal=None if stroke is None else stroke.normal_force,
         measured_tangential=None if stroke is None else stroke.tangential_force,
     )
-    why = _missing(row, stroke)
+    why = _why_missing(row, stroke)
     if why is not None:
         names = ("sed", "normal_force", "tangential_force", "matching_depth", "opposite_sed")
         return ModelInput(replace(row, reasons=dict.fromkeys(names, why)), None)
     return ModelInput(row, _scene(row, options))
 
 
-def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
+def _why_missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
     """Return why there is nothing to solve; None where all is there."""
     if stroke is None:
         return "No stroke was found in this trial."
@@ -173,7 +173,7 @@ def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
 
 def part_of(progress: Progress | None, low: float, high: float) -> Progress | None:
     """Return what reports the part done of a piece of work that reaches from `low` to `high` of the whole."""
-    return None if progress is None else lambda done: progress(low + (high - low) * done)
+    return None if progress is None else lambda part: progress(low + (high - low) * part)
 
 
 def settled_predictions(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
@@ -271,23 +271,23 @@ def predict(
     first. `watch` takes each row as soon as it is known, at finite strain once all are. Raises SceneError where the
     options make no scene, Cancelled where `progress` says so.
     """
-    chosen = with_own_finger(options or PredictionOptions(), plan)
-    prepared, width = list(model_inputs(analysis, plan, chosen)), template(chosen).finger.width
-    rows = [one.row for one in prepared]
+    options = with_own_finger(options or PredictionOptions(), plan)
+    inputs, width = list(model_inputs(analysis, plan, options)), template(options).finger.width
+    rows = [one.row for one in inputs]
     report: Watch = watch or (lambda _number, _row, _way: None)
-    for number, one in enumerate(prepared):
+    for number, one in enumerate(inputs):
         if one.scene is None:
             report(number, one.row, None)
-    order = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
-    scenes = [scene for n in order if (scene := prepared[n].scene) is not None]
-    small = chosen.kinematics == "small"  # a depth is matched on its finger, which finite strain would put elsewhere
-    measured = [prepared[n].row.measured_normal if small else None for n in order]
-    depths = _depths(scenes, [None if f is None else f / s.finger.width for f, s in zip(measured, scenes, strict=True)])
+    order = sorted((n for n, one in enumerate(inputs) if one.scene is not None), key=lambda n: (n != first, n))
+    scenes = [scene for n in order if (scene := inputs[n].scene) is not None]
+    small = options.kinematics == "small"  # a depth is matched on its finger, which finite strain would put elsewhere
+    forces = [inputs[n].row.measured_normal if small else None for n in order]
+    depths = _depths(scenes, [None if f is None else f / s.finger.width for f, s in zip(forces, scenes, strict=True)])
     ways: dict[int, Way] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
 
     def fill_row(at: int) -> TrialPrediction:
-        return _fill_row(prepared[order[at]], answers[2 * at], answers[2 * at + 1], depths[at])
+        return _fill_row(inputs[order[at]], answers[2 * at], answers[2 * at + 1], depths[at])
 
     def take_answer(
         number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
@@ -310,7 +310,7 @@ def predict(
         trials=tuple(rows),
         width=width,
         width_origin="assumed" if width == Finger().width else "set",
-        options=chosen,
+        options=options,
         decisions=analysis.decisions,
         area=analysis.settings.area,
         gain_error=analysis.settings.gain_error,
@@ -320,16 +320,16 @@ def predict(
 
 def _depths(scenes: Sequence[Scene], forces: Sequence[float | None]) -> list[float | None]:
     """Return for each scene the depth at which it bears its force [N/mm], or None where it has none."""
-    wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
-    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
-    return [None if force is None else next(matched) for force in forces]
+    targets = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
+    depths = iter(matching_depths([scene for scene, _ in targets], [force for _, force in targets]))
+    return [None if force is None else next(depths) for force in forces]
 
 
 def _fill_row(
-    prepared: ModelInput, answer: Prediction | SolveFailure, back: Prediction | SolveFailure, depth: float | None
+    model_input: ModelInput, answer: Prediction | SolveFailure, back: Prediction | SolveFailure, depth: float | None
 ) -> TrialPrediction:
     """Return the row with the solver's numbers, and with the reason for each one that is missing."""
-    row, scene = prepared.row, prepared.scene
+    row, scene = model_input.row, model_input.scene
     assert scene is not None  # the caller solved it
     reasons: dict[str, str] = {}
     if depth is None:

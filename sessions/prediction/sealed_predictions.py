@@ -53,7 +53,7 @@ def digest(numbers: Sequence[Mapping[str, Any]]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]) -> str:
+def sealed_sentence(recording: Recording, current: Sequence[Mapping[str, Any]]) -> str:
     """Return whether the predictions that a report shows (`SEAL_NUMBERS` of each) were sealed, when and how blind.
 
     A seal that cannot be read proves nothing, and stands in the way of nothing else.
@@ -69,30 +69,30 @@ def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."
     when = f"sealed on {seal.get('sealed_utc')} (SHA-256 {sha256[:16]}…)"
-    now = [{name: row[name] for name in SEAL_NUMBERS} for row in predicted]
+    now = [{name: row[name] for name in SEAL_NUMBERS} for row in current]
     same = _same(numbers, now)
-    shown = "the predictions shown are those" if same else "the predictions shown here are others, made since"
-    return f"Predictions were {when} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {shown}."
+    comparison = "the predictions shown are those" if same else "the predictions shown here are others, made since"
+    return f"Predictions were {when} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {comparison}."
 
 
 def _how_blind(recording: Recording, *, blinded: bool) -> str:
     if not blinded:
         return "when nothing hid which score belongs to which stimulus"
-    opened = load_derived(recording.folder, UNBLINDING)
-    if opened is None:
+    unblinding = load_derived(recording.folder, UNBLINDING)
+    if unblinding is None:
         return "while the key of the stimuli was sealed, as it still is"
     content = (recording.folder / SEAL).read_bytes()
-    before: Any = opened.get("made_before")
+    before: Any = unblinding.get("made_before")
     if not isinstance(before, dict) or cast("dict[str, Any]", before).get(SEAL) != hashlib.sha256(content).hexdigest():
         return "but the record of unblinding does not hold this seal: it was made or changed after the key was opened"
-    return f"while the key of the stimuli was sealed; it was opened on {opened.get('unblinded_utc')}"
+    return f"while the key of the stimuli was sealed; it was opened on {unblinding.get('unblinded_utc')}"
 
 
-def _same(sealed: Sequence[Any], shown: Sequence[Mapping[str, Any]]) -> bool:
-    if len(sealed) != len(shown):
+def _same(original: Sequence[Any], current: Sequence[Mapping[str, Any]]) -> bool:
+    if len(original) != len(current):
         return False
     return all(
-        _alike(then.get(name), now[name]) for then, now in zip(sealed, shown, strict=True) for name in SEAL_NUMBERS
+        _alike(then.get(name), now[name]) for then, now in zip(original, current, strict=True) for name in SEAL_NUMBERS
     )
 
 

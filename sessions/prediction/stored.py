@@ -117,7 +117,7 @@ _OPTIONAL = ("interval", "opposite_interval")  # of a row as plain data: absent 
 _PARTS = ("stimulus", *_OPTIONAL)
 
 # Options as they were called until 2026-11-26, and what they are called now. Documents hold both names for one release.
-_RENAMED = {"beside": "variants", "beside_intervals": "variant_intervals"}
+_PRESENT_NAMES = {"beside": "variants", "beside_intervals": "variant_intervals"}
 ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
 
 
@@ -271,18 +271,18 @@ class _Document(msgspec.Struct):
 
 
 def _with_former_names(options: Mapping[str, Any]) -> dict[str, Any]:
-    return {**options, **{former: options[name] for former, name in _RENAMED.items()}}
+    return {**options, **{former: options[name] for former, name in _PRESENT_NAMES.items()}}
 
 
 def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a prediction with each of its options called as it is now, and by that name alone."""
     parts = {name: document.get(name) for name in ("options", "options_origin")}
-    renamed = {
-        name: {_RENAMED.get(key, key): value for key, value in cast("dict[str, Any]", part).items()}
+    names = {
+        name: {_PRESENT_NAMES.get(key, key): value for key, value in cast("dict[str, Any]", part).items()}
         for name, part in parts.items()
         if isinstance(part, dict)
     }
-    return {**document, **renamed}
+    return {**document, **names}
 
 
 def check_prediction(document: Mapping[str, Any]) -> None:
@@ -317,17 +317,18 @@ _AUDITS = {  # 0 is perfect, but for the volume
 
 def model_facts(prediction: SessionPrediction | None) -> tuple[tuple[str, str, str], ...]:
     """Return name, value and remark of each thing that the model holds; audits are the worst over all trials."""
-    solved = [] if prediction is None else [row.prediction for row in prediction.trials if row.prediction is not None]
-    if prediction is None or not solved:
+    rows = () if prediction is None else prediction.trials
+    predictions = [row.prediction for row in rows if row.prediction is not None]
+    if prediction is None or not predictions:
         return ()
-    first = solved[0]
+    first = predictions[0]
     facts = [(name, str(value), "") for name, value in first.model.items() if name != "left_out"]
     facts += [(name, _values(asdict(getattr(first.scene, name))), units) for name, units in _SCENE.items()]
     facts.append(("finger's width", f"{prediction.width:g} mm", prediction.width_origin))
     facts.append(("τ max", _READINGS[prediction.options.tau_reading], ""))
     facts.append((UNKNOWNS, f"{first.dofs} displacements", "one mesh for all trials"))
     audits = "; ".join(
-        f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in solved]):.2g}"
+        f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in predictions]):.2g}"
         for name in first.audits
     )
     return (*facts, ("audits", audits, "the worst over all trials; 0 is perfect, 1 for the volume ratio"))

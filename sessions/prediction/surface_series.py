@@ -86,19 +86,19 @@ def _scene(finger: Scene, surface: Surface, press: Press) -> Scene:
         loading = replace(loading, indentation=None, normal_force=press.force)
     else:
         loading = replace(loading, indentation=press.depth * loading.depth)
-    settled = replace(finger.solve, course="steady")
-    return replace(finger, friction=of_surface.friction, loading=loading, solve=settled)
+    steady = replace(finger.solve, course="steady")
+    return replace(finger, friction=of_surface.friction, loading=loading, solve=steady)
 
 
 def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
     """Return the slopes of responses (n, q) over the surfaces of a series."""
-    known = np.isfinite(responses).all(axis=1)
-    count = int(known.sum())
+    finite = np.isfinite(responses).all(axis=1)
+    count = int(finite.sum())
     none = np.full(responses.shape[1], np.nan)
     if count < _LEAST:
         return Slopes(count, none, none)
-    values = responses[known]
-    mu, index = (np.array(column)[known] for column in zip(*((s.mu, float(s.index)) for s in series), strict=True))
+    values = responses[finite]
+    mu, index = (np.array(column)[finite] for column in zip(*((s.mu, float(s.index)) for s in series), strict=True))
     slope = (mu - mu.mean()) @ (values - values.mean(axis=0)) / np.sum((mu - mu.mean()) ** 2)
     change = slope * np.ptp(mu) / np.abs(values).mean(axis=0)
     return Slopes(count, np.corrcoef(index, values, rowvar=False)[0, 1:], change)
@@ -139,11 +139,11 @@ def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generato
     normal = np.array(design.force) * np.exp(_PRESS * draw.standard_normal(shape))
     tau = mu * normal / AREA
     base = scene(STICKINESS[0])
-    settled = replace(base.solve, course="steady")
-    pressed = [replace(base.loading, indentation=d) for d in np.tile(np.repeat(design.depths, len(design.mu)), people)]
+    steady = replace(base.solve, course="steady")
+    loadings = [replace(base.loading, indentation=d) for d in np.tile(np.repeat(design.depths, len(design.mu)), people)]
     scenes = [
-        replace(base, friction=Friction(m, t), loading=loading, solve=settled)
-        for m, t, loading in zip(mu.flat, tau.flat, pressed, strict=True)
+        replace(base, friction=Friction(m, t), loading=loading, solve=steady)
+        for m, t, loading in zip(mu.flat, tau.flat, loadings, strict=True)
     ]
     responses = rough_responses(scenes)[:, :, 0].reshape(*shape, len(NAMES))
     speed = np.array(design.speed) * np.exp(_STROKE * draw.standard_normal(shape))

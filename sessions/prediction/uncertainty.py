@@ -43,7 +43,7 @@ from sessions.strokes.bootstrap import FrictionDraws, friction_draws
 from solver import Prediction, Scene
 from solver.response.nearby import Nearby
 
-Drawn = FrictionDraws | str  # what the friction of a trial may have been, or why that is not known
+DrawsOrReason = FrictionDraws | str  # what the friction of a trial may have been, or why that is not known
 
 _SAMPLES = 60  # draws that are solved where derivatives do not suffice
 MISS = 0.05  # part of the interval's width by which derivatives may miss a draw that is solved [-]
@@ -61,11 +61,11 @@ def with_intervals(
     if not prediction.options.intervals:
         return prediction
     rows = prediction.trials
-    drawn = draws_of(analysis, prediction)
+    draws = draws_of(analysis, prediction)
     column: list[Prediction | str] = [row.prediction or _why(row, "sed") for row in rows]
     if both_ways:
         column += [row.opposite or _why(row, "opposite_sed") for row in rows]
-    intervals = intervals_of(column, [*drawn, *drawn][: len(column)], tau_scale(prediction.options), progress)
+    intervals = intervals_of(column, [*draws, *draws][: len(column)], tau_scale(prediction.options), progress)
     back = intervals[len(rows) :] or [None] * len(rows)
     trials = tuple(
         replace(row, interval=one, opposite_interval=other)
@@ -74,12 +74,12 @@ def with_intervals(
     return replace(prediction, trials=trials)
 
 
-def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[Drawn]:
+def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[DrawsOrReason]:
     """Return for each trial what its friction may have been in each repeat, or why that is not known."""
     return [_draws(analysis, row) for row in prediction.trials]
 
 
-def _draws(analysis: Analysis, row: TrialPrediction) -> Drawn:
+def _draws(analysis: Analysis, row: TrialPrediction) -> DrawsOrReason:
     if row.stroke is None or row.mu is None or row.tau_max is None:
         return _why(row, "sed")
     rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
@@ -92,7 +92,10 @@ def _why(row: TrialPrediction, name: str) -> str:
 
 
 def intervals_of(
-    column: Sequence[Prediction | str], drawn: Sequence[Drawn], scale: float, progress: Progress | None = None
+    column: Sequence[Prediction | str],
+    draws_by_trial: Sequence[DrawsOrReason],
+    scale: float,
+    progress: Progress | None = None,
 ) -> list[SedInterval]:
     """Return the interval of each settled SED of a column, or what stands there why there is none.
 
@@ -103,14 +106,14 @@ def intervals_of(
         SedInterval(None, None, None, reason=answer)
         if isinstance(answer, str)
         else _interval(answer, next(taken_up), draws, scale)
-        for answer, draws in zip(column, drawn, strict=True)
+        for answer, draws in zip(column, draws_by_trial, strict=True)
     ]
 
 
-def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale: float) -> SedInterval:
+def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrReason, scale: float) -> SedInterval:
     if slide is None:
         return SedInterval(None, None, None, reason="the state found depends on the way to it")
-    loads = _loads(prediction.scene, drawn, scale)
+    loads = _loads(prediction.scene, friction, scale)
     if isinstance(loads, str):
         return SedInterval(None, None, None, reason=loads)
     names, draws, means = loads
@@ -119,8 +122,8 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
     def along(number: str, value: float) -> Array:
         return value + (draws - means) @ [by[number][name] for name in names]
 
-    carried = along("sed", prediction.sed_ending)
-    low, high = _ends(carried)
+    linear = along("sed", prediction.sed_ending)
+    low, high = _ends(linear)
     sed = by["sed"]
     slopes = sed["mu"], sed["tau_max"], sed["force"] if "force" in names else None
     whole = SedInterval(
@@ -138,16 +141,17 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
         seds = slide.seds([prediction.scene, *scenes])[:, 0]
         return prediction.sed_ending + (seds[1:] - seds[0])
 
-    tried = _extremes(carried, draws)
-    missed = np.abs(solve_draws(tried) - carried[tried])  # nan, and so no less, where one has no settled state
-    if bool((missed <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
+    extremes = _extremes(linear, draws)
+    errors = np.abs(solve_draws(extremes) - linear[extremes])  # nan, and so no less, where one has no settled state
+    if bool((errors <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
         return whole
     # Each stands for an equal share of all: the middle one, by what the derivatives carry.
-    middles = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES * len(carried)).astype(np.int64)
-    some = solve_draws(np.argsort(carried, kind="stable")[middles])
-    lost = int(np.isnan(some).sum())
-    if lost:
-        reason = f"{lost} of {_SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
+    middles = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES * len(linear)).astype(np.int64)
+    some = solve_draws(np.argsort(linear, kind="stable")[middles])
+    failures = int(np.isnan(some).sum())
+    if failures:
+        what = "draws of the friction have no settled state, or lie too near the limit to tell"
+        reason = f"{failures} of {_SAMPLES} {what}"
         return replace(whole, low=None, high=None, method="sampling", reason=reason)
     low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
     return replace(whole, low=low, high=high, method="sampling")
@@ -158,22 +162,22 @@ def _ends(draws: Array) -> Ends:
     return low, high
 
 
-def _loads(scene: Scene, drawn: Drawn, scale: float) -> tuple[tuple[str, ...], Array, Array] | str:
+def _loads(scene: Scene, friction: DrawsOrReason, scale: float) -> tuple[tuple[str, ...], Array, Array] | str:
     """Return the names of the loads that were drawn (p,), the draws (repeats, p) and what each is in the scene (p,)."""
-    if isinstance(drawn, str):
-        return drawn
-    names, columns = ["mu", "tau_max"], [np.maximum(drawn.mu, 0.0), drawn.tau_max * scale]
+    if isinstance(friction, str):
+        return friction
+    names, columns = ["mu", "tau_max"], [np.maximum(friction.mu, 0.0), friction.tau_max * scale]
     means = [scene.friction.mu, scene.friction.tau_max or 0.0]
     if scene.loading.normal_force is not None:
-        if drawn.normal_force is None:
+        if friction.normal_force is None:
             return "the stroke is too short for an interval of its normal force"
         names.append("force")
-        columns.append(drawn.normal_force)
+        columns.append(friction.normal_force)
         means.append(scene.loading.normal_force)
     return tuple(names), np.stack(columns, axis=1), np.array(means)
 
 
-def _extremes(carried: Array, draws: Array) -> Indices:
+def _extremes(linear: Array, draws: Array) -> Indices:
     """Return the draws at both ends of the interval carried, and of each direction in which draws (repeats, p) spread.
 
     The directions are the principal components of the draws, each load by its own spread: where loads hang together,
@@ -186,7 +190,7 @@ def _extremes(carried: Array, draws: Array) -> Indices:
     units = (draws - draws.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
     axes = np.linalg.svd(units, full_matrices=False)[2]
     ranks = [round(end * (len(draws) - 1)) for end in _QUANTILES]
-    return np.unique([np.argsort(way, kind="stable")[ranks] for way in (carried, *(units @ axes.T).T)])
+    return np.unique([np.argsort(way, kind="stable")[ranks] for way in (linear, *(units @ axes.T).T)])
 
 
 def with_alternatives(
@@ -199,10 +203,10 @@ def with_alternatives(
     Raises Cancelled where `progress`, called with the part done, returns False.
     """
     kinds, options = tuple(variants(prediction.options.variants)), prediction.options
-    drawn = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None
+    draws = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None
 
-    def draws_for(variant: Variant) -> Sequence[Drawn] | None:
-        return drawn if variant.kinematics == "small" or options.variant_intervals else None
+    def draws_for(variant: Variant) -> Sequence[DrawsOrReason] | None:
+        return draws if variant.kinematics == "small" or options.variant_intervals else None
 
     count = len(kinds)
     along = [
@@ -236,20 +240,20 @@ def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPredic
 
 
 def _along(
-    prediction: SessionPrediction, variant: Variant, drawn: Sequence[Drawn] | None, progress: Progress | None
+    prediction: SessionPrediction, variant: Variant, draws: Sequence[DrawsOrReason] | None, progress: Progress | None
 ) -> tuple[Alternative, ...]:
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
-    known = _answers_of_prediction(prediction, variant)
-    answers = known or _solve_variant(prediction, variant, part_of(progress, 0.0, 0.8))
+    trial_answers = _answers_of_prediction(prediction, variant)
+    answers = trial_answers or _solve_variant(prediction, variant, part_of(progress, 0.0, 0.8))
     out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, answers, strict=True)]
-    if drawn is not None:
+    if draws is not None:
         before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
-        if known is not None and None not in before:  # they are those of the trials themselves
+        if trial_answers is not None and None not in before:  # they are those of the trials themselves
             intervals: Sequence[SedInterval | None] = before
         else:
             scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
-            intervals = intervals_of([one for _, one in answers], drawn, scale, part_of(progress, 0.8, 1.0))
+            intervals = intervals_of([one for _, one in answers], draws, scale, part_of(progress, 0.8, 1.0))
         out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
     return tuple(out)
 

@@ -83,8 +83,8 @@ def _contradictions(recording: Recording) -> Iterator[str]:
     except (OSError, ValueError) as error:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
-    expected = json.loads(json.dumps(description(recording)))
-    for place, then, _ in unlike(stored, expected, ""):
+    current = json.loads(json.dumps(description(recording)))
+    for place, then, _ in unlike(stored, current, ""):
         if then is not ABSENT:  # else an older version did not tell it
             yield f"{place.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"
 

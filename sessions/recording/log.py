@@ -35,7 +35,7 @@ class Take:
     start_ns: int  # session clock [ns]
     stop_ns: int | None  # None when the recording ended in the middle of it
     strokes: int  # contacts the live detector saw, or strokes the experimenter reported, in it
-    discarded: str | None  # why it does not count; None for the take that counts or is still open
+    discard_reason: str | None  # why it does not count; None for the take that counts or is still open
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,32 +77,32 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
     answers: dict[int, Any] = {}  # by take
     outcome: Outcome = "open"
     in_hand: int = 0  # number of a take
-    kept: int | None = None
+    valid_take: int | None = None
     for event in events:
         number = event.data.get("take")
         match event.kind:
             case "take_started":
                 in_hand = event.data["take"]
                 takes[in_hand] = Take(in_hand, event.time_ns, None, 0, None)
-                outcome, kept = "open", None
+                outcome, valid_take = "open", None
             case "contact_onset" | "stroke_done" if takes:
                 takes[in_hand] = replace(takes[in_hand], strokes=takes[in_hand].strokes + 1)
-            case "scored" | "number_given" | "chosen" if event.kind == _ANSWERED.get(trial.answer):
+            case "scored" | "number_given" | "chosen" if event.kind == _ANSWER_KINDS.get(trial.answer):
                 answers[in_hand] = event.data[ANSWERS[event.kind]]
             case "take_kept" if number in takes:
                 takes[number] = _end_take(takes[number], event, None)
-                outcome, kept = _outcome(trial, answers.get(number)), number
+                outcome, valid_take = _outcome(trial, answers.get(number)), number
             case "take_discarded" if number in takes:
                 takes[number] = _end_take(takes[number], event, event.data["reason"])
-                outcome, kept = ("skipped" if outcome == "skipped" else "open"), None
+                outcome, valid_take = ("skipped" if outcome == "skipped" else "open"), None
             case "take_restored" if number in takes:
                 in_hand = number
-                takes[number] = replace(takes[number], discarded=None)
+                takes[number] = replace(takes[number], discard_reason=None)
             case "skip" | "left_out":
                 outcome = "skipped"
             case _:
                 pass
-    counts = takes[kept] if kept is not None else None
+    counts = takes[valid_take] if valid_take is not None else None
     other_takes = tuple(take for take in takes.values() if take is not counts)
     answer = answers.get(in_hand)
     return TrialRecord(
@@ -117,13 +117,13 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
 
 
 ANSWERS = {"scored": "score", "number_given": "number", "chosen": "choice"}
-_ANSWERED: Mapping[Answer, str] = {"line": "scored", "number": "number_given", "choice": "chosen"}
+_ANSWER_KINDS: Mapping[Answer, str] = {"line": "scored", "number": "number_given", "choice": "chosen"}
 _OUTCOMES: Mapping[Answer, Outcome] = {"line": "scored", "number": "numbered", "choice": "chosen", "none": "presented"}
 
 
-def _end_take(take: Take, event: LoggedEvent, discarded: str | None) -> Take:
+def _end_take(take: Take, event: LoggedEvent, reason: str | None) -> Take:
     """Return a take with its end; one that had ended before it was restored or discarded keeps that end."""
-    return replace(take, stop_ns=event.time_ns if take.stop_ns is None else take.stop_ns, discarded=discarded)
+    return replace(take, stop_ns=event.time_ns if take.stop_ns is None else take.stop_ns, discard_reason=reason)
 
 
 def _outcome(trial: Trial, answer: Any) -> Outcome:  # noqa: ANN401  a score, a number or a choice
@@ -170,7 +170,7 @@ def health_of(log: Iterable[LoggedEvent]) -> Health:
     events = list(log)
     counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTS}
     words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
-    flagged: Counter[str] = Counter()
+    by_flag: Counter[str] = Counter()
     for event in events:
-        flagged.update(event.data.get("flagged", {}))
-    return Health(**counts, rate_words=words[-1] if words else "", flagged=dict(flagged))
+        by_flag.update(event.data.get("flagged", {}))
+    return Health(**counts, rate_words=words[-1] if words else "", flagged=dict(by_flag))

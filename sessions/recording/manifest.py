@@ -86,8 +86,8 @@ def _trial(record: TrialRecord) -> dict[str, Any]:
         "start_ns": record.start_ns,
         "stop_ns": record.stop_ns,
         "other_takes": [
-            {"number": take.number, "start_ns": take.start_ns, "stop_ns": take.stop_ns, "discarded": take.discarded}
-            for take in record.other_takes
+            {"number": t.number, "start_ns": t.start_ns, "stop_ns": t.stop_ns, "discarded": t.discard_reason}
+            for t in record.other_takes
         ],
     }
 

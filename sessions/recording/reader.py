@@ -69,19 +69,19 @@ class Recording:
             if folder.is_file() and (folder.parent / schema.LIVE_FILE).is_file():
                 what = f"give the folder that it lies in, {folder.parent}"
             raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; {what}")
-        damaged: list[str] = []
+        damage: list[str] = []
         with name_failure(RecordingError, f"{path} cannot be read", _copy_of(folder), DATABASE_FAILURES):
-            torn = tuple(torn_log(path))
+            tail_losses = tuple(torn_log(path))
             with _connect(path) as connection:
                 head = _head(path, connection)
-                events = _events(connection, damaged)
-        losses = [*torn, *damaged]
+                events = _events(connection, damage)
+        losses = [*tail_losses, *damage]
         losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
-            mounted = {e.trial: e.data["code"] for e in events if e.kind == "stimulus_mounted"}  # last of each trial
-            plan = with_mounted_stimuli(as_type(head["plan"], SessionPlan), mounted)
+            codes = {e.trial: e.data["code"] for e in events if e.kind == "stimulus_mounted"}  # last of each trial
+            plan = with_mounted_stimuli(as_type(head["plan"], SessionPlan), codes)
             info = info_from_dict(head["transducer"]) if head["transducer"] else None
             as_type(head["provenance"], Provenance)
             simulated = None if head["simulated"] == "no" else head["simulated"]
@@ -89,7 +89,7 @@ class Recording:
             what = f"its head is damaged ({error}); restore it from a copy{_copy_of(folder)}"
             raise RecordingError(f"{path}: {what}") from error
         trials = trial_records(plan, events)
-        provenance, whole = head["provenance"], not damaged
+        provenance, whole = head["provenance"], not damage
         return Recording(folder, plan, info, simulated, provenance, events, trials, head, whole, tuple(losses))
 
     @property
@@ -131,9 +131,9 @@ class Recording:
         rates = [event.data["rate_words"] for event in losses if "rate_words" in event.data]
         trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(rates)]
         for record in self.trials:
-            allowed = self.plan.stroke_limit(record.trial)
-            if record.take and record.take.strokes > allowed:
-                allowed_words = "one was" if allowed == 1 else f"{allowed} were"
+            limit = self.plan.stroke_limit(record.trial)
+            if record.take and record.take.strokes > limit:
+                allowed_words = "one was" if limit == 1 else f"{limit} were"
                 trouble.append(
                     f"trial {record.trial.number} holds {record.take.strokes} strokes where {allowed_words} asked for"
                 )
@@ -209,13 +209,13 @@ class Recording:
 
         `between` limits it to blocks that hold readings received in that span of the session clock [ns].
         """
-        damaged: list[str] = [] if losses is None else losses
+        damage: list[str] = [] if losses is None else losses
         path = self.folder / schema.LIVE_FILE
         try:
             with _connect(path) as connection:
-                yield from _blocks(connection, damaged, between)
+                yield from _blocks(connection, damage, between)
         except DATABASE_FAILURES as error:
-            damaged.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
+            damage.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
 
 
 def _copy_of(folder: Path) -> str:
@@ -237,11 +237,11 @@ def _blocks(
     if between is not None:
         condition = " WHERE received_last_ns >= ?" + ("" if between[1] is None else " AND received_first_ns < ?")
         limits = tuple(limit for limit in between if limit is not None)
-    expected = 1
+    next_number = 1
     for (number,) in connection.execute("SELECT rowid FROM blocks" + condition + " ORDER BY rowid", limits).fetchall():
-        if between is None and number != expected:
-            losses.append(f"blocks {expected} to {number - 1} of the readings are missing")
-        expected = number + 1
+        if between is None and number != next_number:
+            losses.append(f"blocks {next_number} to {number - 1} of the readings are missing")
+        next_number = number + 1
         try:
             block = _block(connection, number)
         except (ValueError, TypeError, sqlite3.DatabaseError) as error:
@@ -255,11 +255,11 @@ def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
     names = ", ".join(schema.COLUMNS)
     query = f"SELECT crc32, {names}, {schema.SUMMARY} FROM blocks WHERE rowid=?"
     crc, *row = connection.execute(query, (number,)).fetchone()
-    columns, stored = tuple(row[: len(schema.COLUMNS)]), tuple(row[len(schema.COLUMNS) :])
+    columns, summary = tuple(row[: len(schema.COLUMNS)]), tuple(row[len(schema.COLUMNS) :])
     if schema.blobs_crc(columns) != crc:
         raise ValueError("its bytes do not give the CRC-32 stored with them")
     block = schema.block_from_blobs(columns)
-    if not len(block) or schema.summary(block) != stored:
+    if not len(block) or schema.summary(block) != summary:
         raise ValueError("its readings are not those that its row describes")
     return block
 
@@ -287,13 +287,13 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:
     """Return the undamaged events, and name the others in `losses`."""
     events: list[LoggedEvent] = []
-    expected = 1
+    next_number = 1
     # By its rowid, which is its number also where the table's definition is damaged
     rows = connection.execute("SELECT rowid, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY rowid")
     for number, *row in rows:
-        if number != expected:
-            losses.append(f"events {expected} to {number - 1} are missing")
-        expected = number + 1
+        if number != next_number:
+            losses.append(f"events {next_number} to {number - 1} are missing")
+        next_number = number + 1
         try:
             events.append(_event(number, row))
         except ValueError as error:
@@ -343,5 +343,5 @@ def _answers(connection: sqlite3.Connection) -> bool:
     return True
 
 
-def _side_file(path: Path, ending: str) -> Path:
-    return path.with_name(path.name + ending)
+def _side_file(path: Path, suffix: str) -> Path:
+    return path.with_name(path.name + suffix)

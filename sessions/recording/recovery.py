@@ -49,7 +49,7 @@ def log_tail(log: BinaryIO) -> LogTail:
     if magic not in (BIG_ENDIAN_SUMS, LITTLE_ENDIAN_SUMS) or sums != (sum_1, sum_2) or page_size not in PAGE_SIZES:
         return LogTail(0, size)
     commits, position, end = 0, _HEADER.size, _HEADER.size
-    mislabelled = None
+    suspect = None
     while position + _FRAME.size + page_size <= size:
         frame = _read(log, position, _FRAME.size + page_size)
         _, pages, *salts, frame_1, frame_2 = _FRAME.unpack_from(frame)
@@ -58,15 +58,15 @@ def log_tail(log: BinaryIO) -> LogTail:
         if sums != (frame_1, frame_2):
             break
         if salts != [salt_1, salt_2]:  # the sums, which leave salts out, go on: damaged, and not of an earlier run
-            mislabelled = position
+            suspect = position
             break
         position += _FRAME.size + page_size
         if pages:
             commits, end = commits + 1, position
-    return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2), mislabelled) - end)
+    return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2), suspect) - end)
 
 
-def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, int], mislabelled: int | None) -> int:
+def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, int], suspect: int | None) -> int:
     """Return where the last frame carrying `salts` ends, or the one that does not and should, from `start` on.
 
     Frames after it were left over from an earlier run of the log: those of one run lie together, at its head.
@@ -76,11 +76,11 @@ def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, in
     position = end = start
     while position + _FRAME.size <= size:
         frame = _FRAME.unpack(_read(log, position, _FRAME.size))
-        if frame == _HOLE and position != mislabelled:
+        if frame == _HOLE and position != suspect:
             position = max(position + step, start + (_next_data(log, position) - start) // step * step)
             continue
         position += step
-        if position - step == mislabelled or frame[2:4] == salts:
+        if position - step == suspect or frame[2:4] == salts:
             end = position
     return min(end, size) if end < position else size
 
@@ -95,8 +95,8 @@ def _next_data(log: BinaryIO, position: int) -> int:
     try:
         return os.lseek(log.fileno(), position, os.SEEK_DATA)
     except (OSError, AttributeError) as none:  # no data up to the end; or no system that tells
-        ended = isinstance(none, OSError) and none.errno == errno.ENXIO
-        return log.seek(0, os.SEEK_END) if ended else position
+        at_end = isinstance(none, OSError) and none.errno == errno.ENXIO
+        return log.seek(0, os.SEEK_END) if at_end else position
 
 
 def _sums(data: bytes, order: str, sums: tuple[int, int]) -> tuple[int, int]:
@@ -113,10 +113,10 @@ def torn_log(path: Path) -> Iterator[str]:
     log = path.with_name(f"{path.name}-wal")
     if log.is_file():
         with log.open("rb", buffering=0) as file:
-            torn = log_tail(file).torn_bytes
-        if torn:
+            size = log_tail(file).torn_bytes
+        if size:
             yield (
-                f"the last {torn} bytes of the write-ahead log hold no whole commit and are left out:"
+                f"the last {size} bytes of the write-ahead log hold no whole commit and are left out:"
                 " they had not been acknowledged, or were damaged since"
             )
 

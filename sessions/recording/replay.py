@@ -17,13 +17,13 @@ class RecordedReadings:
 
     def __init__(self, blocks: Iterator[ReadingBlock]) -> None:
         self._blocks = blocks
-        self._waiting: list[ReadingBlock] = []
+        self._queue: list[ReadingBlock] = []
         self.position = 0  # how many were handed over
 
     def blocks_up_to(self, position: int | None) -> Iterator[ReadingBlock]:
         """Hand over the next readings until `position` of them were, or until none are left (None: all that are)."""
         while (position is None or self.position < position) and self._look():
-            first = self._waiting[0]
+            first = self._queue[0]
             yield self._take(len(first) if position is None else min(len(first), position - self.position))
 
     def up_to(self, position: int | None) -> ReadingBlock:
@@ -32,34 +32,34 @@ class RecordedReadings:
 
     def take_until(self, instant_ns: int) -> ReadingBlock:
         """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""
-        taken: list[ReadingBlock] = []
+        blocks: list[ReadingBlock] = []
         while self._look():
-            late = self._waiting[0].received_ns > instant_ns
+            late = self._queue[0].received_ns > instant_ns
             count = int(np.argmax(late)) if late.any() else len(late)
             if count:
-                taken.append(self._take(count))
+                blocks.append(self._take(count))
             if late.any():
                 break
-        return ReadingBlock.concatenate(taken)
+        return ReadingBlock.concatenate(blocks)
 
     def next_received_ns(self) -> int | None:
         """Return when the next reading was received [ns]; None after the last."""
-        return int(self._waiting[0].received_ns[0]) if self._look() else None
+        return int(self._queue[0].received_ns[0]) if self._look() else None
 
     def _look(self) -> bool:
         """Have the next readings at hand, and say whether there are any."""
-        while not self._waiting:
+        while not self._queue:
             block = next(self._blocks, None)
             if block is None:
                 return False
             if len(block):
-                self._waiting.append(block)
+                self._queue.append(block)
         return True
 
     def _take(self, count: int) -> ReadingBlock:
-        block = self._waiting.pop()
+        block = self._queue.pop()
         if count < len(block):
-            self._waiting.append(block.between(count, len(block)))
+            self._queue.append(block.between(count, len(block)))
         self.position += count
         return block.between(0, count)
 

@@ -84,16 +84,16 @@ def new_hdf5(path: Path, **more: Any) -> Generator[h5py.File]:  # noqa: ANN401  
 def write_texts(file: h5py.File, name: str, column: Iterable[str]) -> tuple[h5py.Dataset, h5py.Dataset]:
     """Write a column of ASCII texts, and return its two data sets: uint8 bytes, int64 ends."""
     data_set = file.create_dataset(name, (0,), np.uint8, maxshape=(None,), chunks=(CHUNK_BYTES,), fletcher32=True)
-    waiting, ends, end = bytearray(), list[int](), 0
+    buffer, ends, end = bytearray(), list[int](), 0
     for text in column:
-        waiting += text.encode("ascii")
+        buffer += text.encode("ascii")
         end += len(text)
         ends.append(end)
-        if len(waiting) >= CHUNK_BYTES:
-            _append(data_set, waiting)
-    _append(data_set, waiting)
-    protected = {"chunks": (len(ends),), "fletcher32": True} if ends else {}
-    return data_set, file.create_dataset(name + END, data=np.array(ends, "<i8"), **protected)
+        if len(buffer) >= CHUNK_BYTES:
+            _append(data_set, buffer)
+    _append(data_set, buffer)
+    storage = {"chunks": (len(ends),), "fletcher32": True} if ends else {}
+    return data_set, file.create_dataset(name + END, data=np.array(ends, "<i8"), **storage)
 
 
 def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
@@ -110,12 +110,12 @@ def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
         begin = end
 
 
-def _append(data_set: h5py.Dataset, waiting: bytearray) -> None:
+def _append(data_set: h5py.Dataset, buffer: bytearray) -> None:
     length = len(data_set)
-    data_set.resize(length + len(waiting), axis=0)
-    if waiting:
-        data_set[length:] = np.frombuffer(bytes(waiting), np.uint8)
-        waiting.clear()
+    data_set.resize(length + len(buffer), axis=0)
+    if buffer:
+        data_set[length:] = np.frombuffer(bytes(buffer), np.uint8)
+        buffer.clear()
 
 
 # Superblock 2 and nothing that HDF5 1.8 does not know: older MATLAB cannot read later files.
@@ -145,7 +145,7 @@ def write_copy(
     recording: Recording, path: Path, more: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
 ) -> None:
     """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
-    expected = recording.expected_readings or 1
+    total = recording.expected_readings or 1
     with new_hdf5(path, libver=LIBVER) as file:
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
@@ -159,7 +159,7 @@ def write_copy(
                 column.resize(len(column) + len(values), axis=0)
                 column[-len(values) :] = values
             if progress is not None:
-                progress(min(len(readings["time"]) / expected, 1.0))
+                progress(min(len(readings["time"]) / total, 1.0))
         for one in (*data_sets(recording), *more):
             kind = one.values.dtype
             if kind.kind == "S":
@@ -167,8 +167,8 @@ def write_copy(
                 plain = all(text.isascii() for text in one.values.tolist())
                 kind = h5py.string_dtype("ascii" if plain else "utf-8", kind.itemsize)
             # An empty data set has no chunks, and so nothing to protect.
-            protected = {"chunks": one.values.shape, "fletcher32": True} if one.values.size else {}
-            data_set = file.create_dataset(one.name, data=one.values.astype(kind), **protected)
+            storage = {"chunks": one.values.shape, "fletcher32": True} if one.values.size else {}
+            data_set = file.create_dataset(one.name, data=one.values.astype(kind), **storage)
             _describe(data_set, one.unit, one.note)
         data_set, ends = write_texts(file, EVENT_DATA, _event_texts(recording))
         _describe(data_set, "", "what else is known, as JSON")
@@ -257,8 +257,8 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
     yield DataSet("trials/score", scores, "", "0 to 100; NaN unless the outcome is scored")
     yield DataSet("trials/free_number", numbers, "", "on the subject's own scale; NaN unless the outcome is numbered")
     yield DataSet("trials/choice", choices, "", "1 or 2 of the two compared; 0 unless the outcome is chosen")
-    compared = [t.compared_with or 0 for t in trials]
-    yield DataSet("trials/compared_with", _int64(compared), "", "number of the first of two; 0 for none")
+    partners = [t.compared_with or 0 for t in trials]
+    yield DataSet("trials/compared_with", _int64(partners), "", "number of the first of two; 0 for none")
     yield DataSet(
         "trials/take", _int64([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
     )

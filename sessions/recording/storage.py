@@ -162,8 +162,8 @@ def network_mount(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
 
 def sync_folder_above(place: PurePath) -> str | None:
     """Return the program whose folder `place` lies in, by the names of the folders above and itself; None: none."""
-    named = ((part, pattern, program) for part in place.parts for pattern, program in SYNC_FOLDERS)
-    return next((program for part, pattern, program in named if re.fullmatch(pattern, part, re.IGNORECASE)), None)
+    folders = ((part, pattern, program) for part in place.parts for pattern, program in SYNC_FOLDERS)
+    return next((program for part, pattern, program in folders if re.fullmatch(pattern, part, re.IGNORECASE)), None)
 
 
 def linux_mounts(table: str) -> tuple[Mount, ...]:

@@ -150,7 +150,7 @@ class SessionWriter:
         return self._path.parent
 
     @property
-    def waiting(self) -> int:
+    def pending_count(self) -> int:
         """Return how many readings were handed over and are not safe yet."""
         return self.reading_count - self.acknowledged.readings
 
@@ -165,7 +165,7 @@ class SessionWriter:
         if len(block):
             self._blocks.append(block)
             self.reading_count += len(block)
-        if self.clock.now_ns() - self.acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
+        if self.clock.now_ns() - self.acknowledged.time_ns >= COMMIT_EVERY_NS or self.pending_count >= LARGEST_BLOCK:
             self.commit()
 
     def event(
@@ -268,8 +268,8 @@ class SessionWriter:
 
     def _rescue(self) -> None:
         """Go on in a new folder that holds all that the open file does. Raises RecordingError where none can be."""
-        lost, self._failure = self._path, "it was removed, renamed or replaced"
-        self._path = rescue(self._connection, lost)
+        path, self._failure = self._path, "it was removed, renamed or replaced"
+        self._path = rescue(self._connection, path)
         self._connection.close()
         self._connection = sqlite3.connect(self._path, isolation_level=None)
         try:
@@ -278,7 +278,7 @@ class SessionWriter:
             self._fail(error)
         self._identities, self._failure = identities(self._path), None
         self.must_end = (
-            f"{without_home(str(lost))} was removed, renamed or replaced; all that was measured is safe in"
+            f"{without_home(str(path))} was removed, renamed or replaced; all that was measured is safe in"
             f" {without_home(str(self.folder))}: resume the session there"
         )
 
@@ -289,9 +289,9 @@ class SessionWriter:
     def _insert_blocks(self) -> int:
         """Insert the waiting readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""
         rows = self._block_rows
-        waiting = ReadingBlock.concatenate(self._blocks)
-        for start in range(0, len(waiting), LARGEST_BLOCK):
-            block = waiting.between(start, start + LARGEST_BLOCK)
+        pending = ReadingBlock.concatenate(self._blocks)
+        for start in range(0, len(pending), LARGEST_BLOCK):
+            block = pending.between(start, start + LARGEST_BLOCK)
             rows += 1
             columns = schema.blobs(block)
             values = (rows, *schema.summary(block), *columns, schema.blobs_crc(columns))

@@ -131,7 +131,7 @@ def experiments(
     hold. `law` gives the contact area of every number but theirs.
     """
     label = BY_NAME[response].label
-    judged: list[Experiment] = []
+    blocks: list[Experiment] = []
     for block in plan.blocks:
         if block.phase != "main":
             continue
@@ -143,9 +143,9 @@ def experiments(
         rows = score_matrix(tables, descriptor)
         own = {i: score for i, score in rows.get(plan.subject, {}).items() if len(rows) > 1 and i in indices}
         series = _surface_series(trials)
-        predicted = series.get(label, {})
+        responses = series.get(label, {})
         along = [PathTrial("", row.index, score_of.get(row.index), row.rule, row.paths) for row in trials]
-        judged.append(
+        blocks.append(
             Experiment(
                 name=block.name,
                 descriptor=descriptor,
@@ -153,29 +153,29 @@ def experiments(
                 indices=indices,
                 scores=means,
                 answers={subject: tuple(map(row.get, indices)) for subject, row in rows.items()},
-                score_relation=_relation(score_of, predicted),
-                index_relation=_relation({index: float(index) for index in indices}, predicted),
-                own_relation=_relation(own, predicted),
+                score_relation=_relation(score_of, responses),
+                index_relation=_relation({index: float(index) for index in indices}, responses),
+                own_relation=_relation(own, responses),
                 own_scores=own,
-                rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
+                rivals=rivals_of_means(score_of, series, label) if responses and score_of else (),
                 response=response,
                 paths=path_findings(along, "small", law, within=False),
                 psychometric=subject_function([(visit, row) for row in trials]) if block.standard else None,
                 other_answers=() if block.standard else _other_answers(trials),
             )
         )
-    return tuple(judged)
+    return tuple(blocks)
 
 
 def _other_answers(trials: Sequence[TrialRow]) -> tuple[tuple[int, str, str], ...]:
     """Return trial, index judged and answer of each number, and of each choice with both indices."""
     numbers = [(row.trial, str(row.index), f"{row.estimate:g}") for row in trials if row.estimate is not None]
-    chosen = [
+    choices = [
         (row.trial, f"{row.before}, then {row.index}", str(row.before if row.choice == "first" else row.index))
         for row in trials
         if row.choice is not None
     ]
-    return (*numbers, *chosen)
+    return (*numbers, *choices)
 
 
 def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
@@ -189,7 +189,7 @@ def _surface_series(trials: Sequence[TrialRow]) -> dict[str, dict[int, float]]:
 
 def _relation(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
     """Return how responses go with x, over the indices that have both; None where there is none."""
-    shared = [index for index in sorted(x) if index in responses]
-    if not shared:
+    indices = [index for index in sorted(x) if index in responses]
+    if not indices:
         return None
-    return relation([x[index] for index in shared], [responses[index] for index in shared], shared)
+    return relation([x[index] for index in indices], [responses[index] for index in indices], indices)

@@ -129,7 +129,7 @@ class Field:
 
     experiment: str
     index: int
-    drawn: Fields
+    finger: Fields
     skin: Skin
 
 

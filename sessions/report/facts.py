@@ -18,7 +18,7 @@ from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding, TextFile
 from sessions.report.wording import full_stop
 from sessions.statistics.multiverse import PATHS, Values
-from sessions.statistics.scores import ScoreTable, grading, reversed_subjects
+from sessions.statistics.scores import ScoreTable, grades_of, reversed_subjects
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.stroke import PLANNED_AT, AreaLaw
@@ -43,15 +43,15 @@ def session_commands(
     name = shlex.quote(recording.folder.name)
     settings = (*area_words(analysis.settings.area), *calibration_words(analysis.settings.gain_error))
     seed = analysis.settings.bootstrap_seed
-    seeded = ["--bootstrap-seed", str(seed)] if seed else []  # the later verbs take it from what the first has kept
-    lines = [["verify", name], ["analyse", name, *settings, *seeded]]
+    seed_option = ["--bootstrap-seed", str(seed)] if seed else []  # later verbs read it from the first one's results
+    lines = [["verify", name], ["analyse", name, *settings, *seed_option]]
     report = ["report", name, "-o", "report.html"]
     if prediction is not None:
         file = scene_file(recording, prediction)
         scene = [] if file is None else ["--scene", shlex.quote(file.name)]
         variants = prediction.options.variants
-        sided = ["--variants", "both"] if variants == "both" else []
-        words = [*model_words(prediction.options), *scene, *sided, *_afferent_words(afferent), *settings]
+        variant_option = ["--variants", "both"] if variants == "both" else []
+        words = [*model_words(prediction.options), *scene, *variant_option, *_afferent_words(afferent), *settings]
         lines.append(["predict", name, *words])
     if paths is not None:
         small = sum(path.kinematics == "small" for path in PATHS)
@@ -129,12 +129,12 @@ _ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "
 def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ...]:
     """Return who took part, and what they were asked to do."""
     plan = recording.plan
-    scored = sorted({table.subject for table in tables if table.scores})
+    subjects = sorted({table.subject for table in tables if table.scores})
     facts = [Fact("subject", plan.subject)] if plan.subject else []
-    if scored:
+    if subjects:
         sessions = sum(bool(table.scores) for table in tables)
         where = "in one session" if sessions == 1 else f"in {sessions} sessions"
-        facts.append(Fact("subjects who scored", f"{len(scored)}: {', '.join(scored)}", where))
+        facts.append(Fact("subjects who scored", f"{len(subjects)}: {', '.join(subjects)}", where))
     if plan.blocks:
         facts.append(Fact("protocol", plan.protocol))
         facts.append(Fact("stimulus order", plan.order_rule, f"seed {plan.seed}"))
@@ -143,8 +143,8 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
     facts += [Fact(f"the subject's finger: {name}", f"{mm:g} mm", "measured") for name, mm in own.items() if mm]
     if plan.contact_angle_origin == "measured":
         facts.append(Fact("contact angle", f"{plan.contact_angle:g}°", "measured"))
-    graded = grading(recording.trials)
-    facts += [Fact(f"pre-evaluation of {descriptor}", sentence) for descriptor, sentence in graded.items()]
+    grades = grades_of(recording.trials)
+    facts += [Fact(f"pre-evaluation of {descriptor}", sentence) for descriptor, sentence in grades.items()]
     if plan.masking:
         facts.append(Fact("masking of sounds", plan.masking))
     return tuple(facts)
@@ -190,13 +190,13 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
 def _tilt(analysis: Analysis) -> tuple[str, str]:
     """Return how the face leans, and whether that was levelled; nothing where nobody stated it."""
     tilt, x_y = analysis.tilt, analysis.settings.tilt
-    done = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {x_y[0]:.2g}° and {x_y[1]:.2g}°"
+    levelling = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {x_y[0]:.2g}° and {x_y[1]:.2g}°"
     if tilt is None:
-        return ("" if x_y == (0.0, 0.0) else f"{x_y[0]:.2g}° to +x and {x_y[1]:.2g}° to +y"), done
+        return ("" if x_y == (0.0, 0.0) else f"{x_y[0]:.2g}° to +x and {x_y[1]:.2g}° to +y"), levelling
     (low_x, high_x), (low_y, high_y) = tilt.x_interval, tilt.y_interval
     along = f"{tilt.lean[0]:.2g}° ({low_x:.2g} to {high_x:.2g}) to +x"
     across = f"{tilt.lean[1]:.2g}° ({low_y:.2g} to {high_y:.2g}) to +y"
-    return f"{along}, {across}", f"{tilt.kind}; {done}"
+    return f"{along}, {across}", f"{tilt.kind}; {levelling}"
 
 
 def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding]) -> tuple[str, ...]:
@@ -205,7 +205,8 @@ def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Seque
     for record in recording.trials:
         number = record.trial.number
         for take in record.other_takes:
-            why = f"discarded: {take.discarded}" if take.discarded is not None else "the recording ended in it"
+            reason = take.discard_reason
+            why = "the recording ended in it" if reason is None else f"discarded: {reason}"
             sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
         sentences += [f"Trial {number} was skipped."] if record.outcome == "skipped" else []
     for name, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):

@@ -111,14 +111,14 @@ def check_replaceable(path: Path) -> None:
 
 def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None = None) -> tuple[Path, ...]:
     """Write every picture of the report to `folder` as SVG, each with its numbers as CSV; return the files."""
-    written: list[Path] = []
+    paths: list[Path] = []
     for plate in plates(report) if drawings is None else drawings:
         for panel in plate.panels:
-            for ending, text in ((".svg", panel.svg), (".csv", panel_csv(panel, report.head))):
-                path = folder / (re.sub(r"[^0-9A-Za-z_-]", "-", panel.name) + ending)  # a name any file system takes
+            for suffix, text in ((".svg", panel.svg), (".csv", panel_csv(panel, report.head))):
+                path = folder / (re.sub(r"[^0-9A-Za-z_-]", "-", panel.name) + suffix)  # a name any file system takes
                 swap_in(path, text)
-                written.append(path)
-    return tuple(written)
+                paths.append(path)
+    return tuple(paths)
 
 
 def embed(panel: Panel) -> Markup:

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from sessions.prediction.stored import Variant
+from sessions.prediction.stored import Ends, Variant
 from sessions.report.contents import Experiment, PredictionFinding, Report
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, session_functions
@@ -55,17 +55,17 @@ def _in_variant(report: Report, variant: Variant, where: str) -> str:
     def sed(one: PredictionFinding) -> float | None:
         return next((alternative.sed for alternative in one.alternatives if alternative.variant == variant), None)
 
-    tried = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
-    doubted = by_key(
+    names = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
+    in_doubt = by_key(
         (p.experiment, any(one.doubt for one in p.alternatives if one.variant == variant)) for p in report.predictions
     )
     parts = [
-        f"{experiment.name} {words}, n = {plural(related.n, 'stimulus', 'stimuli')}{_doubt(doubted[experiment.name])}"
+        f"{experiment.name} {words}, n = {plural(fit.n, 'stimulus', 'stimuli')}{_doubt(in_doubt[experiment.name])}"
         for experiment in report.experiments
-        if experiment.name in tried
-        for related in [_relation(report, experiment, sed)]
-        for r in [related.pearson]
-        for words in [related.reason if r is None else f"r = {correlation(r)}{ends_of(related)}"]
+        if experiment.name in names
+        for fit in [_relation(report, experiment, sed)]
+        for r in [fit.pearson]
+        for words in [fit.reason if r is None else f"r = {correlation(r)}{ends_of(fit)}"]
     ]
     if not parts:
         sizes = [fact.value for fact in report.left_out if where.endswith(fact.name) and fact.value != NO_ESTIMATE]
@@ -74,22 +74,22 @@ def _in_variant(report: Report, variant: Variant, where: str) -> str:
     return f"{where}, r of the SED with the mean scores: {'; '.join(parts)}."
 
 
-def _doubt(doubted: Sequence[bool]) -> str:
+def _doubt(in_doubt: Sequence[bool]) -> str:
     """Return how many trials are in a state that no finger can be in, as the end of a sentence; "" where none is."""
-    of = f"{sum(doubted)} of {plural(len(doubted), 'trial')}"
-    return f" ({of} in a state that no finger can be in)" if any(doubted) else ""
+    of = f"{sum(in_doubt)} of {plural(len(in_doubt), 'trial')}"
+    return f" ({of} in a state that no finger can be in)" if any(in_doubt) else ""
 
 
 def _relation(report: Report, experiment: Experiment, value: _Value) -> Relation:
     """Return how a number goes with mean scores, over the stimuli that have both; repetitions are averaged."""
     means = {mean.index: mean.mean for mean in experiment.scores}
-    known = by_key(
+    by_index = by_key(
         (p.index, number)
         for p in report.predictions
         if p.experiment == experiment.name and p.index in means and (number := value(p)) is not None
     )
-    numbers = [float(np.mean(repeats)) for repeats in known.values()]
-    return relation(numbers, [means[index] for index in known], list(known))
+    numbers = [float(np.mean(repeats)) for repeats in by_index.values()]
+    return relation(numbers, [means[index] for index in by_index], list(by_index))
 
 
 def _by_place(report: Report) -> str:
@@ -100,9 +100,9 @@ def _by_place(report: Report) -> str:
         arcs = rows[0] if rows else ()
         places = sorted(arc for arc in arcs if abs(arc) <= _REACH and all(arc in row for row in rows))
         by_place = {arc: _relation(report, experiment, lambda p, arc=arc: p.row.get(arc)) for arc in places}
-        known = {arc: related.pearson for arc, related in by_place.items() if related.pearson is not None}
-        if 0.0 in known:
-            low, high = _alike(known)
+        r_by_arc = {arc: fit.pearson for arc, fit in by_place.items() if fit.pearson is not None}
+        if 0.0 in r_by_arc:
+            low, high = _alike(r_by_arc)
             ranges.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
     if not ranges:
         return "How the sign of r depends on the place of the ending is not known here."
@@ -112,7 +112,7 @@ def _by_place(report: Report) -> str:
     )
 
 
-def _alike(known: Mapping[float, float]) -> tuple[float, float]:
+def _alike(r_by_arc: Mapping[float, float]) -> tuple[float, float]:
     """Return the ends of the stretch about 0 in which the sign is that at 0.
 
     >>> _alike({-0.5: -0.9, -0.25: 0.3, 0.0: 0.9, 0.25: 0.8})
@@ -120,33 +120,33 @@ def _alike(known: Mapping[float, float]) -> tuple[float, float]:
     """
     ends: list[float] = []
     for side in (-1.0, 1.0):
-        outwards = sorted((arc for arc in known if side * arc >= 0.0), key=abs)
-        ends.append(list(takewhile(lambda arc: known[arc] * known[0.0] > 0.0, outwards))[-1])
+        outwards = sorted((arc for arc in r_by_arc if side * arc >= 0.0), key=abs)
+        ends.append(list(takewhile(lambda arc: r_by_arc[arc] * r_by_arc[0.0] > 0.0, outwards))[-1])
     return ends[0], ends[1]
 
 
 def question(report: Report) -> str:
     """Return what the session asks, as far as what it holds can answer it."""
-    judged = " and ".join(dict.fromkeys(e.descriptor for e in report.experiments))
+    descriptors = " and ".join(dict.fromkeys(e.descriptor for e in report.experiments))
     if not report.experiments:
         return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
     if not any(e.scale_ends[0] for e in report.experiments):
         what = shown_response(report.response).in_full if report.predictions else ""
-        return f"People judge the {judged} of surfaces they stroke. {friction_question(what)}"
+        return f"People judge the {descriptors} of surfaces they stroke. {friction_question(what)}"
     if not report.predictions:
         stroked = report.course is not None or report.strokes
         friction = ", and with what friction do fingers stroke the same surfaces" if stroked else ""
-        return f"How do people scale {judged}{friction}?"
+        return f"How do people scale {descriptors}{friction}?"
     return (
-        f"People scale the {judged} of surfaces they stroke. Does the {shown_response(report.response).in_full} that a "
-        "finger model predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow "
-        "their scores?"
+        f"People scale the {descriptors} of surfaces they stroke. Does the {shown_response(report.response).in_full} "
+        "that a finger model predicts at a receptor, from nothing but the friction of one finger on the same surfaces, "
+        "follow their scores?"
     )
 
 
-def friction_question(predicted: str) -> str:
-    """Return what a session without scores asks; `predicted` is the quantity that the model says, "" for none."""
-    more = f", and what {predicted} does a finger model predict at a receptor" if predicted else ""
+def friction_question(quantity: str) -> str:
+    """Return what a session without scores asks; `quantity` is what the model predicts, "" for none."""
+    more = f", and what {quantity} does a finger model predict at a receptor" if quantity else ""
     return f"With what µ do they stroke them{more}?"
 
 
@@ -159,26 +159,26 @@ def summary(report: Report) -> tuple[str, ...]:
         sentences.append(f"{plural(len(subjects), 'subject')} scored {plural(stimuli, 'stimulus', 'stimuli')}.")
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
-    for judged in session_functions(report):
-        sentences += psychometric_sentences(judged)
+    for results in session_functions(report):
+        sentences += psychometric_sentences(results)
     for experiment in report.experiments:
-        shown = shown_response(report.response)
-        responses = [shown.of(p) for p in report.predictions if p.experiment == experiment.name]
-        values = [shown.factor * one[0] for one in responses if one is not None]
+        quantity = shown_response(report.response)
+        responses = [quantity.of(p) for p in report.predictions if p.experiment == experiment.name]
+        values = [quantity.factor * one[0] for one in responses if one is not None]
         if values:
             sentences.append(
-                _prediction_sentence(experiment, shown, (min(values), max(values)), report.model.split(",")[0])
+                _prediction_sentence(experiment, quantity, (min(values), max(values)), report.model.split(",")[0])
             )
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     noun = "trial" if any(p.trial is not None for p in report.predictions) else "stroke"
-    missing = sum(p.sed is None for p in report.predictions)
-    if missing:
-        sentences.append(f"{plural(missing, noun)} got no prediction; the tables say why.")
-    doubted = sum(bool(p.doubt) for p in report.predictions)
-    if doubted:
-        are = "is" if doubted == 1 else "are"
-        sentences.append(f"{plural(doubted, noun)} {are} in a state that no finger can be in; the tables mark each.")
+    missing_count = sum(p.sed is None for p in report.predictions)
+    if missing_count:
+        sentences.append(f"{plural(missing_count, noun)} got no prediction; the tables say why.")
+    doubtful = sum(bool(p.doubt) for p in report.predictions)
+    if doubtful:
+        are = "is" if doubtful == 1 else "are"
+        sentences.append(f"{plural(doubtful, noun)} {are} in a state that no finger can be in; the tables mark each.")
     excluded, flaws = len(report.excluded) or "nothing", len(report.flaws) or "none"
     names = "; the appendix names each" if report.excluded or report.flaws else ""
     sentences.append(f"Excluded: {excluded}; flaws found: {flaws}{names}.")
@@ -201,20 +201,20 @@ def _strokes(report: Report) -> str:
     return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
 
 
-def _prediction_sentence(experiment: Experiment, shown: ShownResponse, ends: tuple[float, float], strain: str) -> str:
+def _prediction_sentence(experiment: Experiment, quantity: ShownResponse, ends: Ends, strain: str) -> str:
     """Return how prediction and score go together in one experiment; `ends` are in the shown unit."""
     low, high = ends
-    decimals, unit = (2, " kPa") if shown.unit == "kPa" else (shown.places, "")
-    words = f"{capital(experiment.name)}: the {shown.label} predicted{f' at {strain}' if strain else ''}"
+    decimals, unit = (2, " kPa") if quantity.unit == "kPa" else (quantity.places, "")
+    words = f"{capital(experiment.name)}: the {quantity.label} predicted{f' at {strain}' if strain else ''}"
     if high > low:
         words += f" runs from {digits(low, decimals)} to {digits(high, decimals)}{unit}"
         words += f" (a range of {spread_share(low, high)})"
     else:
         words += f" is {digits(low, decimals)}{unit}"
-    related = experiment.score_relation
-    if related is None:
+    fit = experiment.score_relation
+    if fit is None:
         return f"{words}; there are no scores to hold it against."
-    if related.pearson is None:
-        return f"{words}; no correlation with the scores: {related.reason}."
-    r = f"{correlation(related.pearson)}{ends_of(related)}"
-    return f"{words}; against the mean scores r = {r}, n = {related.n} stimuli."
+    if fit.pearson is None:
+        return f"{words}; no correlation with the scores: {fit.reason}."
+    r = f"{correlation(fit.pearson)}{ends_of(fit)}"
+    return f"{words}; against the mean scores r = {r}, n = {fit.n} stimuli."

@@ -25,12 +25,12 @@ _FEW = 12  # trials named one by one
 
 def question(study: StudyFindings) -> str:
     """Return what the study asks."""
-    predicted = shown_response(study.response).in_full
+    quantity = shown_response(study.response).in_full
     if not any(one.scores for one in study.descriptors):
         forces = any(visit.forces for visit in study.visits)
-        return f"People stroke surfaces and judge what they feel. {friction_question(predicted if forces else '')}"
+        return f"People stroke surfaces and judge what they feel. {friction_question(quantity if forces else '')}"
     return (
-        f"People stroke surfaces and scale what they feel. Does the {predicted} that a "
+        f"People stroke surfaces and scale what they feel. Does the {quantity} that a "
         "finger model predicts at a receptor, from the friction of the same people's own strokes, follow their scores?"
     )
 
@@ -38,8 +38,8 @@ def question(study: StudyFindings) -> str:
 def summary(study: StudyFindings) -> list[str]:
     """Return the findings in short, a sentence each."""
     subjects = {visit.subject for visit in study.visits}
-    read = "was" if len(study.visits) == 1 else "were"
-    sentences = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
+    verb = "was" if len(study.visits) == 1 else "were"
+    sentences = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {verb} read."]
     for one in study.descriptors:
         sentences += _relation_sentences(one, study)
         sentences += scale_sentences(one)
@@ -94,24 +94,24 @@ def _otherwise(one: DescriptorFindings, other: str) -> str:
     """Return what the same trials give at the other strain, as far as the many paths went there."""
     usual = next((path.path for path in one.paths if path.usual), None)
     there = None if usual is None else replace(usual, kinematics=other)
-    tried = next((path for path in one.paths if path.path == there), None)
-    if tried is None:
+    alternative = next((path for path in one.paths if path.path == there), None)
+    if alternative is None:
         return f"at {other} strain, which was not tried here, the sign may differ"
-    trials = plural(tried.trials, "trial")
-    if tried.within is None or tried.low is None or tried.high is None:
+    trials = plural(alternative.trials, "trial")
+    if alternative.within is None or alternative.low is None or alternative.high is None:
         return f"at {other} strain {trials} of {len(one.points)} had a prediction, too few for a correlation"
-    interval = f"{correlation(tried.low)} to {correlation(tried.high)}"
-    return f"at {other} strain r = {correlation(tried.within)} ({interval}) of the {trials} that have one there"
+    interval = f"{correlation(alternative.low)} to {correlation(alternative.high)}"
+    return f"at {other} strain r = {correlation(alternative.within)} ({interval}) of the {trials} that have one there"
 
 
 def who(study: StudyFindings) -> list[Fact]:
     """Return who took part."""
     subjects = sorted({visit.subject for visit in study.visits})
-    stroked = sorted({visit.subject for visit in study.visits if visit.forces})
+    strokers = sorted({visit.subject for visit in study.visits if visit.forces})
     protocols = sorted({visit.protocol for visit in study.visits})
     return [
         Fact("subjects", f"{len(subjects)}: {', '.join(subjects)}"),
-        Fact("of them with forces", f"{len(stroked)}: {', '.join(stroked)}" if stroked else "none"),
+        Fact("of them with forces", f"{len(strokers)}: {', '.join(strokers)}" if strokers else "none"),
         Fact("protocol", ", ".join(protocols)),
     ]
 
@@ -128,13 +128,13 @@ def exclusion_sentences(study: StudyFindings) -> list[str]:
         for one in study.excluded
         if _fits(study, one)
     ]
-    return [*sentences, *_decision_sentences(study, leaving_out=True), *_missing(study)]
+    return [*sentences, *_decision_sentences(study, leaving_out=True), *_trials_without_sed(study)]
 
 
 def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]:
     """Return the decisions about strokes that leave one out, or all others."""
-    decided = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
-    return [f"Session {name}: {full_stop(one)}" for name, one in decided if (" is left out: " in one) == leaving_out]
+    decisions = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
+    return [f"Session {name}: {full_stop(one)}" for name, one in decisions if (" is left out: " in one) == leaving_out]
 
 
 NO_TRIAL = "has no trial of an experiment, as an imported table has none, and counts nothing"
@@ -174,13 +174,13 @@ def remarks(study: StudyFindings) -> list[str]:
 
 def _meshes(study: StudyFindings) -> list[str]:
     """Return what it makes of the SEDs that sessions were not all solved on one mesh; nothing where they were."""
-    solved = by_key((value, v.session) for v in study.visits for name, value, _ in v.model if name == UNKNOWNS)
+    meshes = by_key((value, v.session) for v in study.visits for name, value, _ in v.model if name == UNKNOWNS)
     errors = [row.error_estimate for visit in study.visits for row in visit.rows if row.error_estimate is not None]
-    if len(solved) < 2 or not errors:
+    if len(meshes) < 2 or not errors:
         return []
-    meshes = "; ".join(f"{value}: {_first_few(sessions)}" for value, sessions in solved.items())
+    names = "; ".join(f"{value}: {_first_few(sessions)}" for value, sessions in meshes.items())
     sentence = (
-        f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as the differences "
+        f"The sessions were solved on meshes of {len(meshes)} finenesses ({names}), each as fine as the differences "
         "between its own trials ask for. Within a subject all trials share one mesh; between subjects an SED may "
         f"differ for its mesh alone by as much as its estimated error, {_range_of(errors)} of it."
     )
@@ -211,7 +211,7 @@ def _fits(study: StudyFindings, one: Exclusion) -> bool:
     return any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows)
 
 
-def _missing(study: StudyFindings) -> list[str]:
+def _trials_without_sed(study: StudyFindings) -> list[str]:
     """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
     sentences: list[str] = []
     alike = by_key(
@@ -221,9 +221,9 @@ def _missing(study: StudyFindings) -> list[str]:
         if row.sed is None and row.why and row.outcome != "open"
     )
     for places in alike.values():
-        named, reasons = _first_few([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
+        names, reasons = _first_few([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
         why = f"{'' if len(reasons) == 1 else 'of the first: '}{full_stop(reasons[0])}"
-        sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
+        sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({names}): {why}")
     return sentences
 
 

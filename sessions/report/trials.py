@@ -38,10 +38,10 @@ STRETCHES = 700  # of the whole recording, each drawn by its least and its great
 
 def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ...]:
     """Return the strokes, numbered in order of time, with what their trials ask for."""
-    planned = {trial.number: trial for trial in recording.plan.trials}
+    trials = {trial.number: trial for trial in recording.plan.trials}
     findings: list[StrokeFinding] = []
     for position, stroke in enumerate(analysis.strokes):
-        trial = None if stroke.trial is None else planned.get(stroke.trial)
+        trial = None if stroke.trial is None else trials.get(stroke.trial)
         intervals = analysis.intervals[position]
         numbers: dict[str, Any] = {
             "number": position + 1,
@@ -95,10 +95,10 @@ def course(recording: Recording) -> Course | None:
     shortest = max((block.time[-1] - block.time[0]) / STRETCHES, _GAP * np.median(steps)) if len(steps) else 0.0
     gaps = np.flatnonzero(steps > shortest)
     forces = -wrench[:, 2], np.hypot(wrench[:, 0], wrench[:, 1])
-    kept = np.union1d(np.union1d(*map(_extremes, forces)), [gaps, gaps + 1])
-    behind = np.searchsorted(kept, gaps) + 1
-    normal, tangential = (np.insert(force[kept], behind, np.nan) for force in forces)
-    return Course(np.insert(block.time[kept], behind, block.time[gaps]), normal, tangential)
+    positions = np.union1d(np.union1d(*map(_extremes, forces)), [gaps, gaps + 1])
+    behind = np.searchsorted(positions, gaps) + 1
+    normal, tangential = (np.insert(force[positions], behind, np.nan) for force in forces)
+    return Course(np.insert(block.time[positions], behind, block.time[gaps]), normal, tangential)
 
 
 def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:
@@ -124,9 +124,9 @@ def _trace(stroke: Stroke) -> Trace | None:
     inside = np.flatnonzero((curve.time >= begin) & (curve.time <= end))
     if not len(inside):
         return None
-    kept = inside[:: max(1, -(-len(inside) // MOST_INSTANTS))]
+    sample = inside[:: max(1, -(-len(inside) // MOST_INSTANTS))]
     columns = (curve.time - begin, curve.normal, curve.tangential, curve.ratio, curve.speed)
-    return Trace(begin, *(column[kept] for column in columns))
+    return Trace(begin, *(column[sample] for column in columns))
 
 
 def _extremes(values: Array) -> Indices:
@@ -139,12 +139,12 @@ def _extremes(values: Array) -> Indices:
     if n <= 2 * STRETCHES:
         return np.arange(n)
     edges = np.linspace(0, n, STRETCHES + 1).astype(np.int64)
-    kept = {0, n - 1}
+    positions = {0, n - 1}
     for start, stop in itertools.pairwise(edges.tolist()):
         piece = values[start:stop]
         if not np.isnan(piece).all():
-            kept |= {start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))}
-    return np.array(sorted(kept))
+            positions |= {start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))}
+    return np.array(sorted(positions))
 
 
 _NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
@@ -152,12 +152,12 @@ _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_
 
 
 def predictions(
-    prediction: SessionPrediction | None, firing: Sequence[Firing] = (), undone: Set[int] = frozenset()
+    prediction: SessionPrediction | None, firings: Sequence[Firing] = (), undone: Set[int] = frozenset()
 ) -> tuple[PredictionFinding, ...]:
     """Return a finding for each trial, or stroke where there are none; the session did not come to trials `undone`."""
     if prediction is None:
         return ()
-    rates = {one.trial: one for one in firing}
+    rates = {one.trial: one for one in firings}
     rows = (
         replace(row, reasons=dict.fromkeys(row.reasons, "The trial was not done.")) if row.trial in undone else row
         for row in prediction.trials
@@ -202,12 +202,14 @@ def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
     return f"{options.kinematics} strain, settled sliding, τ max {options.tau_reading}, contact area {area.law}"
 
 
-def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
+def omissions(session: SessionPrediction | None) -> tuple[Fact, ...]:
     """Return the effects that the model omits, how much each may change the SED, and how that was estimated."""
-    solved = [] if stored is None else [row.prediction for row in stored.trials if row.prediction is not None]
-    by_effect = by_key(item for prediction in solved for item in prediction.model.get("left_out", {}).items())
+    rows = () if session is None else session.trials
+    solutions = [row.prediction for row in rows if row.prediction is not None]
+    by_effect = by_key(item for prediction in solutions for item in prediction.model.get("left_out", {}).items())
     # Sentences that differ in their numbers only stand together.
-    warned = by_key((_NUMBER.sub("#", sentence), sentence) for prediction in solved for sentence in prediction.warnings)
+    sentences = (sentence for prediction in solutions for sentence in prediction.warnings)
+    warnings = by_key((_NUMBER.sub("#", sentence), sentence) for sentence in sentences)
     return (
         *(Fact(name, _share(entries), entries[0]["how"]) for name, entries in by_effect.items()),
         *(
@@ -216,7 +218,7 @@ def omissions(stored: SessionPrediction | None) -> tuple[Fact, ...]:
                 max(same, key=lambda sentence: [float(number.group()) for number in _NUMBER.finditer(sentence)]),
                 f"the greatest numbers of {plural(len(same), 'trial')} with this warning",
             )
-            for same in warned.values()
+            for same in warnings.values()
         ),
     )
 
@@ -263,10 +265,10 @@ NO_ESTIMATE = "no estimate"  # of what leaving an effect out changes
 
 def _share(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return the estimated change of the SED, over all trials."""
-    known = [100 * entry["estimate"] for entry in entries if entry["estimate"] is not None]
-    if not known:
+    percentages = [100 * entry["estimate"] for entry in entries if entry["estimate"] is not None]
+    if not percentages:
         return NO_ESTIMATE
-    ends = dict.fromkeys((_plain(min(known)), _plain(max(known))))
+    ends = dict.fromkeys((_plain(min(percentages)), _plain(max(percentages))))
     return f"{' to '.join(ends)} % of the SED"
 
 

@@ -35,22 +35,22 @@ def with_error(value: float, error: float | None, least: int) -> str:
     return f"{digits(value, decimals)} ± {digits(error, decimals)}"
 
 
-def between(low: float, high: float, written: Callable[[float], str], unit: float = 1.0) -> str:
-    """Return a range as `written` shows its ends, with more decimals where they would read alike.
+def between(low: float, high: float, as_text: Callable[[float], str], unit: float = 1.0) -> str:
+    """Return a range as `as_text` writes its ends, with more decimals where they would read alike.
 
-    `unit` is what `written` multiplies a number by first.
+    `unit` is what `as_text` multiplies a number by first.
 
     >>> between(0.5, 1.25, places(1)), between(-178.12, -178.09, places(0)), between(2.0, 2.0, places(1))
     ('0.5 to 1.2', '−178.12 to −178.09', '2.0 to 2.0')
     >>> between(0.001, 0.003, correlation)
     '+0.001 to +0.003'
     """
-    if written(low) == written(high) and low != high:
+    if as_text(low) == as_text(high) and low != high:
         decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
-        sign = "+" if written(1.0).startswith("+") else ""
+        sign = "+" if as_text(1.0).startswith("+") else ""
         low_text, high_text = (f"{unit * end:{sign}.{decimals}f}".replace("-", "−") for end in (low, high))
         return f"{low_text} to {high_text}"
-    return f"{written(low)} to {written(high)}"
+    return f"{as_text(low)} to {as_text(high)}"
 
 
 def places(n: int) -> Callable[[float], str]:
@@ -89,16 +89,16 @@ def correlation(r: float) -> str:
     >>> correlation(-0.5), correlation(0.997), correlation(-0.99996), correlation(-0.004), correlation(1.0)
     ('−0.50', '+0.997', '−0.99996', '+0.00', '+1.00')
     """
-    left = 1.0 - abs(r)
-    decimals = -math.floor(math.log10(left)) if 1e-9 < left <= 0.005 else 2
+    gap = 1.0 - abs(r)
+    decimals = -math.floor(math.log10(gap)) if 1e-9 < gap <= 0.005 else 2
     return f"{r:+z.{decimals}f}".replace("-", "−")
 
 
-def ends_of(related: Relation) -> str:
+def ends_of(relation: Relation) -> str:
     """Return the 95 % interval of a correlation as the end of a sentence, "" where there is none."""
-    if related.low is None or related.high is None:
+    if relation.low is None or relation.high is None:
         return ""
-    return f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
+    return f", 95 % interval {correlation(relation.low)} to {correlation(relation.high)}"
 
 
 def spread_share(low: float, high: float) -> str:
@@ -179,13 +179,13 @@ class ShownResponse:
         """The label, an abbreviation with what it stands for."""
         return "strain-energy density (SED)" if self.name == SED.name else self.label
 
-    def text(self, shown: float) -> str:
+    def text(self, number: float) -> str:
         """Return a number of the shown unit with that unit.
 
         >>> shown_response("sed").text(9.5528), shown_response("shear_along_skin").text(-0.25)
         ('9.553 kPa', '−0.2500')
         """
-        return digits(shown, self.places) + ("" if self.unit == "1" else f" {self.unit}")
+        return digits(number, self.places) + ("" if self.unit == "1" else f" {self.unit}")
 
     def of(self, prediction: PredictionFinding) -> Numbers | None:
         """Return a prediction's number in the kept unit, and its error where it has one; None without one."""

@@ -32,12 +32,12 @@ def data_of(event: steps.Event) -> dict[str, Any]:
     return cast("dict[str, Any]", _plain(msgspec.structs.asdict(event)))
 
 
-def event_of(logged: LoggedEvent) -> steps.Event | None:
+def event_of(entry: LoggedEvent) -> steps.Event | None:
     """Return the event that was logged; None for a line that tells of a command, or of the recording itself.
 
     Raises ValueError where the line does not hold what such an event has.
     """
-    return None if logged.kind not in _EVENTS else event_from_data(logged.kind, logged.data)
+    return None if entry.kind not in _EVENTS else event_from_data(entry.kind, entry.data)
 
 
 def event_from_data(kind: str, data: Mapping[str, Any]) -> steps.Event:

@@ -43,13 +43,13 @@ def advance(state: State, event: steps.Event) -> Step:
             return state, (_refusal(state, event),)
         case _, steps.Abort(reason):
             why = reason.strip() or "no reason given"
-            return Ended(why, complete=False), (*_discarding(state, why), steps.EndSession(why, complete=False))
+            return Ended(why, complete=False), (*_discard_commands(state, why), steps.EndSession(why, complete=False))
         case _, steps.Note(text):
             return state, () if text.strip() else (
                 steps.Refuse("an empty note says nothing: write what is to be kept"),
             )
         case _, steps.Pause() | steps.Resume() | steps.RestOver():
-            return _resting(state, event)
+            return _rest(state, event)
         case _, steps.Redo(reason) | steps.Skip(reason) if not reason.strip():
             return state, (steps.Refuse(f"say why: {type(event).__name__.lower()} needs a reason"),)
         case _, steps.Redo() | steps.UndoRedo():
@@ -79,7 +79,7 @@ def resume_interrupted(state: State, reason: str) -> Step:
             return state, ()
         case _:
             place, undone = _undo_pair(state.place, reason)
-            return Mounting(place), (*_discarding(state, reason), *undone, *_asking_for(place, new_block=True))
+            return Mounting(place), (*_discard_commands(state, reason), *undone, *_asking_for(place, new_block=True))
 
 
 def trial_in_hand(state: State) -> int | None:
@@ -94,8 +94,8 @@ def _went_on(state: State, event: steps.Event) -> Step:
         case Mounting(place), steps.StimulusMounted(code) if code == place.trial.stimulus.code:
             return _begin_take(place)
         case Mounting(place), steps.StimulusMounted(code):
-            wanted = place.trial.stimulus.code
-            return state, (steps.Refuse(f"trial {place.trial.number} needs the stimulus {wanted}, not {code}"),)
+            due_code = place.trial.stimulus.code
+            return state, (steps.Refuse(f"trial {place.trial.number} needs the stimulus {due_code}, not {code}"),)
         case Taring(place), steps.Zeroed():
             return Ready(place), (_ask_stroke(place),)
         case Ready(place), steps.StrokeDone() if not place.plan.forces:
@@ -144,14 +144,14 @@ def _take_answer(state: Scoring, answer: AnswerEvent) -> Step:
     return Settling(place, touching=state.touching), ()
 
 
-def _resting(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -> Step:
+def _rest(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -> Step:
     """Stop asking, and go on where it is safe: the stimulus is confirmed and the zero measured anew."""
     match state, event:
         case Scoring(place, strokes=strokes), steps.Pause():
             return Paused(place, scoring=True, strokes=strokes), ()
         case ((Mounting(place) | Taring(place) | Ready(place) | Stroking(place)), steps.Pause()):
             why = "a pause came before the stroke was done"
-            return Paused(place, scoring=False), _discarding(state, why)
+            return Paused(place, scoring=False), _discard_commands(state, why)
         case Paused(place, scoring=True, strokes=strokes), steps.Resume():
             return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
         case Paused(place), steps.Resume():
@@ -180,9 +180,9 @@ def _repeat(state: State, reason: str) -> Step:
         case Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
             if place.trial.compared_with is not None:
                 before, undone = _undo_pair(place, reason)
-                return Mounting(before), (*_discarding(state, reason), *undone, steps.AskMount(before.trial))
+                return Mounting(before), (*_discard_commands(state, reason), *undone, steps.AskMount(before.trial))
             after, commands = _begin_take(place)
-            return after, (*_discarding(state, reason), *commands)
+            return after, (*_discard_commands(state, reason), *commands)
         case Mounting(place) if place.take > 0:
             return state, (steps.Refuse(f"trial {place.trial.number} is about to be repeated already"),)
         case Mounting(place) | Resting(place) if place.index > 0:
@@ -201,17 +201,17 @@ def _redo_undone(state: State) -> Step:
         case _:
             return state, (steps.Refuse("there is no redo to undo: it can be undone until the next stroke"),)
     assert not isinstance(before, Ended)
-    then, trials, restored = before.place, place.plan.trials, list[steps.Command]()
+    then, trials, restores = before.place, place.plan.trials, list[steps.Command]()
     in_hand = then.index if isinstance(before, Scoring | Settling) else None
     for index in range(place.index, then.index + isinstance(before, Scoring | Settling | Closing)):
         was, takes, number = then.progress[index], place.progress[index].takes, trials[index].number
         if was.kept or index == in_hand:
-            restored += (steps.RestoreTake(number, was.take), *([steps.KeepTake(number, was.take)] if was.kept else ()))
+            restores += (steps.RestoreTake(number, was.take), *([steps.KeepTake(number, was.take)] if was.kept else ()))
         else:
-            restored.append(steps.LeaveOut(number, UNDONE))
+            restores.append(steps.LeaveOut(number, UNDONE))
         then = replace(then.at(index).with_progress(replace(was, takes=takes)), index=then.index)
     after, commands = _go_back(structs.replace(before, place=then))
-    return after, (*_discarding(state, UNDONE), *restored, *commands)
+    return after, (*_discard_commands(state, UNDONE), *restores, *commands)
 
 
 def _go_back(before: State) -> Step:
@@ -235,12 +235,12 @@ def _leave_out(state: State, reason: str) -> Step:
         case Mounting(place) | Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
             why = f"skipped: {reason}"
             more: tuple[steps.Command, ...] = ()
-            discarded = _discarding(state, why)
+            discards = _discard_commands(state, why)
             if place.first_of_two:
                 place = place.at(place.index + 1)
                 more = (steps.LeaveOut(place.trial.number, why),)
             after, commands = _next(place)
-            return after, (*discarded, *more, *commands)
+            return after, (*discards, *more, *commands)
         case _:
             return state, (_refusal(state, steps.Skip(reason)),)
 
@@ -248,10 +248,10 @@ def _leave_out(state: State, reason: str) -> Step:
 def _begin_take(place: Place) -> Step:
     """Open the next take of the trial in hand, its stimulus being on."""
     place = place.with_take(place.progress[place.index].takes + 1)
-    begun = steps.StartTake(place.trial.number, place.take)
+    start_take = steps.StartTake(place.trial.number, place.take)
     if place.plan.forces:
-        return Taring(place), (begun, steps.MeasureZero())
-    return Ready(place), (begun, _ask_stroke(place))
+        return Taring(place), (start_take, steps.MeasureZero())
+    return Ready(place), (start_take, _ask_stroke(place))
 
 
 def _stroke_over(place: Place) -> Step:
@@ -262,10 +262,10 @@ def _stroke_over(place: Place) -> Step:
 
 
 def _further_stroke(place: Place, strokes: int) -> tuple[steps.Command, ...]:
-    allowed = place.block.strokes_allowed
-    if strokes <= allowed:
+    limit = place.block.strokes_allowed
+    if strokes <= limit:
         return ()
-    return (steps.Tell(f"stroke {strokes} where {allowed} may be made: it is recorded and will be flagged"),)
+    return (steps.Tell(f"stroke {strokes} where {limit} may be made: it is recorded and will be flagged"),)
 
 
 def _keep_take(place: Place) -> Step:
@@ -277,7 +277,7 @@ def _keep_take(place: Place) -> Step:
 def _return_to(place: Place, reason: str) -> Step:
     """Return to an earlier trial, whose kept take is discarded."""
     before, undone = _undo_pair(place, reason)
-    return Mounting(before), (*_undoing(place, reason), *undone, steps.AskMount(before.trial))
+    return Mounting(before), (*_undo_commands(place, reason), *undone, steps.AskMount(before.trial))
 
 
 def _undo_pair(place: Place, reason: str) -> tuple[Place, tuple[steps.Command, ...]]:
@@ -285,10 +285,10 @@ def _undo_pair(place: Place, reason: str) -> tuple[Place, tuple[steps.Command, .
     if place.trial.compared_with is None:
         return _without_kept_take(place), ()
     first = _without_kept_take(place).at(place.index - 1)
-    return _without_kept_take(first), _undoing(first, reason)
+    return _without_kept_take(first), _undo_commands(first, reason)
 
 
-def _undoing(place: Place, reason: str) -> tuple[steps.Command, ...]:
+def _undo_commands(place: Place, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that was kept of the trial in hand, where one was."""
     return (steps.DiscardTake(place.trial.number, place.take, reason),) if place.progress[place.index].kept else ()
 
@@ -325,7 +325,7 @@ def _ask_answer(place: Place) -> steps.Command:
     return steps.AskScore(trial, block.scale_ends, block.ticks, block.question)
 
 
-def _discarding(state: State, reason: str) -> tuple[steps.Command, ...]:
+def _discard_commands(state: State, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that is open, where one is."""
     match state:
         case (
@@ -342,7 +342,7 @@ def _discarding(state: State, reason: str) -> tuple[steps.Command, ...]:
 
 
 def _refusal(state: State, event: steps.Event) -> steps.Refuse:
-    waiting: dict[type[State], str] = {
+    situations: dict[type[State], str] = {
         Idle: "the session has not begun",
         Mounting: "a stimulus is to be mounted",
         Taring: "the zero is being measured",
@@ -355,4 +355,4 @@ def _refusal(state: State, event: steps.Event) -> steps.Refuse:
         Closing: "every trial is done",
         Ended: "the session has ended",
     }
-    return steps.Refuse(f"{steps.WORDS[type(event)]} means nothing now: {waiting[type(state)]}")
+    return steps.Refuse(f"{steps.WORDS[type(event)]} means nothing now: {situations[type(state)]}")

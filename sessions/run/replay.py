@@ -58,9 +58,9 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
     return Recording.open(folder)
 
 
-def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
+def different_events(first: Recording, second: Recording) -> Iterator[str]:
     """Yield a sentence for each event that came out otherwise, is new, or came no more."""
-    then, now = ([event for event in events.events if event.kind not in TELL_LOSSES] for events in (recorded, replayed))
+    then, now = ([event for event in events.events if event.kind not in TELL_LOSSES] for events in (first, second))
     matcher = SequenceMatcher(None, [_key(event) for event in then], [_key(event) for event in now], autojunk=False)
     for what, i, i_end, j, j_end in matcher.get_opcodes():
         if what == "equal":
@@ -71,9 +71,9 @@ def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
             yield from (f"{_name(event)} of the replay is new" for event in now[j:j_end])
 
 
-def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str]:
+def different_readings(first: Recording, second: Recording) -> Iterator[str]:
     """Yield a sentence for each column of the readings that is not what it was."""
-    yield from different(digest_of(recorded.blocks(), ()), digest_of(replayed.blocks(), ()))
+    yield from different(digest_of(first.blocks(), ()), digest_of(second.blocks(), ()))
 
 
 class _Rewriter(FleetingWriter):
@@ -111,7 +111,7 @@ class _Rewriter(FleetingWriter):
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
-        return super().commit() if self._closing or self.waiting >= _PART else self.acknowledged
+        return super().commit() if self._closing or self.pending_count >= _PART else self.acknowledged
 
     def close(self) -> None:
         """Wait: what ended may have been resumed."""
@@ -173,17 +173,17 @@ class _Player:
         self._stopped = False
 
     @property
-    def done(self) -> bool:
+    def at_end(self) -> bool:
         """Say whether the last step was taken."""
         return self._next == len(self._steps)
 
     def go_on(self) -> Ending | None:
         """Take the next step when its time has come, and say why the session is to be ended in it."""
         self._step = None
-        if self.done:
+        if self.at_end:
             return "stopped", STOPPED_BY_USER  # the course went another way, and waits for what never comes
         step = self._steps[self._next]
-        if self._waiting(step):
+        if self._wait_for(step):
             return None
         self._step = step
         self._next += 1
@@ -256,15 +256,15 @@ class _Player:
     def close(self) -> None:
         """Give back nothing."""
 
-    def _waiting(self, step: Step) -> bool:
+    def _wait_for(self, step: Step) -> bool:
         """Wait a little for a step whose time has not come, and say so."""
         if self.speed is None:
             return False
         due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self.speed
-        remaining = due - time.monotonic()
-        if remaining > 0.0:
-            time.sleep(min(remaining, SLICE))
-        return remaining > SLICE
+        remaining_s = due - time.monotonic()
+        if remaining_s > 0.0:
+            time.sleep(min(remaining_s, SLICE))
+        return remaining_s > SLICE
 
     def _move_past(self, what: str, step: Step, every: float) -> None:
         """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
@@ -299,29 +299,29 @@ def _run(
 
             player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, show)
             writer.follow_part(log)
-            resumed = None if number == 0 else _resume_part(recording.plan, writer.log_written, log)
-            _run_part(recording.plan, player, writer, resumed)
+            continuation = None if number == 0 else _resume_part(recording.plan, writer.log_written, log)
+            _run_part(recording.plan, player, writer, continuation)
     finally:
         writer.finish()
 
 
-def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Continuation | None) -> None:
+def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, continuation: Continuation | None) -> None:
     transducer, settings = player if plan.forces else None, player.settings
     with suppress(_CutShort, _Again):  # as the part ends
-        end = run_session(plan, writer, player, transducer, settings=settings, resumed=resumed, stop=player.go_on)
-        if end.cause == "stopped" and not player.done:
+        end = run_session(plan, writer, player, transducer, settings=settings, resumed=continuation, stop=player.go_on)
+        if end.cause == "stopped" and not player.at_end:
             raise Stopped
 
 
 def _resume_part(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Continuation:
     """Return where a part of the session continues, after the parts that are replayed already."""
-    resumed = next(event.data for event in log if event.kind == "resumed")
+    resumption_data = next(event.data for event in log if event.kind == "resumed")
     seams = [event.data for event in log if event.kind == "readings_joined"]
 
     def joins(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
         return _RecordedSeam(**seams[0]) if seams else _RecordedSeam(0, 0.0)
 
-    data = {name: value for name, value in resumed.items() if name != "run"}
+    data = {name: value for name, value in resumption_data.items() if name != "run"}
     return Continuation(resumption(plan, before), data, ReadingBlock.empty(), joins)
 
 

@@ -32,7 +32,7 @@ class Resumption:
     """Where a session that was cut short goes on."""
 
     state: State
-    owed: tuple[Line, ...]  # about takes: decided, or now due, and not in the log yet
+    due_lines: tuple[Line, ...]  # about takes: decided, or now due, and not in the log yet
     commands: tuple[Command, ...]  # that enter the state, without those about takes
 
 
@@ -42,29 +42,29 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
     Raises RecordingError where an event does not follow from those before it.
     """
     state, _ = start(plan)
-    owed: list[Line] = []
-    for logged in events:
-        line = (logged.kind, logged.trial, dict(logged.data))
+    due_lines: list[Line] = []
+    for entry in events:
+        line = (entry.kind, entry.trial, dict(entry.data))
         try:
-            event = event_of(logged)
+            event = event_of(entry)
         except ValueError as error:
-            raise RecordingError(f"event {logged.number} of the log is not readable ({error})") from error
+            raise RecordingError(f"event {entry.number} of the log is not readable ({error})") from error
         if event is not None:
             state, commands = advance(state, event)
             if any(isinstance(command, Refuse) for command in commands):
                 raise RecordingError(
-                    f"event {logged.number} ({logged.kind}) of the log does not follow from those before it:"
+                    f"event {entry.number} ({entry.kind}) of the log does not follow from those before it:"
                     " the session can be analysed, not resumed"
                 )
-            owed = _of_takes(commands)
-        elif line in owed:
-            owed.remove(line)
-        elif logged.kind in ("take_discarded", "resumed"):  # by the end of an earlier part, or by its resumption
+            due_lines = _of_takes(commands)
+        elif line in due_lines:
+            due_lines.remove(line)
+        elif entry.kind in ("take_discarded", "resumed"):  # by the end of an earlier part, or by its resumption
             state, _ = resume_interrupted(state, CUT_SHORT)
     state, commands = resume_interrupted(state, CUT_SHORT)
     due = _of_takes(commands)
     pending = tuple(command for command in commands if line_of(command) not in due)
-    return Resumption(state, (*owed, *due), pending)
+    return Resumption(state, (*due_lines, *due), pending)
 
 
 def check_resumable(recording: Recording) -> None:
@@ -79,24 +79,24 @@ def check_resumable(recording: Recording) -> None:
         raise RecordingError(f"{folder} ran on simulated time without a pace; begin a new session{seals}")
 
 
-def check_same_transducer(recorded: TransducerInfo | None, opened: TransducerInfo | None) -> None:
+def check_same_transducer(original: TransducerInfo | None, present: TransducerInfo | None) -> None:
     """Raise RecordingError unless the transducer is the one the session began with, set and calibrated alike."""
-    if recorded is None or opened is None:
-        if recorded is not opened:
+    if original is None or present is None:
+        if original is not present:
             raise RecordingError("the session began without a transducer, or is to go on without its own")
         return
-    if opened.serial != recorded.serial:
+    if present.serial != original.serial:
         raise RecordingError(
-            f"the session began on the transducer with serial number {recorded.serial}, and this one has"
-            f" {opened.serial}; connect the first, or begin a new session"
+            f"the session began on the transducer with serial number {original.serial}, and this one has"
+            f" {present.serial}; connect the first, or begin a new session"
         )
-    if calibration_hash(opened.calibration) != calibration_hash(recorded.calibration):
-        raise RecordingError(f"transducer {opened.serial} is calibrated otherwise than before; begin a new session")
+    if calibration_hash(present.calibration) != calibration_hash(original.calibration):
+        raise RecordingError(f"transducer {present.serial} is calibrated otherwise than before; begin a new session")
     # A device that counts no ticks of its own has its rate measured when it is opened, good to a few per cent.
-    tolerance = SPREAD if np.isnan(recorded.counter_rate) else 1e-3
-    if not np.isclose(opened.rate, recorded.rate, rtol=tolerance, equal_nan=True):
+    tolerance = SPREAD if np.isnan(original.counter_rate) else 1e-3
+    if not np.isclose(present.rate, original.rate, rtol=tolerance, equal_nan=True):
         raise RecordingError(
-            f"transducer {opened.serial} gives {opened.rate:g} readings a second, and gave {recorded.rate:g};"
+            f"transducer {present.serial} gives {present.rate:g} readings a second, and gave {original.rate:g};"
             " set it as it was"
         )
 
@@ -138,9 +138,10 @@ def continue_clock(recording: Recording, last: ReadingBlock, clock: Clock, now: 
     `last` holds the last readings (or none), `now` is the date. The session clock goes on from its last instant by as
     much as the wall clock says has passed, a second more or less: no two clocks of a computer survive its restart.
     """
-    known = [(str(recording.provenance["created_utc"]), int(recording.provenance["clock"]["now_ns"]))]
-    known += [(e.data["resumed_utc"], _clock_at_resumption(e.data)) for e in recording.events if e.kind == "resumed"]
-    utc, at_ns = known[-1]
+    clock_readings = [(str(recording.provenance["created_utc"]), int(recording.provenance["clock"]["now_ns"]))]
+    resumptions = (e.data for e in recording.events if e.kind == "resumed")
+    clock_readings += [(data["resumed_utc"], _clock_at_resumption(data)) for data in resumptions]
+    utc, at_ns = clock_readings[-1]
     instants = [at_ns, *(event.time_ns for event in recording.events), *last.received_ns.tolist()]
     last_ns = max(instants)
     elapsed_ns = round((now - datetime.fromisoformat(utc)).total_seconds() * 1e9)
@@ -153,9 +154,9 @@ def continue_clock(recording: Recording, last: ReadingBlock, clock: Clock, now: 
     return ContinuedClock(clock, offset_ns), gap
 
 
-def _clock_at_resumption(resumed: Mapping[str, Any]) -> int:
+def _clock_at_resumption(data: Mapping[str, Any]) -> int:
     """Return the session clock [ns] at the date of a `resumed`, which is written once the device is open."""
-    return int(resumed["last_ns"]) + max(round((resumed.get("gap") or 0.0) * 1e9), LEAST_GAP_NS)
+    return int(data["last_ns"]) + max(round((data.get("gap") or 0.0) * 1e9), LEAST_GAP_NS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,10 +174,10 @@ class Seam:
         """
         if not len(before):
             return Seam(0, 0.0)
-        passed = max(int(after.received_ns[0]) - int(before.received_ns[-1]), LEAST_GAP_NS) * 1e-9
+        gap_s = max(int(after.received_ns[0]) - int(before.received_ns[-1]), LEAST_GAP_NS) * 1e-9
         return Seam(
             int(before.sequence[-1]) + 1 - int(after.sequence[0]),
-            float(before.time[-1]) + passed - float(after.time[0]),
+            float(before.time[-1]) + gap_s - float(after.time[0]),
         )
 
     def join(self, block: ReadingBlock) -> ReadingBlock:

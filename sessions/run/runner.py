@@ -103,9 +103,9 @@ def run_session(
     """
     if plan.forces != (transducer is not None):
         raise ValueError("a visit with forces needs a transducer, and one without has none")
-    with interruptions() as interrupted:
+    with interruptions() as interruption:
         run = _Run(plan, writer, operator, transducer, writer.clock, settings or RunnerSettings(), progress, resumed)
-        return run.to_the_end(interrupted, stop)
+        return run.to_the_end(interruption, stop)
 
 
 @dataclass(eq=False)
@@ -130,14 +130,14 @@ class _Run:
         self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), self.clock.now_ns())
         self._rested_ns: int | None = None  # when the rest is over [session clock]
 
-    def to_the_end(self, interrupted: Interruptions, stop: Callable[[], Ending | None]) -> SessionEnd:
+    def to_the_end(self, interruption: Interruptions, stop: Callable[[], Ending | None]) -> SessionEnd:
         """Run, and write the end whatever it was."""
         try:
             self._write_beginning()
             if self.transducer is not None:
-                with interrupted.raise_at_once():  # a device that does not answer may take its time
+                with interruption.raise_at_once():  # a device that does not answer may take its time
                     self.transducer.start()
-            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interrupted.heard else stop())
+            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interruption.heard else stop())
         except (LinkLost, DeviceFault, SetupError) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:
@@ -158,7 +158,7 @@ class _Run:
         if self.resumed is None:
             self.writer.event("started", data=settings)
             return
-        for line in self.resumed.at.owed:
+        for line in self.resumed.at.due_lines:
             self.writer.event(*line, commit=False)
         self.writer.event("resumed", data={**self.resumed.data, "run": settings["settings"]})
 
@@ -217,10 +217,10 @@ class _Run:
             self.writer.event("refused", trial_in_hand(before), data)
             self.operator.show(refusals[0])
             return
-        logged = self.writer.event(kind, trial_in_hand(before), data_of(event), commit=False)
+        entry = self.writer.event(kind, trial_in_hand(before), data_of(event), commit=False)
         for command in commands:
             if isinstance(command, AskRest):  # reckoned from the event it follows, whose instant a replay knows
-                self._rested_ns = None if command.duration is None else logged.time_ns + round(command.duration * 1e9)
+                self._rested_ns = None if command.duration is None else entry.time_ns + round(command.duration * 1e9)
         if isinstance(event, UndoRedo) or not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
             self._watch = None
         self._carry_out(commands)
@@ -251,13 +251,14 @@ class _Run:
         counts = {name: getattr(health, name) - getattr(self._reported, name) for name in COUNTS}
         if any(counts.values()) and (now or self._due("losses", self.settings.losses_every)):
             summary = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-            flagged = {words: count - self._reported.flagged.get(words, 0) for words, count in health.flagged.items()}
-            flagged = {words: count for words, count in flagged.items() if count}
+            before = self._reported.flagged
+            flags = {words: count - before.get(words, 0) for words, count in health.flagged.items()}
+            flags = {words: count for words, count in flags.items() if count}
             causes = [health.rate_words] if counts["off_rate"] else []
-            causes += [f"status: {flagged_words(flagged)}"] if flagged else []
+            causes += [f"status: {flagged_words(flags)}"] if flags else []
             sentence = f"readings: {summary}" + (f" ({'; '.join(causes)})" if causes else "")
             data: dict[str, Any] = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else {**counts}
-            data |= {"flagged": flagged} if flagged else {}
+            data |= {"flagged": flags} if flags else {}
             self.writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
             self._reported = health
 

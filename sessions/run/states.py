@@ -81,8 +81,8 @@ class Place:
         stimuli: list[tuple[Stimulus, bool]] = []
         for n, (trial, progress) in enumerate(zip(trials, self.progress, strict=True)):
             if trial.block == self.trial.block and progress.kept and progress.choice is not None:
-                compared = trials[n - 1] if trial.standard else trial
-                stimuli.append((compared.stimulus, (progress.choice == "second") == (compared is trial)))
+                comparison = trials[n - 1] if trial.standard else trial
+                stimuli.append((comparison.stimulus, (progress.choice == "second") == (comparison is trial)))
         return tuple(stimuli)
 
     def with_take(self, take: int) -> "Place":

@@ -59,12 +59,12 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
 
 
-def slope_interval(related: Relation) -> tuple[float, float] | None:
+def slope_interval(line: Relation) -> tuple[float, float] | None:
     """Return the 95 % t interval of the slope (n - 2 degrees of freedom); None without one, or where r is 0 or 1.
 
     Its standard error follows from r: (slope / r) sqrt((1 - r^2) / (n - 2)).
     """
-    r, slope, n = related.pearson, related.slope, related.n
+    r, slope, n = line.pearson, line.slope, line.n
     if r is None or slope is None or not r or n < 3 or abs(r) > _PERFECT:
         return None
     half = t_quantile(n - 2) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
@@ -106,14 +106,14 @@ def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
     return None if pearson(x, y) is None else _rank_correlation(x, y)
 
 
-def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | None, float | None]:
+def fisher_interval(r: float, n: int, inflation: float = 1.0) -> tuple[float | None, float | None]:
     """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
 
     None for fewer than four points, or where all points agree wholly or are each other's reverse.
     """
     if n < 4 or abs(r) > _PERFECT:
         return None, None
-    half = t_quantile(math.inf) * math.sqrt(inflated / (n - 3))
+    half = t_quantile(math.inf) * math.sqrt(inflation / (n - 3))
     return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
 
 
@@ -189,18 +189,18 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
 
     Correlations as for `steiger_z`, which says when there is none; a negative one is turned round with its variable.
     """
-    turned = math.copysign(1.0, first) * math.copysign(1.0, second)
-    first, second, mutual = abs(first), abs(second), turned * mutual
+    sign = math.copysign(1.0, first) * math.copysign(1.0, second)
+    first, second, mutual = abs(first), abs(second), sign * mutual
     z = steiger_z(first, second, mutual, n)
     if z is None:
         return None
     half = t_quantile(math.inf) / math.sqrt(n - 3)
     (a, b), (c, d) = ((math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)) for r in (first, second))
-    shared = _covariance(first, second, mutual) / ((1 - first**2) * (1 - second**2))
+    covariance = _covariance(first, second, mutual) / ((1 - first**2) * (1 - second**2))
     difference = first - second
 
     def reach(one: float, other: float) -> float:
-        return math.sqrt(max(one**2 + other**2 - 2 * shared * one * other, 0.0))
+        return math.sqrt(max(one**2 + other**2 - 2 * covariance * one * other, 0.0))
 
     low, high = difference - reach(first - a, d - second), difference + reach(b - first, second - c)
     return Contrast(n, difference, low, high, z, math.erfc(abs(z) / math.sqrt(2.0)))
@@ -209,8 +209,8 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
 def partial_correlation(xy: ArrayLike, xz: ArrayLike, yz: ArrayLike) -> Array:
     """Return correlations of x and y given z, from their three correlations; nan where z determines one of them."""
     xy, xz, yz = (np.asarray(r, np.float64) for r in (xy, xz, yz))
-    left = (1 - xz * xz) * (1 - yz * yz)
-    partial = np.where(left > 1e-12, xy - xz * yz, np.nan) / np.sqrt(np.where(left > 1e-12, left, 1.0))
+    product = (1 - xz * xz) * (1 - yz * yz)
+    partial = np.where(product > 1e-12, xy - xz * yz, np.nan) / np.sqrt(np.where(product > 1e-12, product, 1.0))
     return np.clip(partial, -1.0, 1.0)
 
 
@@ -221,15 +221,15 @@ def leave_one_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
     """
     if len(x) < 3:
         return None
-    centred = np.asarray(x, np.float64) - float(np.mean(x))
-    size = float(centred @ centred)
+    deviations = np.asarray(x, np.float64) - float(np.mean(x))
+    size = float(deviations @ deviations)
     if size <= 1e-24 * float(np.max(np.abs(x))) ** 2:
         return None
-    own = 1.0 - 1.0 / len(x) - centred**2 / size
+    own = 1.0 - 1.0 / len(x) - deviations**2 / size
     if float(own.min()) < 1e-9:
         return None
     values = np.asarray(y, np.float64) - float(np.mean(y))
-    errors = (values - centred * float(centred @ values) / size) / own
+    errors = (values - deviations * float(deviations @ values) / size) / own
     return float(np.sqrt(np.mean(errors**2)))
 
 

@@ -60,13 +60,13 @@ class _Likelihood:
 
     def deviance(self, at: Array) -> tuple[float, Array]:
         """Return -2 log likelihood, and its gradient."""
-        factor, left, value = self.reduce(at)
+        factor, cross_products, value = self.reduce(at)
         c = len(factor)
-        root = linalg.cholesky(left[c:-1, c:-1], lower=True)
-        half = linalg.solve_triangular(root, left[c:-1], lower=True)
-        left = left - half.T @ half  # by what the fixed effects leave
-        rest = float(left[-1, -1])
-        by = left[:c, :c] - self.dof / rest * np.outer(left[:c, -1], left[:c, -1])
+        root = linalg.cholesky(cross_products[c:-1, c:-1], lower=True)
+        half = linalg.solve_triangular(root, cross_products[c:-1], lower=True)
+        cross_products = cross_products - half.T @ half  # by what the fixed effects leave
+        rest = float(cross_products[-1, -1])
+        by = cross_products[:c, :c] - self.dof / rest * np.outer(cross_products[:c, -1], cross_products[:c, -1])
         if self.reml:
             value += 2.0 * float(np.log(np.diag(root)).sum())
         else:
@@ -129,11 +129,11 @@ def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int
     patterns = np.array([np.kron(np.eye(whose.shape[1]), unit) for unit in units], np.float64)
     likelihood = _Likelihood.of(y, columns, random, patterns, reml=True)
     at = likelihood.maximum([np.diag(spread)[places] for spread in product(_STARTS, repeat=own)])
-    factor, left, _ = likelihood.reduce(at)
-    factor, left = factor[:own, :own], left[random.shape[1] :, random.shape[1] :]
-    inverse = np.linalg.inv(left[:-1, :-1])
-    beta = inverse @ left[:-1, -1]
-    square = float(left[-1, -1] - left[-1, :-1] @ beta) / likelihood.dof
+    factor, cross_products, _ = likelihood.reduce(at)
+    factor, cross_products = factor[:own, :own], cross_products[random.shape[1] :, random.shape[1] :]
+    inverse = np.linalg.inv(cross_products[:-1, :-1])
+    beta = inverse @ cross_products[:-1, -1]
+    square = float(cross_products[-1, -1] - cross_products[-1, :-1] @ beta) / likelihood.dof
     return Fit(
         estimates=likelihood.offset + beta,
         errors=np.sqrt(square * np.diag(inverse)),
@@ -153,8 +153,8 @@ def _levels(groups: Sequence[str] | Sequence[int] | Array) -> Array:
 
 def fits_exactly(design: Array, y: Array) -> bool:
     """Say whether columns (n, k) leave nothing of y (n) but round-off."""
-    left = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
-    return float(np.abs(left).max()) <= 1e-9 * (1.0 + float(np.abs(y).max()))
+    residuals = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    return float(np.abs(residuals).max()) <= 1e-9 * (1.0 + float(np.abs(y).max()))
 
 
 def crossed_deviance(
@@ -204,7 +204,7 @@ class Spreads:
 
     level: Spread  # of the subjects' levels, at the mean of the covariate [unit of y]
     slope: Spread | None  # of their slopes on the covariate [unit of y over unit of x]; None without one
-    left: Spread  # of y about each subject's own line: the noise of single trials
+    residual: Spread  # of y about each subject's own line: the noise of single trials
     subjects: int
     dof: int  # of what is left
 
@@ -310,29 +310,29 @@ def spreads(
     own = 1 if x is None else 2
     codes, whole = np.unique(np.array(subjects), return_inverse=True)
     trials = np.bincount(whole, minlength=len(codes))
-    kept = trials[whole] > own
-    used = np.unique(whole[kept])
-    k = len(used)
+    usable = trials[whole] > own
+    subject_numbers = np.unique(whole[usable])
+    k = len(subject_numbers)
     if k < 3:
         return None
-    who = (whole[kept][:, None] == used[None, :]).astype(np.float64)  # (n, k)
+    who = (whole[usable][:, None] == subject_numbers[None, :]).astype(np.float64)  # (n, k)
     lines = who
     if x is not None:
-        along = np.array(x, np.float64)[kept]
+        along = np.array(x, np.float64)[usable]
         lines = np.hstack([who, who * (along - along.mean())[:, None]])
-    shared = np.array(common, np.float64).reshape(len(common), len(y))[:, kept].T
+    shared = np.array(common, np.float64).reshape(len(common), len(y))[:, usable].T
     design = np.hstack([lines, shared])
     scale = np.abs(design).max(axis=0)
     if not scale.all():
         return None
     design /= scale
-    values = np.array(y, np.float64)[kept]
+    values = np.array(y, np.float64)[usable]
     dof = len(values) - design.shape[1]
     if dof < 1 or np.linalg.matrix_rank(design) < design.shape[1]:
         return None
     inverse = np.asarray(np.linalg.pinv(design), np.float64)
-    left = values - design @ inverse @ values
-    square = float(left @ left) / dof
+    residuals = values - design @ inverse @ values
+    square = float(residuals @ residuals) / dof
     coefficients, errors = inverse @ values / scale, inverse @ inverse.T / np.outer(scale, scale)
 
     def between(first: int) -> Spread:
@@ -357,10 +357,10 @@ def difference_of_squares(first: float, n: int, second: float, m: int) -> Spread
         return dof / float(special.chdtri(dof, 1 - q))
 
     f, g, h = float(special.fdtri(n, m, 1 - tail)), 1 - over(1 - tail, n), over(tail, m) - 1
-    covered = ((f - 1) ** 2 - (g * f) ** 2 - h * h) / f
-    low = difference - math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + covered * first * second, 0.0))
+    bound = ((f - 1) ** 2 - (g * f) ** 2 - h * h) / f
+    low = difference - math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + bound * first * second, 0.0))
     f, g, h = float(special.fdtri(n, m, tail)), over(tail, n) - 1, 1 - over(1 - tail, m)
-    covered = ((1 - f) ** 2 - (g * f) ** 2 - h * h) / f
-    high = difference + math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + covered * first * second, 0.0))
+    bound = ((1 - f) ** 2 - (g * f) ** 2 - h * h) / f
+    high = difference + math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + bound * first * second, 0.0))
     sd, least, greatest = (math.sqrt(max(square, 0.0)) for square in (difference, low, high))
     return Spread(sd, least, greatest)

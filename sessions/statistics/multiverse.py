@@ -116,8 +116,8 @@ def trial_paths(
             kind = replace(steady, kinematics=path.kinematics)
             scenes[path] = scenes_of(_analysis_of_path(analyses, path, usual), recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
-    known = [row.prediction for row in prediction.trials if row.prediction is not None]
-    answers = _solve_scenes(tuple(wanted), known, quantity, progress)
+    predictions = [row.prediction for row in prediction.trials if row.prediction is not None]
+    answers = _solve_scenes(tuple(wanted), predictions, quantity, progress)
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
 
     def value(trial: int, path: Path) -> float | None:
@@ -160,7 +160,7 @@ def _analysis_of_path(
 
 
 def _solve_scenes(
-    scenes: Sequence[Scene], known: Sequence[Prediction], quantity: Quantity, progress: Progress | None
+    scenes: Sequence[Scene], predictions: Sequence[Prediction], quantity: Quantity, progress: Progress | None
 ) -> Mapping[Scene, Pair | None]:
     """Return a quantity over the ending and at its middle of each scene, None where it has no settled state.
 
@@ -170,7 +170,7 @@ def _solve_scenes(
     ordered = sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf))
     alike = by_key((_kind(scene), scene) for scene in ordered)
     first = {kind: group[0] for kind, group in alike.items()}
-    solved = {kind: one for one in known if (kind := _kind(one.scene)) in first}
+    solved = {kind: one for one in predictions if (kind := _kind(one.scene)) in first}
     new = [kind for kind in first if kind not in solved]
     answers = settled_predictions([first[kind] for kind in new], part_of(progress, 0.0, 0.5))
     solved |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
@@ -229,10 +229,10 @@ def path_findings(
     along = [trial for trial in trials if trial.values]
     if not along:
         return ()
-    rule, gone = along[0].rule, min(len(trial.values) for trial in along)
+    rule, path_count = along[0].rule, min(len(trial.values) for trial in along)
     return tuple(
         _finding(n, path, along, usual=path.usual(rule, kinematics, law), within=within)
-        for n, path in enumerate(PATHS[:gone])
+        for n, path in enumerate(PATHS[:path_count])
     )
 
 
@@ -271,9 +271,9 @@ class Spread:
 
 def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
     """Return the correlation of each path: within subjects where any path has that, else of the means."""
-    listed = list(findings)
-    inner = any(one.within is not None for one in listed)
-    return [one.within if inner else one.r for one in listed]
+    paths = list(findings)
+    inner = any(one.within is not None for one in paths)
+    return [one.within if inner else one.r for one in paths]
 
 
 def spread(values: Sequence[float | None]) -> Spread | None:
@@ -305,6 +305,6 @@ def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread |
         names = dict.fromkeys(getattr(one.path, choice) for one in findings)
         usual = {getattr(one.path, choice) for one in findings if one.usual}
         for name in names:
-            chosen = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
-            rows.append((choice, name, spread(chosen), name in usual))
+            subset = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
+            rows.append((choice, name, spread(subset), name in usual))
     return tuple(rows)

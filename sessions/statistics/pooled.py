@@ -80,33 +80,34 @@ def pool_visits(
     `options` is what was asked of each visit, `quantity` that response of the model which is held against scores.
     `ground_truth` is that of a synthetic study; nothing but the comparison uses it.
     """
-    ordered = tuple(sorted(visits, key=lambda visit: visit.session))
-    same = by_key((visit.sha256, visit.session) for visit in ordered if visit.sha256)
+    in_order = tuple(sorted(visits, key=lambda visit: visit.session))
+    same = by_key((visit.sha256, visit.session) for visit in in_order if visit.sha256)
     copies = {session: first for first, *more in same.values() for session in more}
-    counted = [visit for visit in ordered if visit.session not in copies]
-    kept = [(v, row) for v in counted for row in v.rows if exclusion_of(exclusions, v.subject, row.descriptor) is None]
-    tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
-    chosen = options or VisitOptions()
+    unique_visits = [visit for visit in in_order if visit.session not in copies]
+    rows = ((v, row) for v in unique_visits for row in v.rows)
+    trials = [(v, row) for v, row in rows if exclusion_of(exclusions, v.subject, row.descriptor) is None]
+    tables = [scores_of(visit, [row for v, row in trials if v is visit]) for visit in unique_visits]
+    options = options or VisitOptions()
     descriptors = _with_holm(
         [
-            _descriptor(name, chosen, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
-            for name in dict.fromkeys(row.descriptor for _, row in kept)
+            _descriptor(name, options, quantity, tables, [(v, row) for v, row in trials if row.descriptor == name])
+            for name in dict.fromkeys(row.descriptor for _, row in trials)
         ]
     )
-    simulated = sum(bool(visit.simulated) for visit in ordered)
-    head = f"SIMULATED: {simulated} of the {len(ordered)} sessions of this study are simulated"
+    simulated = sum(bool(visit.simulated) for visit in in_order)
+    head = f"SIMULATED: {simulated} of the {len(in_order)} sessions of this study are simulated"
     return StudyFindings(
         simulated=head if simulated else "",
-        options=chosen,
-        visits=ordered,
+        options=options,
+        visits=in_order,
         failed=tuple(sorted(failed)),
-        copies=tuple((v.session, copies[v.session]) for v in ordered if v.session in copies),
+        copies=tuple((v.session, copies[v.session]) for v in in_order if v.session in copies),
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=descriptors,
         effects=() if ground_truth is None else effect_recoveries(descriptors, ground_truth),
-        friction=None if ground_truth is None else friction_recovery(ordered, ground_truth["strokes"]),
-        flaws=() if ground_truth is None else flaw_detections(ordered, dict(failed), ground_truth.get("spoilt", {})),
+        friction=None if ground_truth is None else friction_recovery(in_order, ground_truth["strokes"]),
+        flaws=() if ground_truth is None else flaw_detections(in_order, dict(failed), ground_truth.get("spoilt", {})),
         synthetic=None if ground_truth is None else ground_truth.get("seed"),
         response=quantity.name,
     )
@@ -114,8 +115,8 @@ def pool_visits(
 
 def _with_holm(descriptors: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
     ps = {one.descriptor: one.repeated.people_p for one in descriptors if one.repeated is not None}
-    known = {descriptor: p for descriptor, p in ps.items() if p is not None}
-    adjusted = dict(zip(known, holm(list(known.values())), strict=True))
+    p_values = {descriptor: p for descriptor, p in ps.items() if p is not None}
+    adjusted = dict(zip(p_values, holm(list(p_values.values())), strict=True))
     return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in descriptors)
 
 
@@ -124,14 +125,14 @@ def _descriptor(
 ) -> DescriptorFindings:
     indices = tuple(sorted({row.index for _, row in trials}))
     matrix = score_matrix(tables, name)
-    answered = [(v.subject, r, r.response(quantity.name), r.score) for v, r in trials]
-    scored = [(subject, row, score) for subject, row, _, score in answered if score is not None]
-    points = [(subject, r, x, score) for subject, r, x, score in answered if x is not None and score is not None]
+    rows = [(v.subject, r, r.response(quantity.name), r.score) for v, r in trials]
+    score_rows = [(subject, row, score) for subject, row, _, score in rows if score is not None]
+    points = [(subject, r, x, score) for subject, r, x, score in rows if x is not None and score is not None]
     plain = tuple((subject, row.index, x, score) for subject, row, x, score in points)
     pairs = choices(trials)
     scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
-    compared = constant_stimuli(trials)
-    competing = [RivalTrial(subject, row.index, score, rival_values(row)) for subject, row, _, score in points]
+    comparisons = constant_stimuli(trials)
+    rival_trials = [RivalTrial(subject, row.index, score, rival_values(row)) for subject, row, _, score in points]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -144,8 +145,8 @@ def _descriptor(
         mean_relation=_relation(plain),
         repeated=repeated_correlation([p[0] for p in plain], [p[2] for p in plain], [p[3] for p in plain]),
         repeated_holm=None,
-        rivals=rivals_within(competing, quantity.label),
-        rivals_of_means=rivals_of_surfaces(competing, quantity.label),
+        rivals=rivals_within(rival_trials, quantity.label),
+        rivals_of_means=rivals_of_surfaces(rival_trials, quantity.label),
         without_subject=_without_subject([(subject, x, score) for subject, _, x, score in plain]),
         normalised=_normalise(z_scores(matrix), plain),
         differences=differences(matrix),
@@ -156,8 +157,8 @@ def _descriptor(
         on_response=_model(
             [(subject, row, score) for subject, row, _, score in points], quantity, response_term(quantity)
         ),
-        on_index=_model(scored, quantity, INDEX),
-        on_friction=_model([one for one in scored if one[1].mu is not None], quantity, INDEX, FRICTION),
+        on_index=_model(score_rows, quantity, INDEX),
+        on_friction=_model([one for one in score_rows if one[1].mu is not None], quantity, INDEX, FRICTION),
         fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
         paths=path_findings(
             [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
@@ -165,8 +166,8 @@ def _descriptor(
             options.area,
             within=True,
         ),
-        constant_stimuli=compared,
-        latent=latent_scales(trials, scales, compared),
+        constant_stimuli=comparisons,
+        latent=latent_scales(trials, scales, comparisons),
     )
 
 
@@ -315,11 +316,11 @@ def choices(trials: Trials) -> list[Choice]:
 
 def constant_stimuli(trials: Trials) -> ConstantStimuli | None:
     """Return the psychometric function of each subject who compared with a standard; None where nobody did."""
-    compared = by_key((visit.subject, (visit, row)) for visit, row in trials if row.standard is not None)
-    answered = {subject: own for subject, own in sorted(compared.items()) if any(row.choice for _, row in own)}
-    if not answered:
+    by_subject = by_key((visit.subject, (visit, row)) for visit, row in trials if row.standard is not None)
+    own_trials = {subject: own for subject, own in sorted(by_subject.items()) if any(row.choice for _, row in own)}
+    if not own_trials:
         return None
-    functions = {subject: subject_function(own) for subject, own in answered.items()}
+    functions = {subject: subject_function(own) for subject, own in own_trials.items()}
     pse = [one.pse.value for one in functions.values() if one.pse is not None]
     jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
     return ConstantStimuli(functions, average(pse), average(jnd))
@@ -337,12 +338,12 @@ def subject_function(trials: Trials) -> Psychometric:
 
 
 def latent_scales(
-    trials: Trials, scales: Sequence[PairedScale], compared: ConstantStimuli | None
+    trials: Trials, scales: Sequence[PairedScale], comparisons: ConstantStimuli | None
 ) -> Mapping[Judgement, Mapping[int, IntervalEstimate]]:
     """Return the latent values of each surface by every kind of judgement that has some."""
     scores = [(v.subject, row.index, row.score) for v, row in trials if row.score is not None]
     logs = [(v.subject, row.index, math.log(row.estimate)) for v, row in trials if row.estimate and row.estimate > 0.0]
-    jnd = None if compared is None else compared.jnd
+    jnd = None if comparisons is None else comparisons.jnd
     by_judgement: dict[Judgement, Mapping[int, IntervalEstimate]] = {
         "scores": of_judgements(scores),
         "estimates": of_judgements(logs),

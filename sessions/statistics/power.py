@@ -154,12 +154,12 @@ def study_weights(
     own = draw.choice(len(strokes[quantity]), people, replace=False)
     values = {name: all_of[own] for name, all_of in strokes.items()}
     usable = np.isfinite(np.stack(list(values.values()))).all(axis=0)
-    known: Array = strokes[quantity][np.isfinite(strokes[quantity])]
+    finite: Array = strokes[quantity][np.isfinite(strokes[quantity])]
     level, noise = draw.standard_normal((people, 1)), draw.standard_normal(usable.shape)
     slope = effects.rise * np.ones((people, 1))
     if effects.slope_sd:
         slope *= 1.0 + effects.slope_sd * draw.standard_normal((people, 1))
-    scores: Array = slope * (values[quantity] - known.mean()) / known.std()
+    scores: Array = slope * (values[quantity] - finite.mean()) / finite.std()
     scores += _MIDDLE + effects.level_sd * level + effects.noise * noise
     subjects, trials = np.nonzero(usable)
     at = (trials % surfaces).tolist()
@@ -178,6 +178,6 @@ def preferred_rivals(weights: Sequence[Mapping[str, float]]) -> list[str]:
 
 def twins(strokes: Mapping[str, Array], quantity: str) -> set[str]:
     """Return the quantity and those that go with it over all strokes."""
-    known = np.isfinite(np.stack(list(strokes.values()))).all(axis=0)
-    size = {name: abs(float(np.corrcoef(x[known], strokes[quantity][known])[0, 1])) for name, x in strokes.items()}
+    finite = np.isfinite(np.stack(list(strokes.values()))).all(axis=0)
+    size = {name: abs(float(np.corrcoef(x[finite], strokes[quantity][finite])[0, 1])) for name, x in strokes.items()}
     return {name for name, r in size.items() if r >= TWIN} | {quantity}

@@ -46,7 +46,7 @@ class Level:
     """The answers to one comparison in one order."""
 
     log_ratio: float  # of the comparison's magnitude by the standard's [-]
-    chosen: int  # how often the comparison was judged to have more
+    choices: int  # how often the comparison was judged to have more
     presented: int
     order: int = 0  # 1: the comparison came second; -1: first; 0: not known
 
@@ -72,12 +72,12 @@ class Psychometric:
 
 def psychometric(levels: Sequence[Level]) -> Psychometric:
     """Return the function fitted to answers."""
-    shown = [one for one in levels if one.presented]
-    none = Psychometric(sum(one.presented for one in shown))
-    ratios = {one.log_ratio for one in shown}
+    levels = [one for one in levels if one.presented]
+    none = Psychometric(sum(one.presented for one in levels))
+    ratios = {one.log_ratio for one in levels}
     if len(ratios) < LEAST_LEVELS:
         return replace(none, reason=f"it takes {LEAST_LEVELS} comparisons of different friction")
-    task = _Task(shown)
+    task = _Task(levels)
     if task.flat:
         return replace(none, reason="answers hardly go with friction: the JND lies beyond all comparisons")
     slope = task.profile(_SLOPE)
@@ -91,7 +91,7 @@ def psychometric(levels: Sequence[Level]) -> Psychometric:
         rises=slope.value > 0.0,
         log_likelihood=task.likelihood,
         deviance=task.deviance(),
-        freedom=len(shown) - task.parameters,
+        freedom=len(levels) - task.parameters,
     )
 
 
@@ -106,7 +106,7 @@ class _Task:
     def __init__(self, levels: Sequence[Level]) -> None:
         self.x = np.array([one.log_ratio for one in levels])
         self.side = np.array([float(one.order) for one in levels])
-        self.k = np.array([float(one.chosen) for one in levels])
+        self.k = np.array([float(one.choices) for one in levels])
         self.n = np.array([float(one.presented) for one in levels])
         # Of every answer: level, how many came before, whether the comparison was chosen, and how many like it before.
         self.level = np.repeat(np.arange(len(levels)), [one.presented for one in levels])
@@ -288,18 +288,18 @@ def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int]
     """
     log_mu = {key: float(np.mean(np.log(values))) for key, values in friction.items() if values}
     presented: Counter[tuple[str, int, int, bool]] = Counter()
-    chosen: Counter[tuple[str, int, int, bool]] = Counter()
+    choices: Counter[tuple[str, int, int, bool]] = Counter()
     for session, standard, (first, second), choice in answers:
         after = first == standard  # the comparison was stroked after the standard
         index = second if after else first
         if (session, index) in log_mu and (session, standard) in log_mu:
             presented[session, standard, index, after] += 1
-            chosen[session, standard, index, after] += choice == ("second" if after else "first")
+            choices[session, standard, index, after] += choice == ("second" if after else "first")
     if answers and not presented:
         return Psychometric(0, reason="no friction was measured of the standard and of what it was compared with")
     return psychometric(
         [
-            Level(log_mu[session, index] - log_mu[session, standard], chosen[key], count, 1 if after else -1)
+            Level(log_mu[session, index] - log_mu[session, standard], choices[key], count, 1 if after else -1)
             for key, count in sorted(presented.items())
             for session, standard, index, after in [key]
         ]

@@ -88,13 +88,13 @@ def rivals_of_means(
 
 def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
     """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
-    counted = [trial for trial in trials if model in trial.values]
+    own_trials = [trial for trial in trials if model in trial.values]
 
     def means(value: Callable[[RivalTrial], float | None]) -> Mapping[int, float]:
-        points = [(t.subject, t.index, v) for t in counted if (v := value(t)) is not None]
+        points = [(t.subject, t.index, v) for t in own_trials if (v := value(t)) is not None]
         return surface_means(points) or {}
 
-    names = [name for name in RIVAL_NAMES if any(name in trial.values for trial in counted)]
+    names = [name for name in RIVAL_NAMES if any(name in trial.values for trial in own_trials)]
     series = {name: means(lambda t, name=name: t.values.get(name)) for name in names}
     return rivals_of_means(means(lambda t: t.score), series, model)
 
@@ -105,16 +105,16 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple
     Differences and partial correlations have the jackknife's intervals over subjects: those of other people on these
     very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
     """
-    counted = [trial for trial in trials if model in trial.values]
-    names = [name for name in _model_first(model) if any(name in trial.values for trial in counted)]
-    if not counted:
+    own_trials = [trial for trial in trials if model in trial.values]
+    names = [name for name in _model_first(model) if any(name in trial.values for trial in own_trials)]
+    if not own_trials:
         return ()
-    deviances = {name: _deviance(name, counted) for name in names}
+    deviances = {name: _deviance(name, own_trials) for name in names}
     whole = {name: value for name, value in deviances.items() if not isinstance(value, str)}
     weights = dict(zip(whole, akaike_weights(list(whole.values())), strict=True)) if whole else {}
     return tuple(
         _because(
-            replace(_within(name, model, counted), weight=weights.get(name)),
+            replace(_within(name, model, own_trials), weight=weights.get(name)),
             weight=deviance if isinstance(deviance, str) else None,
         )
         for name, deviance in deviances.items()
@@ -126,24 +126,24 @@ def _model_first(model: str) -> tuple[str, ...]:
 
 
 def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:
-    used = [name, model, *([MODEL_MU] if MODEL_MU in series else [])]
+    quantities = [name, model, *([MODEL_MU] if MODEL_MU in series else [])]
     own = [index for index in scores if index in series[name]]
     x, y = [series[name][i] for i in own], [scores[i] for i in own]
-    related, error = relation(x, y, own), leave_one_out_error(x, y)
-    rival = Rival(name, len(own), related.pearson, related.low, related.high, left_out_error=error)
-    rival = _because(rival, r=related.reason, left_out_error=_NO_LINE if error is None else None)
-    shared = [i for i in scores if all(i in series[one] for one in used)]
-    score = [scores[i] for i in shared]
-    values = {one: [series[one][i] for i in shared] for one in used}
+    fit, error = relation(x, y, own), leave_one_out_error(x, y)
+    rival = Rival(name, len(own), fit.pearson, fit.low, fit.high, left_out_error=error)
+    rival = _because(rival, r=fit.reason, left_out_error=_NO_LINE if error is None else None)
+    indices = [i for i in scores if all(i in series[one] for one in quantities)]
+    score = [scores[i] for i in indices]
+    values = {one: [series[one][i] for i in indices] for one in quantities}
     if name != model:
         rival = _compare(rival, values[model], values[name], score)
-    if MODEL_MU not in used or name == MODEL_MU:
+    if MODEL_MU not in quantities or name == MODEL_MU:
         return _because(rival, partial="µ itself is given")
     xy, xz, yz = pearson(values[name], score), pearson(values[name], values[MODEL_MU]), pearson(score, values[MODEL_MU])
     partial = math.nan if xy is None or xz is None or yz is None else float(partial_correlation(xy, xz, yz))
     if math.isnan(partial):
         return _because(rival, partial="µ determines it, or there are too few surfaces")
-    low, high = fisher_interval(partial, len(shared) - 1)
+    low, high = fisher_interval(partial, len(indices) - 1)
     return replace(rival, partial=partial, partial_low=low, partial_high=high)
 
 
@@ -153,27 +153,27 @@ def _compare(rival: Rival, model: Sequence[float], values: Sequence[float], scor
     rho = spearman(model, values)
     if first is None or second is None or mutual is None or rho is None:
         return _because(rival, contrast="too few surfaces have both, or one of them does not vary")
-    turned = math.copysign(1.0, first * second)
+    sign = math.copysign(1.0, first * second)
     rival = replace(
         rival,
         contrast=contrast(first, second, mutual, len(score)),
         same_order=abs(rho) > 1 - 1e-12,
-        needed=required_cases(abs(first), abs(second), turned * mutual),
+        needed=required_cases(abs(first), abs(second), sign * mutual),
     )
     return _because(rival, contrast=None if rival.contrast else "no test from these few surfaces, or of a perfect r")
 
 
 def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
-    used = [*dict.fromkeys((name, model, MODEL_MU))]
+    quantities = [*dict.fromkeys((name, model, MODEL_MU))]
     mine = [trial for trial in trials if name in trial.values]
     x, y = [trial.values[name] for trial in mine], [trial.score for trial in mine]
-    related, error = repeated_correlation([trial.subject for trial in mine], x, y), _leave_surface_out_error(mine, name)
-    low, high = (related.people if related is not None else None) or (None, None)
-    rival = Rival(name, len(mine), None if related is None else related.r, low, high, left_out_error=error)
-    no_r = "too few trials within subjects, or no variation" if related is None else None
+    within, error = repeated_correlation([trial.subject for trial in mine], x, y), _leave_surface_out_error(mine, name)
+    low, high = (within.people if within is not None else None) or (None, None)
+    rival = Rival(name, len(mine), None if within is None else within.r, low, high, left_out_error=error)
+    no_r = "too few trials within subjects, or no variation" if within is None else None
     rival = _because(rival, r=no_r, left_out_error=_NO_LINE if error is None else None)
-    shared = [trial for trial in mine if all(one in trial.values for one in used)]
-    covariances = _covariances(shared, used)
+    complete = [trial for trial in mine if all(one in trial.values for one in quantities)]
+    covariances = _covariances(complete, quantities)
     if covariances is None:
         few = f"it takes {LEAST_CASES} subjects with two trials or more that have all of them"
         return _because(rival, partial=few, contrast=None if name == model else few)
@@ -181,19 +181,19 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
         own, models = (_correlations(covariances, 0, column) for column in (1, 2))
         steps = np.sign(models[0]) * models - np.sign(own[0]) * own
         if math.isfinite(steps[0]):
-            low, high, p = _known(*jackknife(steps[0], steps[1:]))
-            rival = replace(rival, contrast=Contrast(len(shared), float(steps[0]), low, high, None, p))
+            low, high, p = _finite_or_none(*jackknife(steps[0], steps[1:]))
+            rival = replace(rival, contrast=Contrast(len(complete), float(steps[0]), low, high, None, p))
         else:
             rival = _because(rival, contrast="one of them does not vary within subjects")
     if name == MODEL_MU:
         return _because(rival, partial="µ itself is given")
-    mu = used.index(MODEL_MU) + 1
+    mu = quantities.index(MODEL_MU) + 1
     partials = partial_correlation(*(_correlations(covariances, *pair) for pair in ((0, 1), (0, mu), (1, mu))))
     if not math.isfinite(partials[0]):
         return _because(rival, partial="µ determines it, or one of them does not vary")
     with np.errstate(divide="ignore", invalid="ignore"):  # a perfect one has no z
         z = np.arctanh(partials)
-        low, high = _known(*np.tanh(jackknife(z[0], z[1:])[:2]))
+        low, high = _finite_or_none(*np.tanh(jackknife(z[0], z[1:])[:2]))
     return replace(rival, partial=float(partials[0]), partial_low=low, partial_high=high)
 
 
@@ -207,8 +207,8 @@ def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | 
     if len(columns) < LEAST_CASES:
         return None
     scale = np.abs(np.concatenate(columns)).max(axis=0, initial=1e-300)
-    centred = [own / scale - (own / scale).mean(axis=0) for own in columns]
-    products = np.array([own.T @ own for own in (own * (np.abs(own) > 1e-12) for own in centred)])  # no round-off
+    deviations = [own / scale - (own / scale).mean(axis=0) for own in columns]
+    products = np.array([own.T @ own for own in (own * (np.abs(own) > 1e-12) for own in deviations)])  # no round-off
     whole = products.sum(axis=0, keepdims=True)
     return np.concatenate([whole, whole - products])
 
@@ -219,7 +219,7 @@ def _correlations(covariances: Array, first: int, second: int) -> Array:
     return np.where(size > 0.0, covariances[:, first, second], np.nan) / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
-def _known(*numbers: Array) -> list[float | None]:
+def _finite_or_none(*numbers: Array) -> list[float | None]:
     """Return numbers, None for each that is not known."""
     return [float(one) if math.isfinite(one) else None for one in numbers]
 
@@ -231,23 +231,23 @@ def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float |
     x, y = np.array([trial.values[name] for trial in trials]), np.array([trial.score for trial in trials])
     errors: list[float] = []
     for surface in np.unique(surfaces):
-        kept = surfaces != surface
-        count = np.bincount(whose[kept], minlength=len(subjects))
-        levels = (np.bincount(whose[kept], v[kept], len(subjects)) / np.maximum(count, 1) for v in (x, y))
+        training = surfaces != surface
+        count = np.bincount(whose[training], minlength=len(subjects))
+        levels = (np.bincount(whose[training], v[training], len(subjects)) / np.maximum(count, 1) for v in (x, y))
         off_x, off_y = (v - level[whose] for v, level in zip((x, y), levels, strict=True))
-        size = float(off_x[kept] @ off_x[kept])
-        if size <= 1e-24 * float(np.max(x[kept] ** 2, initial=1e-300)):
+        size = float(off_x[training] @ off_x[training])
+        if size <= 1e-24 * float(np.max(x[training] ** 2, initial=1e-300)):
             return None
-        slope = float(off_x[kept] @ off_y[kept]) / size
-        errors += (off_y - slope * off_x)[~kept & (count[whose] > 0)].tolist()
+        slope = float(off_x[training] @ off_y[training]) / size
+        errors += (off_y - slope * off_x)[~training & (count[whose] > 0)].tolist()
     return math.sqrt(float(np.mean(np.square(errors)))) if errors else None
 
 
 def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
     """Return the deviance of the mixed model on a quantity, or why it has none that compares."""
-    missing = sum(name not in trial.values for trial in trials)
-    if missing:
-        return f"{missing} of {len(trials)} trials have no such number, and AIC compares models of the same scores"
+    lack = sum(name not in trial.values for trial in trials)
+    if lack:
+        return f"{lack} of {len(trials)} trials have no such number, and AIC compares models of the same scores"
     subjects, surfaces = [trial.subject for trial in trials], [trial.index for trial in trials]
     if min(len(set(subjects)), len(set(surfaces))) < 2 or len(trials) < 6:
         return "too few subjects, surfaces or trials for a model of five parameters"

@@ -134,14 +134,14 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
 
 def _why_none(counts: Array, indices: Sequence[int]) -> str:
     """Return why there are no values, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
-    met, chosen = counts
-    beaten = chosen + (met - chosen).T  # [a, b]: how often a was chosen and b was not
+    meetings, wins = counts
+    beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen and b was not
     groups, label = csgraph.connected_components(beaten > 0, directed=True, connection="strong")
     if groups > 1:
         above = next(group for group in range(groups) if not (beaten[label != group][:, label == group] > 0).any())
         names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == above)
         return f"no other surface was ever preferred to {names}, so their distance has no bound"
-    if np.linalg.matrix_rank(_design(len(indices))[met > 0]) < len(indices):
+    if np.linalg.matrix_rank(_design(len(indices))[meetings > 0]) < len(indices):
         return "preference and order cannot be told apart: some pairs must be met in both orders"
     return ""
 
@@ -164,10 +164,10 @@ def _chances(eta: Array, model: Model) -> tuple[Array, Array]:
 
 def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | None:
     """Return the values about their mean and then the first's advantage (n + 1,); None without a finite maximum."""
-    met, chosen = counts
-    design = _design(len(met))
-    compared = met > 0
-    x, n, y = design[compared], met[compared], chosen[compared]
+    meetings, wins = counts
+    design = _design(len(meetings))
+    pairs = meetings > 0
+    x, n, y = design[pairs], meetings[pairs], wins[pairs]
     beta = np.zeros(x.shape[1])
     if begin is not None:
         beta = np.append(begin[:-2] - begin[-2], begin[-1])
@@ -210,12 +210,12 @@ def _estimates(whole: Array, without: Array) -> list[IntervalEstimate]:
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
     """Return the deviance of a fit from a chance of its own for every ordered pair, and its degrees of freedom."""
-    met, chosen = counts
+    meetings, wins = counts
     eta = fitted[:-1, None] - fitted[None, :-1] + fitted[-1]
-    compared = met > 0
-    chance = _chances(eta, model)[0][compared]
-    deviance = binomial_deviance(chosen[compared], met[compared], chance)
-    return deviance, int(compared.sum()) - len(fitted) + 1
+    pairs = meetings > 0
+    chance = _chances(eta, model)[0][pairs]
+    deviance = binomial_deviance(wins[pairs], meetings[pairs], chance)
+    return deviance, int(pairs.sum()) - len(fitted) + 1
 
 
 NAME = "log magnitude"
@@ -346,8 +346,8 @@ class _AnswerTable(NamedTuple):
         """Return means over the subjects `who` (b, s) by √2 s: (b, k); nan where nothing scatters about them."""
         cells, counts = self.cells[who], self.counts[who]
         means = cells.mean(axis=1)
-        left = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[who].sum(axis=1)
+        squares = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[who].sum(axis=1)
         freedom = counts.sum(axis=(1, 2)) - cells.shape[1] - cells.shape[2] + 1
-        unit = np.sqrt(2.0 * left / freedom)[:, None]
+        unit = np.sqrt(2.0 * squares / freedom)[:, None]
         scattered = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
         return np.where(scattered, means, np.nan) / np.where(scattered, unit, 1.0)

@@ -238,7 +238,7 @@ def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] 
     return {index: level + float(effect) for index, effect in zip(indices, fitted[len(subjects) :], strict=True)}
 
 
-def grading(records: Iterable[TrialRecord]) -> dict[str, str]:
+def grades_of(records: Iterable[TrialRecord]) -> dict[str, str]:
     """Return a sentence for each descriptor that was pre-evaluated; none where nothing was.
 
     The grading holds where the answers rise with the maker's number throughout. Raises Blinded while it is sealed.
@@ -259,8 +259,8 @@ def _sentence(answers: dict[int, float]) -> str:
     >>> _sentence({0: 3.0, 55: 62.0, 75: 58.0})
     'the grading does not hold: 75 was judged no higher than 55 (0: 3, 55: 62, 75: 58)'
     """
-    listed = ", ".join(f"{index}: {answer:g}" for index, answer in sorted(answers.items()))
+    answer_list = ", ".join(f"{index}: {answer:g}" for index, answer in sorted(answers.items()))
     if len(answers) < 2:
-        return f"too few answers to see a grading ({listed})"
+        return f"too few answers to see a grading ({answer_list})"
     wrong = [f"{b} was judged no higher than {a}" for a, b in pairwise(sorted(answers)) if answers[b] <= answers[a]]
-    return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({listed})"
+    return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({answer_list})"

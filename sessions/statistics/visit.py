@@ -38,9 +38,9 @@ class Exclusion:
 
     def __post_init__(self) -> None:
         """Refuse a decision that nobody made or nobody can follow."""
-        for key, allowed in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
+        for key, content in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
             if not getattr(self, key).strip():
-                raise NotAllowed(key, getattr(self, key), f"{allowed}, not empty")
+                raise NotAllowed(key, getattr(self, key), f"{content}, not empty")
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,16 +168,16 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
-    known = reveal(recording)
-    gain_error = gain_error_set(known.folder) if options.gain_error is None else options.gain_error
-    analysis = analyse(known, AnalysisSettings(area=options.area, gain_error=gain_error))
+    recording = reveal(recording)
+    gain_error = gain_error_set(recording.folder) if options.gain_error is None else options.gain_error
+    analysis = analyse(recording, AnalysisSettings(area=options.area, gain_error=gain_error))
     prediction = None
-    if known.plan.forces:
-        prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction), both_ways=False)
+    if recording.plan.forces:
+        prediction = with_intervals(analysis, predict(analysis, recording.plan, options.prediction), both_ways=False)
     along: Mapping[int, Values] = {}
     if options.paths != "none" and prediction is not None:
-        along = trial_paths(known, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])
-    return visit_from(known, analysis, prediction, along, made_by)
+        along = trial_paths(recording, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])
+    return visit_from(recording, analysis, prediction, along, made_by)
 
 
 def visit_from(
@@ -244,14 +244,14 @@ def _row(
         choice=record.choice,
         standard=None if block.standard is None else block.standard.known_index,
     )
-    flagged = (str(one.name) for one in analysis.flaws if one.trial == trial.number and one.grade != "note")
-    flaws = tuple(dict.fromkeys(flagged))
+    flaw_names = (str(one.name) for one in analysis.flaws if one.trial == trial.number and one.grade != "note")
+    flaws = tuple(dict.fromkeys(flaw_names))
     friction = next((one for one in analysis.friction if one.trial == trial.number), None)
     answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
     if friction is None:
-        missing = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
-        missing = "The trial was not done." if record.outcome == "open" else missing
-        return replace(row, flaws=flaws, why=missing)
+        why = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
+        why = "The trial was not done." if record.outcome == "open" else why
+        return replace(row, flaws=flaws, why=why)
     row = replace(_with_friction(row, friction, analysis), flaws=flaws)
     return row if answer is None else _with_prediction(row, answer)
 

@@ -70,8 +70,8 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
     if n < 2 or c < 2:
         return ()
     means = scores.mean(axis=0).tolist()
-    levelled = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
-    deviation = levelled.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
+    adjusted = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
+    deviation = adjusted.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
     half = t_quantile(n - 1) * deviation / math.sqrt(n)
     ends = [(m - h, m + h) if h > 1e-9 * abs(m) else (None, None) for m, h in zip(means, half.tolist(), strict=True)]
     return tuple(WithinMean(i, len(subjects), m, *two) for i, m, two in zip(indices, means, ends, strict=True))

@@ -90,8 +90,8 @@ def analyse(
     warm_up = [(trial, recording.readings(trial.number)) for trial in takes if trial.phase != "main"]
     context = TrialContext(recording.plan, recording.info, settings, decisions)
     analysis = _without_intervals(main if recording.plan.blocks else [(None, recording.readings())], context, losses)
-    undecided = TrialContext(recording.plan, recording.info, settings)
-    presses = _without_intervals(warm_up, undecided, ()).presses + analysis.presses
+    plain_context = TrialContext(recording.plan, recording.info, settings)
+    presses = _without_intervals(warm_up, plain_context, ()).presses + analysis.presses
     analysis = replace(analysis, simulated=recording.simulated, presses=presses)
     return _with_intervals(replace(analysis, flaws=(*analysis.flaws, *_assumed_tilt_flaw(analysis))))
 
@@ -158,13 +158,13 @@ def _assumed_tilt_flaw(analysis: Analysis) -> Iterable[Flaw]:
 
 def _decisions_without_stroke(decisions: Decisions, strokes: Iterable[Stroke]) -> Iterable[Flaw]:
     """Yield a flaw for each decision about a stroke that does not exist, or that is left out."""
-    kept: dict[tuple[int | None, Value], bool] = {(one.trial, one.number): one.kept for one in strokes}
+    is_kept: dict[tuple[int | None, Value], bool] = {(one.trial, one.number): one.kept for one in strokes}
     for one in decisions.in_force:
         if one.what in OF_SESSION:
             continue
         stroke = (one.trial, one.new if one.what == "choice" else one.stroke)
-        if stroke not in kept or (one.what == "choice" and not kept[stroke]):
-            what = "left out, or not found" if stroke in kept else "not found"
+        if stroke not in is_kept or (one.what == "choice" and not is_kept[stroke]):
+            what = "left out, or not found" if stroke in is_kept else "not found"
             sentence = f"Stroke {stroke[1]} is {what}, so nothing is changed by {one.sentence}."
             yield Flaw(FlawName.DECISION, sentence, "doubtful", trial=one.trial)
 
@@ -194,9 +194,9 @@ def preview(recording: "Recording", decision: Decision, before: Decisions, now: 
     """
     settings = replace(now.settings, tilt=(0.0, 0.0))  # the decisions tell it
     after = analyse(recording, settings, before.with_line(decision))
-    known = {flaw.sentence for flaw in now.flaws}
+    earlier = {flaw.sentence for flaw in now.flaws}
     for flaw in after.flaws:
-        if flaw.name is FlawName.DECISION and flaw.sentence not in known and decision.undoes is None:
+        if flaw.name is FlawName.DECISION and flaw.sentence not in earlier and decision.undoes is None:
             raise DecisionError(flaw.sentence)
     return after
 

@@ -59,7 +59,7 @@ class ContactDetector:
         self._bin: list[float] = []
         self._bin_start: float | None = None
         self._touching = False
-        self._left: float | None = None  # first reading since the force was last within the noise
+        self._noise_exit: float | None = None  # first reading since the force was last within the noise
         self._above: float | None = None  # first reading of the present run above the onset threshold
         self._below: float | None = None  # first reading of the present run below the lift threshold
         self._pulling: float | None = None  # first reading of the present run far below zero
@@ -78,7 +78,7 @@ class ContactDetector:
             return self._still_touching(t, force)
         if self._has_zero:
             above = force - self._level
-            self._left = _since(self._left, t, on=above > self._noise_band)
+            self._noise_exit = _since(self._noise_exit, t, on=above > self._noise_band)
             self._above = _since(self._above, t, on=above > self._threshold)
             if self._above is not None:
                 return self._touch(self._above, t)
@@ -92,9 +92,9 @@ class ContactDetector:
         """Return the onset once the force has exceeded the threshold for long enough."""
         if t - began < self._settings.onset_hold - _ROUNDING:
             return None
-        onset = Onset(began if self._left is None else self._left, t)
+        onset = Onset(began if self._noise_exit is None else self._noise_exit, t)
         self._touching = True
-        self._above = self._left = None
+        self._above = self._noise_exit = None
         return onset
 
     def _still_touching(self, t: float, force: float) -> ContactEvent | None:

@@ -149,7 +149,7 @@ class StrokeDecisions:
         return float(self.value(what)) if what in self.of else None
 
     @property
-    def kept(self) -> bool:
+    def is_kept(self) -> bool:
         """Say whether the stroke stays in: so unless it was decided otherwise."""
         return self.value("kept") is not False
 

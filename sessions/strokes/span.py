@@ -207,12 +207,12 @@ def _unsure(span: Span, contact: Contact, idle: Mask, level: Array, drift: Array
     return max((s for s, _ in offsets), default=0.0), max((n for _, n in offsets), default=0.0)
 
 
-def recorded_zero(span: Span, *, stated: bool) -> StrokeZero:
+def recorded_zero(span: Span, *, is_stated: bool) -> StrokeZero:
     """Return the recording's own zero, which counts only where somebody stated that nothing touched when it was set."""
     steps = np.abs(np.diff(span.wrench, axis=0))
     noise = NORMAL_STEP * np.median(steps, axis=0) if len(steps) else np.zeros(6)
-    origin = "as recorded, stated to be true" if stated else "as recorded, unknown"
-    flaw = None if stated else FlawName.NO_UNLOADED_STRETCH
+    origin = "as recorded, stated to be true" if is_stated else "as recorded, unknown"
+    flaw = None if is_stated else FlawName.NO_UNLOADED_STRETCH
     return StrokeZero(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, flaw=flaw)
 
 

@@ -35,21 +35,21 @@ class Climb(NamedTuple):
     def slopes(self, time: Array) -> Array:
         """Return how T/N changes with each of the seven numbers (n, 7) at `time` (n,) [s], 0 if it has none."""
         lasts = self.meets - self.begins
-        left = np.clip((self.meets - time) / lasts, 0.0, 1.0)
-        inside = (left > 0.0) & (left < 1.0)
+        rest = np.clip((self.meets - time) / lasts, 0.0, 1.0)
+        inside = (rest > 0.0) & (rest < 1.0)
         by_left, by_bend = np.zeros_like(time), np.zeros_like(time)
-        by_left[inside] = -self.bend * left[inside] ** (self.bend - 1.0) / lasts
-        by_bend[inside] = -(left[inside] ** self.bend) * np.log(left[inside])
-        done, above = _parts(self, time).T
+        by_left[inside] = -self.bend * rest[inside] ** (self.bend - 1.0) / lasts
+        by_bend[inside] = -(rest[inside] ** self.bend) * np.log(rest[inside])
+        progress, above = _parts(self, time).T
         share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _peak_decay(self, time)
         columns = np.zeros((len(time), 7))
-        columns[:, 0], columns[:, 1] = share * by_left * left, share * by_left * (1.0 - left)
+        columns[:, 0], columns[:, 1] = share * by_left * rest, share * by_left * (1.0 - rest)
         columns[:, 2] = share * by_bend
         if self.fall > 0.0:
             late = np.maximum(time - self.meets, 0.0)
             columns[:, 1] += self.peak * above / self.fall * (late > 0.0)
             columns[:, 3] = self.peak * above * late / self.fall**2
-        columns[:, 4], columns[:, 5], columns[:, 6] = 1.0, done, above
+        columns[:, 4], columns[:, 5], columns[:, 6] = 1.0, progress, above
         return columns
 
 
@@ -109,10 +109,10 @@ class ClimbReadings:
             numbers = np.array(climb)
             numbers[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
             new = self._feasible_climb(numbers)
-            left = self.mean_square(new)
-            if left < least:
-                gain, climb, least, damping = least - left, new, left, damping / 10.0
-                if gain < self.settings.climb_still * left:
+            misfit = self.mean_square(new)
+            if misfit < least:
+                gain, climb, least, damping = least - misfit, new, misfit, damping / 10.0
+                if gain < self.settings.climb_still * misfit:
                     break
             elif (damping := damping * 10.0) > 1e9:
                 break
@@ -140,9 +140,9 @@ class ClimbReadings:
         begins, meets = (grid[index] for index in np.triu_indices(count, 1))
         late = meets >= t[few]
         begins, meets = begins[late], meets[late]
-        done = 1.0 - np.clip((meets[:, None] - t) / (meets - begins)[:, None], 0.0, 1.0)
-        done -= done.mean(axis=1)[:, None]
-        explained = np.maximum(done @ (y - y.mean()), 0.0) ** 2 / (done**2).sum(axis=1)
+        progress = 1.0 - np.clip((meets[:, None] - t) / (meets - begins)[:, None], 0.0, 1.0)
+        progress -= progress.mean(axis=1)[:, None]
+        explained = np.maximum(progress @ (y - y.mean()), 0.0) ** 2 / (progress**2).sum(axis=1)
         best = int(np.argmax(explained))
         return float(begins[best]), float(meets[best])
 
@@ -167,8 +167,8 @@ class ClimbReadings:
 
 def _parts(fit: Climb, t: Array) -> Array:
     """Return how much of the climb is done, and of the peak there (n, 2) [-]."""
-    done = 1.0 - np.clip((fit.meets - t) / (fit.meets - fit.begins), 0.0, 1.0) ** fit.bend
-    return np.column_stack([done, done * _peak_decay(fit, t)])
+    progress = 1.0 - np.clip((fit.meets - t) / (fit.meets - fit.begins), 0.0, 1.0) ** fit.bend
+    return np.column_stack([progress, progress * _peak_decay(fit, t)])
 
 
 def _peak_decay(fit: Climb, t: Array) -> Array:

@@ -46,13 +46,13 @@ def measure_stroke(
     plan: SessionPlan,
     trial: Trial | None = None,
     number: int = 1,
-    decided: StrokeDecisions | None = None,
+    decisions: StrokeDecisions | None = None,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
     """Return a contact's stroke and its flaws; `plan` tells the face's frame and the area that tau_max is of.
 
-    `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
+    `number` is that of the stroke within its trial; a person's `decisions` about it go before what is found.
     """
-    findings, missed, decided = Findings(), None, decided or StrokeDecisions({})
+    findings, missed, decisions = Findings(), None, decisions or StrokeDecisions({})
     track = track_of(span, contact, zero)
     _judge_ends(findings, contact, track)
     _judge_zero(findings, zero, track)
@@ -63,15 +63,15 @@ def measure_stroke(
         if contact.uncut is not None:
             first, last = contact.uncut
             uncut = track_of(span, replace(contact, start=first, stop=last), zero)
-        window = slide(findings, span, track, decided.value("steady"), uncut)
-        _decide_slide_onset(findings, track, decided)
+        window = slide(findings, span, track, decisions.value("steady"), uncut)
+        _decide_slide_onset(findings, track, decisions)
         if window is not None:
             missed = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area)
             _friction(findings, track, window)
             _static_peak(findings, track, window, zero, turned=contact.start in contact.reversals)
             _break_away(findings, track, window)
             _judge_way(findings, track, window)
-        _apply_decisions(findings, track, decided)
+        _apply_decisions(findings, track, decisions)
         _judge_drift(findings, zero, track.settings.zero)
     numbers = {name: None if name in findings.reasons else findings.numbers.get(name) for name in EVERYTHING}
     if trial is not None and numbers["direction"] not in (None, trial.direction):
@@ -80,8 +80,8 @@ def measure_stroke(
         findings.flaw(FlawName.WRONG_DIRECTION, sentence, "doubtful")
     stroke = Stroke(
         trial=None if trial is None else trial.number,
-        onset=contact.onset if "onset" not in findings.reasons else decided.instant("onset"),
-        lift=contact.lift if "lift" not in findings.reasons else decided.instant("lift"),
+        onset=contact.onset if "onset" not in findings.reasons else decisions.instant("onset"),
+        lift=contact.lift if "lift" not in findings.reasons else decisions.instant("lift"),
         readings=numbers.pop("readings") or 0,
         zero=zero.origin,
         zero_drift=None if zero.drift is None else float(np.linalg.norm(zero.drift[:3])),
@@ -89,8 +89,8 @@ def measure_stroke(
         reasons=dict(findings.reasons),
         area_exponent=track.settings.area.exponent,
         number=number,
-        kept=decided.kept,
-        decided=decided.sentences,
+        kept=decisions.is_kept,
+        decided=decisions.sentences,
         curve=curve_of(span, contact, zero, missed),
         **numbers,
     )
@@ -279,9 +279,9 @@ def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> 
     findings.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
 
 
-def _decide_slide_onset(findings: Findings, track: Track, decided: StrokeDecisions) -> None:
+def _decide_slide_onset(findings: Findings, track: Track, decisions: StrokeDecisions) -> None:
     """Set the slide onset that a person decided, unless it lies outside of the contact."""
-    onset = decided.instant("slide_onset")
+    onset = decisions.instant("slide_onset")
     if onset is not None and track.time[0] <= onset <= track.time[-1]:
         findings.numbers["slide_onset"] = onset
     elif onset is not None:
@@ -329,9 +329,9 @@ def _break_away(findings: Findings, track: Track, window: slice) -> None:
         findings.reasons["break_away"] = _SLIDES_BEFORE
 
 
-def _apply_decisions(findings: Findings, track: Track, decided: StrokeDecisions) -> None:
+def _apply_decisions(findings: Findings, track: Track, decisions: StrokeDecisions) -> None:
     """Set the stick phase and the direction that a person decided."""
-    stick = decided.value("stick")
+    stick = decisions.value("stick")
     if stick is not None:
         inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]
         inside = inside[np.isfinite(inside)]
@@ -342,7 +342,7 @@ def _apply_decisions(findings: Findings, track: Track, decided: StrokeDecisions)
         else:
             sentence = "The stick phase that was decided holds no T/N: the force is too low there, or nothing touches."
             findings.flaw(FlawName.DECISION, sentence, "doubtful", ("mu_static",))
-    if (direction := decided.value("direction")) is not None:
+    if (direction := decisions.value("direction")) is not None:
         findings.numbers |= {"direction": direction, "direction_from": "decision"}
         for name in DIRECTION:
             findings.reasons.pop(name, None)

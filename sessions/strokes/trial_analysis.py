@@ -121,11 +121,11 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
 def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
     """Return the zero by which contacts are found; None where nothing tells one."""
     if context.zero_is_stated:
-        return recorded_zero(span, stated=True)
+        return recorded_zero(span, is_stated=True)
     first = span.windows.after(-np.inf, context.settings.zero.zero_stretch)
     if first is not None:
         return StrokeZero(first.level, first.noise, first.noise[:3], 0.0, first.error)
-    return recorded_zero(span, stated=False) if context.info.calibration.raw_unit == RAW_WRENCH else None
+    return recorded_zero(span, is_stated=False) if context.info.calibration.raw_unit == RAW_WRENCH else None
 
 
 def _pull(span: Span, zero: StrokeZero) -> Flaw | None:
@@ -162,8 +162,8 @@ def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[C
             if own is None
             else split_at_reversals(piece, span.time, span.smooth - own.level, own.unsure[0], settings)
         )
-    kept, flaws = _worth_measuring(strokes, span, smooth)
-    return kept, idle, flaws
+    contacts, flaws = _worth_measuring(strokes, span, smooth)
+    return contacts, idle, flaws
 
 
 def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[list[Contact], list[Flaw]]:
@@ -171,13 +171,13 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
     peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
     greatest, limits = max(peaks, default=0.0), span.settings.contact
     near = limits.gap_beside / span.rate
-    kept: list[Contact] = []
+    contacts: list[Contact] = []
     flaws: list[Flaw] = []
     for piece, peak in zip(pieces, peaks, strict=True):
         start, stop = span.time[piece.start], span.time[piece.stop - 1]
         tapped = stop - start < limits.shortest_stroke
         if not tapped and peak >= limits.light_share * greatest:
-            kept.append(piece)
+            contacts.append(piece)
             continue
         gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
         if gaps:
@@ -190,7 +190,7 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
             what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
             sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {significant(peak, 2)} N, is not a stroke."
             flaws.append(Flaw(name, sentence, "note"))
-    return kept, flaws
+    return contacts, flaws
 
 
 def _measure(
@@ -198,19 +198,19 @@ def _measure(
 ) -> TrialAnalysis:
     """Measure contacts as they were found or decided, each from its own zero unless one was stated."""
     number = None if trial is None else trial.number
-    decided = [context.decisions.of_stroke(number, at) for at in range(1, len(pieces) + 1)]
+    by_stroke = [context.decisions.of_stroke(number, at) for at in range(1, len(pieces) + 1)]
     flaws: list[Flaw] = []
     idle = idle.copy()
-    for at, decisions in enumerate(decided):
+    for at, decisions in enumerate(by_stroke):
         pieces[at], empty = _with_decided_ends(pieces[at], decisions, span)
         flaws += [] if empty is None else [replace(empty, stroke=at)]
         idle[pieces[at].start : pieces[at].stop] = False
     strokes: list[Stroke] = []
     presses: list[Press] = []
-    for at, (piece, decisions) in enumerate(zip(pieces, decided, strict=True)):
+    for at, (piece, decisions) in enumerate(zip(pieces, by_stroke, strict=True)):
         own = zero
         if not context.zero_is_stated:
-            own = zero_for(span, piece, idle) or recorded_zero(span, stated=False)
+            own = zero_for(span, piece, idle) or recorded_zero(span, is_stated=False)
         stroke, more = measure_stroke(span, piece, own, context.plan, trial, at + 1, decisions)
         flaws += [replace(flaw, stroke=at) for flaw in more]
         strokes.append(stroke)
@@ -252,11 +252,11 @@ def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: Tri
 
 def strokes_for_model(strokes: tuple[Stroke, ...], trial: Trial | None, decisions: Decisions) -> tuple[Stroke, ...]:
     """Return the strokes of a part that the model gets: of a trial the one decided, or else the first that is kept."""
-    kept = tuple(stroke for stroke in strokes if stroke.kept)
+    strokes = tuple(stroke for stroke in strokes if stroke.kept)
     if trial is None:
-        return kept
+        return strokes
     choice = decisions.choice(trial.number)
-    return tuple(one for one in kept if choice is not None and one.number == choice.new) or kept[:1]
+    return tuple(one for one in strokes if choice is not None and one.number == choice.new) or strokes[:1]
 
 
 def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) -> Press | None:

@@ -73,8 +73,8 @@ def test_every_record_is_kept_lost_repeated_late_or_garbage_however_the_batches_
         head = batch[-1:] if verdict.undecided else []
         sequence += verdict.sequence.tolist()
         counters += verdict.counter.tolist()
-        assert [n % WRAP for n in sequence[len(sequence) - len(verdict.kept) :]] == [
-            batch[k][0] % WRAP for k in verdict.kept
+        assert [n % WRAP for n in sequence[len(sequence) - len(verdict.positions) :]] == [
+            batch[k][0] % WRAP for k in verdict.positions
         ]
     survivors, repeated, late = classify_by_greatest_number([i for i in order if i is not None])
     assert [s - number for s in sequence] == survivors
@@ -91,7 +91,7 @@ def test_every_record_is_kept_lost_repeated_late_or_garbage_however_the_batches_
 def test_any_numbers_at_all_are_accounted_for(records, step):
     account = new_account(step=step)
     verdict = take(account, records, end=True)
-    assert len(verdict.kept) + account.repeated + account.late + account.garbage == len(records)
+    assert len(verdict.positions) + account.repeated + account.late + account.garbage == len(records)
     assert np.all(np.diff(verdict.sequence) > 0)
     assert np.all(np.diff(verdict.counter) >= 0)
 

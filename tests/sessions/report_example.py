@@ -249,7 +249,7 @@ def finger_field(descriptor, index):
     return Field(
         experiment=descriptor,
         index=index,
-        drawn=Fields(world, np.array(triangles), {"sed": sed}, outlines, patch),
+        finger=Fields(world, np.array(triangles), {"sed": sed}, outlines, patch),
         skin=Skin(x, np.zeros_like(x), pressure, traction, tuple(state)),
     )
 

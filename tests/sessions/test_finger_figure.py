@@ -10,11 +10,11 @@ from sessions.report.figures.finger import NO_SED, common_levels, finger_panels
 from sessions.report.figures.style import look
 
 FIELD = example().fields[0]
-SED = FIELD.drawn.sed
+SED = FIELD.finger.sed
 
 
 def with_sed(values):
-    return replace(FIELD, drawn=replace(FIELD.drawn, values={"sed": values}))
+    return replace(FIELD, finger=replace(FIELD.finger, values={"sed": values}))
 
 
 def test_a_node_without_an_sed_moves_no_border_of_the_colours():

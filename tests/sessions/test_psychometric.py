@@ -56,7 +56,7 @@ def loss(at, levels):
     total = 0.0
     for level in levels:
         p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (level.log_ratio - pse))
-        total -= stats.betabinom.logpmf(level.chosen, level.presented, p * beta, (1.0 - p) * beta)
+        total -= stats.betabinom.logpmf(level.choices, level.presented, p * beta, (1.0 - p) * beta)
     return total
 
 
@@ -68,7 +68,7 @@ def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelih
     assert [
         fit.pse.value, QUARTILE / fit.jnd.value, fit.lapse.value, fit.correlation.value
     ] == pytest.approx(best.x, rel=1e-4)  # fmt: skip
-    coefficient = sum(math.log(math.comb(level.presented, level.chosen)) for level in scattered())
+    coefficient = sum(math.log(math.comb(level.presented, level.choices)) for level in scattered())
     assert fit.log_likelihood + coefficient == pytest.approx(-best.fun, abs=1e-7)
 
 
@@ -154,7 +154,7 @@ def test_intervals_hold_the_values_of_simulated_observers_in_90_to_98_of_a_hundr
 def test_an_observer_who_says_the_opposite_has_the_same_pse_and_jnd():
     levels = observer(np.random.default_rng(1), SIX, 40, (0.05, 0.25, 0.02, 0.0))
     forward = psychometric(levels)
-    opposite = psychometric([Level(v.log_ratio, v.presented - v.chosen, v.presented, v.order) for v in levels])
+    opposite = psychometric([Level(v.log_ratio, v.presented - v.choices, v.presented, v.order) for v in levels])
     assert (forward.rises, opposite.rises) == (True, False)
     for name in ("pse", "jnd", "lapse"):
         assert getattr(opposite, name).value == pytest.approx(getattr(forward, name).value, abs=1e-5)

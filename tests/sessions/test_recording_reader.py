@@ -314,7 +314,7 @@ def test_a_take_that_was_kept_and_then_discarded_keeps_its_own_end():
         ),
     )
     assert (record.outcome, record.score, record.take) == ("open", None, None)
-    assert [(take.start_ns, take.stop_ns, take.discarded) for take in record.other_takes] == [
+    assert [(take.start_ns, take.stop_ns, take.discard_reason) for take in record.other_takes] == [
         (10, 30, "wrong hand"),
         (50, None, None),
     ]
@@ -336,7 +336,7 @@ def test_a_take_that_is_restored_counts_with_its_own_end_and_the_answer_that_cam
     )
     assert (record.outcome, record.score) == ("scored", 5.0)
     assert (record.take.number, record.take.start_ns, record.take.stop_ns, record.take.strokes) == (1, 10, 30, 1)
-    assert [(take.number, take.discarded) for take in record.other_takes] == [(2, "the redo was undone")]
+    assert [(take.number, take.discard_reason) for take in record.other_takes] == [(2, "the redo was undone")]
 
 
 def test_a_recording_without_a_plan_of_trials_has_none():

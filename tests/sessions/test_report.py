@@ -216,7 +216,7 @@ def test_the_finger_of_each_experiment_lies_on_the_surface_and_is_pressed_where_
     assert [(f.experiment, f.index) for f in report.fields] == [("stickiness", 100), ("slipperiness", 100)]
     for field in report.fields:
         touching = [i for i, state in enumerate(field.skin.state) if state != "open"]
-        assert field.drawn.nodes[:, 1].min() == pytest.approx(0.0, abs=1e-6)
+        assert field.finger.nodes[:, 1].min() == pytest.approx(0.0, abs=1e-6)
         assert field.skin.gap[touching] == pytest.approx(0.0, abs=1e-6)
         assert (field.skin.pressure[touching] >= 0).all()
         way = {"stickiness": -1, "slipperiness": 1}[field.experiment]  # friction opposes the stroke

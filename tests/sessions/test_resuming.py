@@ -74,9 +74,9 @@ def test_any_beginning_of_a_log_gives_a_state_that_can_be_ended_with_kept_trials
         at = resumption(plan, events[:length])
         if not isinstance(at.state, Ended):
             assert isinstance(advance(at.state, Abort("enough"))[0], Ended)
-        after = [*lines, *at.owed]
+        after = [*lines, *at.due_lines]
         assert not open_takes(after)
-        taken_back = {trial for kind, trial, _ in at.owed if kind == "take_discarded"}
+        taken_back = {trial for kind, trial, _ in at.due_lines if kind == "take_discarded"}
         kept_before = kept_takes(lines)
         # A take that was kept is taken back only where the experimenter had already asked for it, or with the second of
         # two that are compared.
@@ -84,9 +84,9 @@ def test_any_beginning_of_a_log_gives_a_state_that_can_be_ended_with_kept_trials
         for trial, take in kept_before.items():
             may_be_discarded = trial in alone or events[length - 1].kind == "redo"
             assert kept_takes(after).get(trial) == take or (trial in taken_back and may_be_discarded)
-        again = [*events[:length], *(LoggedEvent(0, 0, *line[:2], 0, line[2]) for line in at.owed)]
+        again = [*events[:length], *(LoggedEvent(0, 0, *line[:2], 0, line[2]) for line in at.due_lines)]
         assert resumption(plan, again).state == at.state
-        assert resumption(plan, again).owed == ()
+        assert resumption(plan, again).due_lines == ()
 
 
 def test_a_log_in_which_something_does_not_follow_is_refused():
@@ -127,7 +127,7 @@ def test_a_killed_session_goes_on_at_the_same_trial_and_nothing_acknowledged_is_
         assert after.plan == before.plan
         for number, record in kept_records.items():
             assert after.trial(number) == record
-        discarded = [take.discarded for record in after.trials for take in record.other_takes]
+        discarded = [take.discard_reason for record in after.trials for take in record.other_takes]
         assert set(discarded) <= {"the recording was cut short in the middle of it"}
         joint = after.readings()
         assert (joint.sequence[1:] - joint.sequence[:-1] == 1).all()

@@ -178,7 +178,7 @@ def test_a_discarded_take_stays_in_the_file_and_the_next_one_counts(tmp_path):
     record = recording.trials[0]
     assert record.outcome == "scored"
     assert (record.take.number, [take.number for take in record.other_takes]) == (2, [1])
-    assert record.other_takes[0].discarded == "finger slipped"
+    assert record.other_takes[0].discard_reason == "finger slipped"
     spoiled = recording.readings_between(record.other_takes[0].start_ns, record.other_takes[0].stop_ns)
     assert (spoiled.raw[:, 2] < -1e6).sum() == pytest.approx(0.6 * RATE, abs=1)
     assert [r.trial.number for r in recording.trials if r.outcome == "scored"] == list(range(1, 11))
@@ -192,7 +192,7 @@ def test_a_trial_done_again_after_its_score_has_only_its_new_score(tmp_path):
     recording = session.run()
     record = recording.trials[0]
     assert record.score == session.plan.trials[0].stimulus.index != 11.0
-    assert (record.take.number, record.other_takes[0].discarded) == (2, "wrong hand")
+    assert (record.take.number, record.other_takes[0].discard_reason) == (2, "wrong hand")
     assert record.other_takes[0].stop_ns < record.start_ns
 
 
@@ -200,7 +200,7 @@ def test_a_skipped_trial_is_recorded_as_skipped(tmp_path):
     recording = Session(tmp_path / "s", instead={AskStroke: once(Skip("surface torn"))}).run()
     record = recording.trials[0]
     assert (record.outcome, record.take, record.score) == ("skipped", None, None)
-    assert record.other_takes[0].discarded == "skipped: surface torn"
+    assert record.other_takes[0].discard_reason == "skipped: surface torn"
     assert len(recording.readings(1)) == 0
     assert recording.trials[1].outcome == "scored"
 

@@ -15,7 +15,7 @@ from sessions.statistics.scores import (
     Score,
     ScoreTable,
     distinct_sessions,
-    grading,
+    grades_of,
     mean_scores,
     reversed_subjects,
     score_matrix,
@@ -223,5 +223,5 @@ def test_a_pre_evaluation_says_whether_the_makers_grading_holds_and_counts_nowhe
     writer.event("ended", data={"reason": "done"})
     writer.close()
     recording = Recording.open(tmp_path / "s")
-    assert sentence in grading(recording.trials)["d"]
+    assert sentence in grades_of(recording.trials)["d"]
     assert score_table(recording).scores == ()

@@ -97,7 +97,7 @@ def test_an_interrupted_take_is_kept_as_one_that_does_not_count(tmp_path):
     recording = Session(tmp_path / "s", instead={AskScore: once(Abort("ill"))}).run()
     record = recording.trials[0]
     assert (record.outcome, record.take) == ("open", None)
-    assert record.other_takes[0].discarded == "ill"
+    assert record.other_takes[0].discard_reason == "ill"
 
 
 def test_a_session_whose_end_cannot_be_written_lets_go_of_its_file(tmp_path):

@@ -51,7 +51,7 @@ def _whole_session(folder: Path) -> Generator[None]:
     from sessions.recording.schema import DiskRefused, NotEmpty, RecordingError
 
     try:
-        with whole_or_nothing(folder, taken=NotEmpty):
+        with whole_or_nothing(folder, unless=NotEmpty):
             yield
     except DiskRefused as error:
         raise RecordingError(

@@ -212,8 +212,8 @@ class _Blocks:
     def _adaptive_orders(self, outline: BlockOutline, standard: int, comparisons: int) -> list[tuple[int, ...]]:
         """Return each comparison as the answers that there are not yet ask for it; half begin with the standard."""
         first = next_comparison(self._candidates(outline), ()).known_index
-        leading = shuffle(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
-        return [(first, standard) if n in leading else (standard, first) for n in range(comparisons)]
+        leaders = shuffle(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
+        return [(first, standard) if n in leaders else (standard, first) for n in range(comparisons)]
 
     def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
         """Return what is compared with the standard of an adaptive block, by index; nothing in any other block."""

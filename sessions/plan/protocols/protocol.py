@@ -245,8 +245,8 @@ class Protocol:
             for block in self.blocks
             for text in [texts[block.name]]
         )
-        judged = texts.get(PRE_EVALUATION)
-        before = self.pre_evaluation if judged is None else PreEvaluation(judged.instruction)
+        words = texts.get(PRE_EVALUATION)
+        before = self.pre_evaluation if words is None else PreEvaluation(words.instruction)
         return replace(self, blocks=blocks, pre_evaluation=before, language=language, translations=())
 
     def _check_answers(self, key: str, block: BlockOutline) -> None:
@@ -284,15 +284,15 @@ class Protocol:
 
 def check_phases(protocol: Protocol, phases: Sequence[Phase]) -> None:
     """Raise NotAllowed unless the protocol has these phases."""
-    shown = list(phases)
+    phase_names = list(phases)
     if not phases or len(set(phases)) < len(phases):
-        raise NotAllowed("phases", shown, "there must be at least one, and none may come twice")
+        raise NotAllowed("phases", phase_names, "there must be at least one, and none may come twice")
     if "pre-evaluation" in phases and protocol.pre_evaluation is None:
-        raise NotAllowed("phases", shown, "a pre-evaluation needs a table [pre_evaluation] with its instruction")
+        raise NotAllowed("phases", phase_names, "a pre-evaluation needs a table [pre_evaluation] with its instruction")
     if "pre-evaluation" in phases and protocol.scale.answer == "choice":
-        raise NotAllowed("phases", shown, "a pre-evaluation grades each stimulus, which a choice of two does not")
+        raise NotAllowed("phases", phase_names, "a pre-evaluation grades each stimulus, which a choice of two does not")
     if "practice" in phases and not any(block.practice for block in protocol.blocks):
-        raise NotAllowed("phases", shown, "a practice needs blocks that list their stimuli under practice")
+        raise NotAllowed("phases", phase_names, "a practice needs blocks that list their stimuli under practice")
 
 
 def phases_before(protocol: Protocol) -> tuple[Phase, ...]:

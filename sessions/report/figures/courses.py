@@ -32,8 +32,8 @@ from sessions.report.figures.style import (
 
 def course_panel(course: Course, strokes: tuple[StrokeFinding, ...]) -> Panel:
     """Return both forces against time; strokes are grey bands with their number."""
-    drawn = sheet(672, 270, (1.0, 1.0), share_x=True)
-    upper, lower = drawn.axes
+    picture = sheet(672, 270, (1.0, 1.0), share_x=True)
+    upper, lower = picture.axes
     first, last = (float(course.time[0]), float(course.time[-1])) if len(course.time) else (0.0, 1.0)
     for axes, values, colour, name in (
         (upper, course.normal, SKY, "normal force"),
@@ -42,7 +42,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...]) -> Panel:
         for stroke in strokes:
             begin, end = _ends(stroke, first, last)
             text = f"stroke {stroke.number}: {begin:.3f} s to {end:.3f} s"
-            axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=drawn.note(text))
+            axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=picture.note(text))
         axes.plot(course.time, values, color=colour, linewidth=0.8)
         axes.axhline(0.0, color=GREY, linewidth=0.4)
         axes.set(ylabel=f"{name}\n[N]", xlim=(first, last if last > first else first + 1.0))
@@ -53,7 +53,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...]) -> Panel:
         _mark(upper, str(stroke.number), (middle, 1.0), (0, 2), ha="center", va="bottom", color=INK, fontsize=7.5)
     header = ("time [s]", "normal force [N]", "tangential force [N]")
     rows = rows_of(course.time, course.normal, course.tangential)
-    return drawn.panel("course", "Normal and tangential force over the whole recording", header, rows)
+    return picture.panel("course", "Normal and tangential force over the whole recording", header, rows)
 
 
 def _mark(axes: Axes, text: str, at: tuple[float, float], off: tuple[float, float], **look: Any) -> None:  # noqa: ANN401 - matplotlib's
@@ -66,12 +66,12 @@ def _strokes_with_room(
 ) -> list[tuple[StrokeFinding, float]]:
     """Return the strokes whose number has room in the figure, each with its middle [s]."""
     room = 0.025 * (last - first)
-    kept: list[tuple[StrokeFinding, float]] = []
+    with_room: list[tuple[StrokeFinding, float]] = []
     for stroke in strokes:
         middle = sum(_ends(stroke, first, last)) / 2
-        if not kept or middle - kept[-1][1] >= room:
-            kept.append((stroke, middle))
-    return kept
+        if not with_room or middle - with_room[-1][1] >= room:
+            with_room.append((stroke, middle))
+    return with_room
 
 
 def _ends(stroke: StrokeFinding, first: float, last: float) -> tuple[float, float]:
@@ -107,10 +107,10 @@ def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experimen
     """Return a quantity of an experiment's strokes since contact, None without curves; refused speeds stay out."""
     if of is SPEED_COURSE:
         strokes = [stroke for stroke in strokes if stroke.speed is not None]
-    drawn = sheet(328, 290)
-    (axes,) = drawn.axes
+    picture = sheet(328, 290)
+    (axes,) = picture.axes
     axes.set(title=experiment, ylabel=of.axis)
-    rows = _draw(drawn, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
+    rows = _draw(picture, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
     if not rows:
         return None
     if of is SPEED_COURSE:
@@ -120,15 +120,15 @@ def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experimen
     name = f"{of.name}-{experiment}" if experiment else of.name
     title = f"{of.values} against time, {experiment or 'all strokes'}"
     header = ("stroke", "index", "time since contact [s]", of.column, "in steady window")
-    return drawn.panel(name, title, header, rows)
+    return picture.panel(name, title, header, rows)
 
 
 Row = tuple[int, int | None, float, float, int]
 
 
-def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
+def _draw(picture: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
     """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
-    (axes,) = drawn.axes
+    (axes,) = picture.axes
     ordered = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
     rows: list[Row] = []
     labels: list[Label] = []
@@ -140,14 +140,14 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
         text = f"stroke {stroke.number}" + ("" if stroke.index is None else f", index {stroke.index}")
         text += f", {of.word} {level:.3g} over the steady window" if level is not None else ""
         style = "solid" if level is not None else (0, (3, 2))
-        axes.plot(trace.time, values, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
+        axes.plot(trace.time, values, color=shade, linewidth=0.7, linestyle=style, gid=picture.note(text))
         axes.plot(trace.time, np.where(inside, values, np.nan), color=shade, linewidth=2.2, solid_capstyle="butt")
-        known = ~np.isnan(values)
-        points = zip(*(column[known].tolist() for column in (trace.time, values, inside)), strict=True)
+        valid = ~np.isnan(values)
+        points = zip(*(column[valid].tolist() for column in (trace.time, values, inside)), strict=True)
         rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in points]
-        if known.any():
-            last_known = np.flatnonzero(known & inside if (known & inside).any() else known)[-1]
-            at = float(trace.time[last_known]), float(values[last_known])
+        if valid.any():
+            last_valid = np.flatnonzero(valid & inside if (valid & inside).any() else valid)[-1]
+            at = float(trace.time[last_valid]), float(values[last_valid])
             labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at))
     axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
     if rows:  # from 0 on where nothing lies below
@@ -155,7 +155,7 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
         low, high = min(*greatest, 0.0), max(greatest)
         axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
     if len(labels) <= MOST_LABELLED:
-        label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
+        label_right(picture, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
     return tuple(rows)
 
 
@@ -170,8 +170,8 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
     )
     if not courses:
         return None
-    drawn = sheet(328, 420, (1.0, 1.25))
-    whole, sliding = drawn.axes
+    picture = sheet(328, 420, (1.0, 1.25))
+    whole, sliding = picture.axes
     labels: list[Label] = []
     rows: list[tuple[int | None, int | None, float, float]] = []
     sliding_values: list[float] = []
@@ -181,8 +181,8 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
         kilopascal = 1e3 * history.sed_ending
         label = str(prediction.stroke if prediction.index is None else prediction.index)
         text = f"{kind} {label}: {kilopascal[-1]:.3f} kPa in the end"
-        for axes in drawn.axes:
-            axes.plot(history.time, kilopascal, color=shade, linewidth=1.2, gid=drawn.note(text))
+        for axes in picture.axes:
+            axes.plot(history.time, kilopascal, color=shade, linewidth=1.2, gid=picture.note(text))
             if history.time[-1] < end:  # settled: it stays
                 rest = [history.time[-1], end], [kilopascal[-1]] * 2
                 axes.plot(*rest, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
@@ -200,7 +200,7 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
     margin = 0.06 * (high - low or high)
     sliding.set(ylim=(low - margin, high + margin), ylabel="SED while sliding [kPa]", xlabel="time [s]")
     whole.set(xlim=(0.0, end), ylabel="SED [kPa]")
-    label_right(drawn, sliding, labels, kind)
+    label_right(picture, sliding, labels, kind)
     title = f"Predicted response in time, {name or 'all strokes'}"
     name = f"response-{name}" if name else "response"
-    return drawn.panel(name, title, ("trial", "index", "time [s]", "SED [MPa]"), rows)
+    return picture.panel(name, title, ("trial", "index", "time [s]", "SED [MPa]"), rows)

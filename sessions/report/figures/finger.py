@@ -33,32 +33,38 @@ _WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
 def finger_panels(field: Field, levels: tuple[float, ...]) -> tuple[Panel, Panel]:
     """Return the whole finger and a close view of its contact; `levels` [kPa] are the borders of the colours."""
     whole, close = sheet(328, 330), sheet(328, 330)
-    filled = _tissue(whole.axes[0], field, levels)
+    contours = _tissue(whole.axes[0], field, levels)
     _tissue(close.axes[0], field, levels)
-    x, y = field.drawn.nodes.T
+    x, y = field.finger.nodes.T
     whole.axes[0].set(xlim=(x.min() - 0.5, x.max() + 0.5), ylim=(-1.2, y.max() + 0.5))
-    if filled is not None:
+    if contours is not None:
         bar = whole.figure.colorbar(
-            filled, ax=whole.axes[0], location="bottom", spacing="proportional", aspect=28, pad=0.02, label="SED [kPa]"
+            contours,
+            ax=whole.axes[0],
+            location="bottom",
+            spacing="proportional",
+            aspect=28,
+            pad=0.02,
+            label="SED [kPa]",
         )
         bar.set_ticks(levels[:: -(-len(levels) // 6)])
     _name_layers(whole.axes[0], field)
     _tractions(close, field)
-    inside = tuple(field.drawn.patch.mean(axis=0).tolist())
+    inside = tuple(field.finger.patch.mean(axis=0).tolist())
     close.axes[0].annotate("ending", inside, xytext=(0, 7), textcoords="offset points", ha="center", va="bottom")
     middle = _middle(field)
     close.axes[0].set(xlim=(middle - HALF_WIDTH, middle + HALF_WIDTH), ylim=(-3.1, 4.4))
-    for drawn in (whole, close):
-        drawn.axes[0].set(xlabel="along the surface, proximal to distal [mm]", ylabel="above the surface [mm]")
-        drawn.axes[0].set_title(f"{field.experiment}, index {field.index}")
+    for picture in (whole, close):
+        picture.axes[0].set(xlabel="along the surface, proximal to distal [mm]", ylabel="above the surface [mm]")
+        picture.axes[0].set_title(f"{field.experiment}, index {field.index}")
     stem = f"finger-{field.experiment}-{field.index}"
     of = f"index {field.index} of {field.experiment}"
     skin, header = field.skin, ("x [mm]", "y [mm]", "SED [MPa]")
-    touched = zip(rows_of(skin.x, skin.gap, skin.pressure, skin.traction), skin.state, strict=True)
+    contact_rows = zip(rows_of(skin.x, skin.gap, skin.pressure, skin.traction), skin.state, strict=True)
     of_contact = ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state")
-    rows = ((*row, state) for row, state in touched)
+    rows = ((*row, state) for row, state in contact_rows)
     return (
-        whole.panel(stem, f"Strain-energy density in the finger, {of}", header, rows_of(x, y, field.drawn.sed)),
+        whole.panel(stem, f"Strain-energy density in the finger, {of}", header, rows_of(x, y, field.finger.sed)),
         close.panel(f"{stem}-contact", f"Contact and receptor, {of}", of_contact, rows),
     )
 
@@ -69,7 +75,7 @@ def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
     They rise from 0 in steps of 1, 2 or 5 times a power of ten. Nodes without an SED (nan) count for nothing; where no
     node has one above 0, the colours end at 1 kPa.
     """
-    values = np.concatenate([field.drawn.sed for field in fields]) * 1e3
+    values = np.concatenate([field.finger.sed for field in fields]) * 1e3
     values = values[np.isfinite(values)]
     high = float(np.quantile(values, 0.97)) if len(values) else 0.0
     if high <= 0.0:
@@ -83,40 +89,40 @@ def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSe
 
     Returns the filling; None where no triangle has an SED at all its corners, which the picture then says.
     """
-    filled = _filling(axes, field, levels)
-    for name, line in field.drawn.outlines.items():
+    contours = _draw_contours(axes, field, levels)
+    for name, line in field.finger.outlines.items():
         if name == "bone":
             axes.fill(line[:, 0], line[:, 1], facecolor="#f2f2f2", edgecolor=INK, linewidth=0.4)
         else:
             axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=0.8 if name == "skin" else 0.4)
-    patch = np.vstack([field.drawn.patch, field.drawn.patch[:1]])
+    patch = np.vstack([field.finger.patch, field.finger.patch[:1]])
     axes.plot(patch[:, 0], patch[:, 1], color="white", linewidth=2.2)
     axes.plot(patch[:, 0], patch[:, 1], color=INK, linewidth=1.0)
     axes.axhline(0.0, color=INK, linewidth=1.0)
     axes.axhspan(-50.0, 0.0, color=PALE, alpha=0.45, linewidth=0, zorder=0)
     axes.set_aspect("equal", anchor="N")
-    if filled is None:
+    if contours is None:
         axes.text(0.5, 0.98, NO_SED, transform=axes.transAxes, ha="center", va="top")
-    return filled
+    return contours
 
 
-def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
+def _draw_contours(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
     """Fill the triangles whose corners all have a finite SED; return None where there are none."""
-    nodes, sed, corners = field.drawn.nodes, field.drawn.sed * 1e3, field.drawn.triangles
-    missing = ~np.isfinite(sed[corners]).all(axis=1)
-    if missing.all():
+    nodes, sed, corners = field.finger.nodes, field.finger.sed * 1e3, field.finger.triangles
+    without_sed = ~np.isfinite(sed[corners]).all(axis=1)
+    if without_sed.all():
         return None
-    known = np.where(np.isfinite(sed), sed, 0.0)  # a node without an SED lies in no triangle that is drawn
-    mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=missing)
-    filled = axes.tricontourf(mesh, known, levels=levels, cmap=_COLOURS, extend="max")
-    filled.set_edgecolor("face")  # else hairlines of the page show between the levels
-    filled.set_linewidth(0.3)
-    return filled
+    values = np.where(np.isfinite(sed), sed, 0.0)  # a node without an SED lies in no triangle that is drawn
+    mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=without_sed)
+    contours = axes.tricontourf(mesh, values, levels=levels, cmap=_COLOURS, extend="max")
+    contours.set_edgecolor("face")  # else hairlines of the page show between the levels
+    contours.set_linewidth(0.3)
+    return contours
 
 
 def _name_layers(axes: Axes, field: Field) -> None:
     """Write the layers' names beside the finger's back, each with a line into its layer, and the bone's on it."""
-    outlines = field.drawn.outlines
+    outlines = field.finger.outlines
     if "bone" in outlines:
         x, y = outlines["bone"].mean(axis=0).tolist()
         axes.text(x, y, "bone", ha="center", va="center", clip_on=True)
@@ -131,31 +137,31 @@ def _name_layers(axes: Axes, field: Field) -> None:
 
 
 def _middle(field: Field) -> float:
-    touching = field.skin.x[[state != "open" for state in field.skin.state]]
-    return float(touching.min() + touching.max()) / 2 if len(touching) else 0.0
+    contact_x = field.skin.x[[state != "open" for state in field.skin.state]]
+    return float(contact_x.min() + contact_x.max()) / 2 if len(contact_x) else 0.0
 
 
-def _tractions(drawn: Sheet, field: Field) -> None:
+def _tractions(picture: Sheet, field: Field) -> None:
     """Draw what the surface does to the skin: arrows that end where it acts, and how each part of it moves."""
-    axes, skin = drawn.axes[0], field.skin
-    touching = [i for i, state in enumerate(skin.state) if state != "open"]
-    if not touching:
+    axes, skin = picture.axes[0], field.skin
+    contact_nodes = [i for i, state in enumerate(skin.state) if state != "open"]
+    if not contact_nodes:
         axes.text(0.5, 0.02, "no contact", transform=axes.transAxes, ha="center", va="bottom")
         return
     _states(axes, field)
-    strongest = float(np.hypot(skin.pressure[touching], skin.traction[touching]).max())
+    strongest = float(np.hypot(skin.pressure[contact_nodes], skin.traction[contact_nodes]).max())
     if strongest == 0.0:  # it touches, and nothing presses yet
         return
     scale = LONGEST_ARROW / strongest
-    for i in touching[:: max(1, -(-len(touching) // _ARROWS))]:
+    for i in contact_nodes[:: max(1, -(-len(contact_nodes) // _ARROWS))]:
         vector = (scale * skin.traction[i], scale * skin.pressure[i])
         text = f"pressure {1e3 * skin.pressure[i]:.1f} kPa, traction {1e3 * skin.traction[i]:.1f} kPa"
         start = (skin.x[i] - vector[0], -0.08 - vector[1])
-        axes.quiver(*start, *vector, color=INK, gid=drawn.note(text), **_ARROW)
+        axes.quiver(*start, *vector, color=INK, gid=picture.note(text), **_ARROW)
     unit = _nice(strongest)
-    left = _middle(field) - HALF_WIDTH + 0.3
-    axes.plot([left, left], [-2.8, -2.8 + unit * scale], color=INK, linewidth=1.0, solid_capstyle="butt")
-    axes.text(left + 0.2, -2.8 + unit * scale / 2, f"{1e3 * unit:g} kPa", ha="left", va="center", fontsize=7.5)
+    bar_x = _middle(field) - HALF_WIDTH + 0.3
+    axes.plot([bar_x, bar_x], [-2.8, -2.8 + unit * scale], color=INK, linewidth=1.0, solid_capstyle="butt")
+    axes.text(bar_x + 0.2, -2.8 + unit * scale / 2, f"{1e3 * unit:g} kPa", ha="left", va="center", fontsize=7.5)
 
 
 def _states(axes: Axes, field: Field) -> None:

@@ -39,48 +39,48 @@ from sessions.statistics.scores import MeanScore
 _TICKS = [0, 20, 40, 60, 80, 100]  # of a scale of scores
 
 
-def score_panel(judged: Experiment | DescriptorFindings) -> Panel | None:
+def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
     """Return mean score against index, with 95 % t intervals and every subject's answer beside them; None of none."""
-    if not judged.scores:
+    if not findings.scores:
         return None
-    name = judged.name if isinstance(judged, Experiment) else judged.descriptor
-    drawn = sheet(328, 280)
-    (axes,) = drawn.axes
+    name = findings.name if isinstance(findings, Experiment) else findings.descriptor
+    picture = sheet(328, 280)
+    (axes,) = picture.axes
     axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
-    places = [index - 3.0 for index in judged.indices]
-    for scores in judged.answers.values():
+    places = [index - 3.0 for index in findings.indices]
+    for scores in findings.answers.values():
         own = [math.nan if score is None else score for score in scores]
         axes.plot(places, own, "o", ms=2, color=GREY, alpha=0.55, mew=0)
-    for mean in judged.scores:
-        _draw_mean(drawn, axes, mean)
-    low = min([-4.0, *(m.low - 2 for m in judged.scores if m.low is not None)])
-    axes.set(xlim=(-9, 106), ylim=(low, 109), xticks=judged.indices, yticks=_TICKS, title=name)
-    axes.set(xlabel=f"index of {judged.descriptor} [–]", ylabel=f"score of {judged.descriptor} [0–100]")
-    title = f"Scores of {judged.descriptor} against the stimuli's index"
+    for mean in findings.scores:
+        _draw_mean(picture, axes, mean)
+    low = min([-4.0, *(m.low - 2 for m in findings.scores if m.low is not None)])
+    axes.set(xlim=(-9, 106), ylim=(low, 109), xticks=findings.indices, yticks=_TICKS, title=name)
+    axes.set(xlabel=f"index of {findings.descriptor} [–]", ylabel=f"score of {findings.descriptor} [0–100]")
+    title = f"Scores of {findings.descriptor} against the stimuli's index"
     header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
-    header += tuple(f"score of {subject}" for subject in judged.answers)
-    by_index = dict(zip(judged.indices, zip(*judged.answers.values(), strict=True), strict=False))
-    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in judged.scores)
-    return drawn.panel(f"scores-{name}", title, header, rows)
+    header += tuple(f"score of {subject}" for subject in findings.answers)
+    by_index = dict(zip(findings.indices, zip(*findings.answers.values(), strict=True), strict=False))
+    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in findings.scores)
+    return picture.panel(f"scores-{name}", title, header, rows)
 
 
-def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
+def _draw_mean(picture: Sheet, axes: Axes, mean: MeanScore) -> None:
     text = f"index {mean.index}: mean {mean.mean:.1f}, {plural(mean.n, 'subject')}"
     if mean.low is not None and mean.high is not None:
         text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
         ends = [[mean.mean - mean.low], [mean.high - mean.mean]]
         axes.errorbar(mean.index, mean.mean, yerr=ends, color=INK, linewidth=1.1, capsize=3, capthick=0.8)
-    axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=drawn.note(text))
+    axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=picture.note(text))
 
 
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     """Return the figures a study has numbers for, in their order."""
-    shown = shown_response(study.response)
-    words = caption("figure-study-relation", label=shown.label, model=study_model(study))
-    paths = (paths_panel(one.descriptor, one.paths, shown.label) for one in study.descriptors)
+    quantity = shown_response(study.response)
+    words = caption("figure-study-relation", label=quantity.label, model=study_model(study))
+    paths = (paths_panel(one.descriptor, one.paths, quantity.label) for one in study.descriptors)
     with look(simulated=bool(study.simulated)):
         plates = (
-            plate("relation", words, (_relation(one, shown) for one in study.descriptors if one.points)),
+            plate("relation", words, (_relation(one, quantity) for one in study.descriptors if one.points)),
             plate("scores", caption("figure-scores"), map(score_panel, study.descriptors)),
             plate("paths", caption("figure-paths"), paths),
         )
@@ -90,128 +90,131 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
 _MOST = 400  # points that tell their values each on their own
 
 
-def _relation(one: DescriptorFindings, shown: ShownResponse) -> Panel:
-    drawn = sheet(328, 280)
-    (axes,) = drawn.axes
+def _relation(one: DescriptorFindings, quantity: ShownResponse) -> Panel:
+    picture = sheet(328, 280)
+    (axes,) = picture.axes
     each = len(one.points) <= _MOST  # of more points only hovering names the subject
     for subject in dict.fromkeys(point[0] for point in one.points):
-        own = sorted((shown.factor * value, score, index) for of, index, value, score in one.points if of == subject)
+        own = sorted((quantity.factor * value, score, index) for of, index, value, score in one.points if of == subject)
         axes.plot([x for x, _, _ in own], [y for _, y, _ in own], "-", color=GREY, alpha=0.35, linewidth=0.7)
         for x, y, index in own if each else ():
-            words = f"subject {subject}, index {index}: {shown.label} {shown.text(x)}, score {y:.1f}"
-            axes.plot(x, y, "o", color=GREY, markersize=2, gid=drawn.note(words))
+            words = f"subject {subject}, index {index}: {quantity.label} {quantity.text(x)}, score {y:.1f}"
+            axes.plot(x, y, "o", color=GREY, markersize=2, gid=picture.note(words))
         if not each:
             dots = [x for x, _, _ in own], [y for _, y, _ in own]
-            axes.plot(*dots, "o", color=GREY, markersize=2, gid=drawn.note(f"subject {subject}"))
+            axes.plot(*dots, "o", color=GREY, markersize=2, gid=picture.note(f"subject {subject}"))
     means = {mean.index: mean for mean in one.scores}
     for surface in one.surfaces:
         response, mean = surface.response, means.get(surface.index)
         if response is not None and mean is not None:
-            x, y = shown.factor * response.mean, mean.mean
-            words = f"index {surface.index}: mean {shown.label} {shown.text(x)}, mean score {y:.1f}"
-            axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(words))
+            x, y = quantity.factor * response.mean, mean.mean
+            words = f"index {surface.index}: mean {quantity.label} {quantity.text(x)}, mean score {y:.1f}"
+            axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=picture.note(words))
             if response.low is not None and response.high is not None:
-                ends = [shown.factor * response.low, shown.factor * response.high]
+                ends = [quantity.factor * response.low, quantity.factor * response.high]
                 axes.plot(ends, [y, y], color=GREEN, linewidth=0.9, zorder=2)
             if mean.low is not None and mean.high is not None:
                 axes.plot([x, x], [mean.low, mean.high], color=GREEN, linewidth=0.9, zorder=2)
             axes.annotate(str(surface.index), (x, y), xytext=(5, 4), textcoords="offset points", zorder=4)
     axes.set(ylim=(-4, 109), yticks=_TICKS)
-    axes.set(xlabel=f"predicted {shown.label} [{shown.unit}]", ylabel=f"score of {one.descriptor} [0–100]")
+    axes.set(xlabel=f"predicted {quantity.label} [{quantity.unit}]", ylabel=f"score of {one.descriptor} [0–100]")
     within = "" if one.repeated is None else f": within subjects r = {correlation(one.repeated.r)}"
     axes.set_title(f"{one.descriptor}{within}\n{rival_words(one.rivals)}".strip())
-    name, title = f"study-relation-{one.descriptor}", f"Score of {one.descriptor} against predicted {shown.label}"
-    header = ("subject", "index", f"{shown.label} [{shown.kept_unit}]", "score")
-    return drawn.panel(name, title, header, one.points)
+    name, title = f"study-relation-{one.descriptor}", f"Score of {one.descriptor} against predicted {quantity.label}"
+    header = ("subject", "index", f"{quantity.label} [{quantity.kept_unit}]", "score")
+    return picture.panel(name, title, header, one.points)
 
 
 def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFinding]) -> Panel | None:
     """Return the experiment's response against mean score with both errors, their line, r, its interval and n."""
     means = {mean.index: mean for mean in experiment.scores}
-    shown = shown_response(experiment.response)
-    pairs = [(p, shown.of(p)) for p in predictions]
-    points = [(means[p.index], n, shown.ends(p)) for p, n in pairs if n is not None and p.index in means]
+    quantity = shown_response(experiment.response)
+    pairs = [(p, quantity.of(p)) for p in predictions]
+    points = [(means[p.index], n, quantity.ends(p)) for p, n in pairs if n is not None and p.index in means]
     if len(points) < 2:
         return None
-    figure_sheet = sheet(328, 300, widths=(1.0, 0.18))
-    axes, from_zero = figure_sheet.axes
-    related = experiment.score_relation
-    rising = related is not None and (related.slope or 0.0) > 0.0
-    for mean, numbers, friction in points:
-        expected = shown.factor * (numbers[0] if related is None else _on_line(related, mean.mean))
-        _point(figure_sheet, mean, numbers, friction, shown, above=shown.factor * numbers[0] >= expected, rising=rising)
+    picture = sheet(328, 300, widths=(1.0, 0.18))
+    axes, from_zero = picture.axes
+    relation = experiment.score_relation
+    rising = relation is not None and (relation.slope or 0.0) > 0.0
+    values = [quantity.factor * numbers[0] for _, numbers, _ in points]
+    for (mean, numbers, friction), value in zip(points, values, strict=True):
+        above = relation is None or value >= quantity.factor * _on_line(relation, mean.mean)
+        _point(picture, mean, numbers, friction, quantity, above=above, rising=rising)
         own = experiment.own_scores.get(mean.index)
         if own is not None:
-            text = f"index {mean.index}: own score {own:.1f}, {shown.label} {shown.text(shown.factor * numbers[0])}"
-            axes.plot(own, shown.factor * numbers[0], "o", color=GREEN, mfc="none", ms=4, gid=figure_sheet.note(text))
-    if related is not None:
+            text = f"index {mean.index}: own score {own:.1f}, {quantity.label} {quantity.text(value)}"
+            axes.plot(own, value, "o", color=GREEN, mfc="none", ms=4, gid=picture.note(text))
+    if relation is not None:
         ends = [min(m.mean for m, *_ in points), max(m.mean for m, *_ in points)]
-        axes.plot(ends, [shown.factor * _on_line(related, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
-    values = [shown.factor * numbers[0] for _, numbers, _ in points]
+        axes.plot(ends, [quantity.factor * _on_line(relation, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
     low, high = min(values), max(values)
     room = 0.18 * (high - low or abs(high))
-    drawn = [low - room, high + room]
-    drawn += [
-        shown.factor * end + side for *_, ends in points if ends for end in ends for side in (-room / 4, room / 4)
+    heights = [low - room, high + room]
+    heights += [
+        quantity.factor * end + side for *_, ends in points if ends for end in ends for side in (-room / 4, room / 4)
     ]
-    axes.set(xlim=(-6, 106), ylim=(min(drawn), max(drawn)), xticks=_TICKS)
-    axes.set(xlabel=f"mean score of {experiment.descriptor} [0–100]", ylabel=f"predicted {shown.label} [{shown.unit}]")
-    title = f"range of {shown.label}: {shown.text(high - low)} ({spread_share(low, high)})"
+    axes.set(xlim=(-6, 106), ylim=(min(heights), max(heights)), xticks=_TICKS)
+    axes.set_xlabel(f"mean score of {experiment.descriptor} [0–100]")
+    axes.set_ylabel(f"predicted {quantity.label} [{quantity.unit}]")
+    title = f"range of {quantity.label}: {quantity.text(high - low)} ({spread_share(low, high)})"
     axes.set_title(f"{relation_words(experiment)}\n{title}\n{rival_words(experiment.rivals)}".strip())
     from_zero.plot([0.0] * len(values), values, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
     from_zero.set(xlim=(-1, 1), ylim=(min(0.0, 1.15 * low), max(0.0, 1.15 * high)), xticks=[])
-    from_zero.set_xlabel(f"from 0\n[{shown.unit}]")
+    from_zero.set_xlabel(f"from 0\n[{quantity.unit}]")
     from_zero.spines["bottom"].set_visible(False)
-    name, title = f"relation-{experiment.name}", f"Predicted {shown.label} against score of {experiment.descriptor}"
+    name, title = f"relation-{experiment.name}", f"Predicted {quantity.label} against score of {experiment.descriptor}"
     header = ("index", "mean score", "95 % interval low", "95 % interval high", "own score")
-    header += (f"{shown.label} [{shown.kept_unit}]", f"error estimate of {shown.label} [-]")
-    header += tuple(f"95 % interval of {shown.label} by friction, {end} [{shown.kept_unit}]" for end in ("low", "high"))
+    header += (f"{quantity.label} [{quantity.kept_unit}]", f"error estimate of {quantity.label} [-]")
+    interval = f"95 % interval of {quantity.label} by friction"
+    header += tuple(f"{interval}, {end} [{quantity.kept_unit}]" for end in ("low", "high"))
     relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n, _ in points]
     rows = (
         (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), n[0], error, *(friction or (None, None)))
         for (m, n, friction), error in zip(points, relative, strict=True)
     )
-    return figure_sheet.panel(name, title, header, rows)
+    return picture.panel(name, title, header, rows)
 
 
 def relation_words(experiment: Experiment) -> str:
     """Return r with its interval and n, or why there is none, in few words."""
-    related = experiment.score_relation
-    if related is None or related.pearson is None:
-        return "no r: " + (related.reason if related is not None and related.reason else "no scores")
-    words = f"r = {correlation(related.pearson)}"
-    if related.low is not None and related.high is not None:
-        words += f" ({correlation(related.low)} to {correlation(related.high)})"
-    return words + f", n = {related.n}"
+    relation = experiment.score_relation
+    if relation is None or relation.pearson is None:
+        return "no r: " + (relation.reason if relation is not None and relation.reason else "no scores")
+    words = f"r = {correlation(relation.pearson)}"
+    if relation.low is not None and relation.high is not None:
+        words += f" ({correlation(relation.low)} to {correlation(relation.high)})"
+    return words + f", n = {relation.n}"
 
 
-def _on_line(related: Relation, score: float) -> float:
+def _on_line(relation: Relation, score: float) -> float:
     """Return the response of the least-squares line at a score; nan where there is no line."""
-    if related.slope is None or related.intercept is None:
+    if relation.slope is None or relation.intercept is None:
         return math.nan
-    return related.intercept + related.slope * score
+    return relation.intercept + relation.slope * score
 
 
 def _point(
-    drawn: Sheet,
+    picture: Sheet,
     mean: MeanScore,
     numbers: Numbers,
     friction: Ends | None,
-    shown: ShownResponse,
+    quantity: ShownResponse,
     *,
     above: bool,
     rising: bool,
 ) -> None:
     """Draw one stimulus with its errors, its index on the side away from the line."""
-    axes = drawn.axes[0]
-    value = shown.factor * numbers[0]
-    text = f"index {mean.index}: score {mean.mean:.1f}, {shown.label} {shown.text(value)}"
+    axes = picture.axes[0]
+    value = quantity.factor * numbers[0]
+    text = f"index {mean.index}: score {mean.mean:.1f}, {quantity.label} {quantity.text(value)}"
     if mean.low is not None and mean.high is not None:
         axes.plot([mean.low, mean.high], [value, value], color=GREY, linewidth=0.8, zorder=2)
     mesh = [(numbers[0] - error, numbers[0] + error, 2.4) for error in numbers[1:]]
     for low, high, width in [*mesh, *([] if friction is None else [(*friction, 0.8)])]:
-        axes.plot([mean.mean] * 2, [shown.factor * low, shown.factor * high], color=GREY, linewidth=width, zorder=2)
-    axes.plot(mean.mean, value, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(text))
+        ends = [quantity.factor * low, quantity.factor * high]
+        axes.plot([mean.mean] * 2, ends, color=GREY, linewidth=width, zorder=2)
+    axes.plot(mean.mean, value, "o", color=GREEN, markersize=5, zorder=3, gid=picture.note(text))
     right = above != rising  # away from the line
     off = (5 if right else -5, 4 if above else -4)
     sides: dict[str, Any] = {"ha": "left" if right else "right", "va": "bottom" if above else "top"}
@@ -229,8 +232,8 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
         return None
     choices = by_choice(findings)
     usual = next((r for one, r in zip(findings, values, strict=True) if one.usual and r is not None), None)
-    drawn = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
-    above, below = drawn.axes
+    picture = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
+    above, below = picture.axes
     low, high = _ends(numbers)
     counts, edges = np.histogram(numbers, _BINS, (low, high))
     above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
@@ -242,7 +245,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
         else:
             words = f"{CHOICE_LABELS[choice]} {name}: median r {correlation(of.median)} of {of.correlated} paths"
             below.plot([of.least, of.greatest], [y, y], color=GREY, linewidth=1.1)
-            below.plot(of.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=drawn.note(words))
+            below.plot(of.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=picture.note(words))
         if is_usual:
             below.plot(low - 0.02 * (high - low), y, "D", color=INK, markersize=2.6, clip_on=False)
     below.set_yticks(range(len(choices)), [name for _, name, _, _ in choices], fontsize=7)
@@ -251,7 +254,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
         if choices[before][0] != choices[before - 1][0]:
             below.axhline(before - 0.5, color=PALE, linewidth=0.6)
     below.set_xlabel(f"correlation of {label} with score [–]")
-    for axes in drawn.axes:
+    for axes in picture.axes:
         axes.set_xlim(low - 0.04 * (high - low), high)
         if usual is not None:
             axes.axvline(usual, color=INK, linewidth=0.9, linestyle=(0, (3, 2)), zorder=0)
@@ -259,7 +262,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
     numbers_of = attrgetter("surfaces", "trials", "r", "within", "low", "high")
     rows = ((*map(str, astuple(one.path)), int(one.usual), *numbers_of(one)) for one in findings)
     title = f"Correlation of {descriptor} along many paths of the analysis"
-    return drawn.panel(f"paths-{descriptor}", title, header, rows)
+    return picture.panel(f"paths-{descriptor}", title, header, rows)
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
@@ -284,8 +287,8 @@ def comparison_panel(
     """Return the picture of `rows`: stimuli, and both sessions' values of each of `names`; None where none has both."""
     if not any(None not in pair for _, pairs in rows for pair in pairs):
         return None
-    drawn = sheet(560, 150 * len(names) + 60, tuple(1.0 for _ in names), share_x=True)
-    for at, (name, axes) in enumerate(zip(names, drawn.axes, strict=True)):
+    picture = sheet(560, 150 * len(names) + 60, tuple(1.0 for _ in names), share_x=True)
+    for at, (name, axes) in enumerate(zip(names, picture.axes, strict=True)):
         for place, (stimulus, pairs) in enumerate(rows):
             first, second = pairs[at]
             if first is not None and second is not None:
@@ -293,12 +296,12 @@ def comparison_panel(
             for value, filled, session in ((first, False, sessions[0]), (second, True, sessions[1])):
                 if value is not None:
                     face = _COLOURS[at % len(_COLOURS)] if filled else "white"
-                    note = drawn.note(f"{stimulus}, {session}: {name} {value:.4g}")
+                    note = picture.note(f"{stimulus}, {session}: {name} {value:.4g}")
                     axes.plot([place], [value], "s" if filled else "o", ms=5.0, mfc=face, mec=INK, mew=0.7, gid=note)
         axes.set_ylabel(name)
-        axes.tick_params(labelbottom=axes is drawn.axes[-1])
-    drawn.axes[0].set_title(f"circle: {sessions[0]}; filled square: {sessions[1]}")
-    last = drawn.axes[-1]
+        axes.tick_params(labelbottom=axes is picture.axes[-1])
+    picture.axes[0].set_title(f"circle: {sessions[0]}; filled square: {sessions[1]}")
+    last = picture.axes[-1]
     last.set_xticks(range(len(rows)), [stimulus for stimulus, _ in rows], rotation=60, ha="right")
     last.set_xlim(-0.6, len(rows) - 0.4)
     header = ("stimulus", *(f"{name} {part}" for name in names for part in (*sessions, "difference")))
@@ -306,4 +309,4 @@ def comparison_panel(
         (stimulus, *(cell for a, b in pairs for cell in (a, b, None if a is None or b is None else b - a)))
         for stimulus, pairs in rows
     )
-    return drawn.panel("compared", f"{sessions[0]} and {sessions[1]} compared", header, table)
+    return picture.panel("compared", f"{sessions[0]} and {sessions[1]} compared", header, table)

@@ -181,26 +181,26 @@ def rows_of(*columns: Array) -> tuple[tuple[Cell, ...], ...]:
     return tuple(zip(*cells, strict=True))
 
 
-def svg(drawn: Sheet, name: str, title: str) -> str:
+def svg(picture: Sheet, name: str, title: str) -> str:
     """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
     if _SIMULATED.get():
-        drawn.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
+        picture.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
     if note := _NOTE.get():
-        drawn.figure.supxlabel(note, x=0.01, ha="left", fontsize=6.5, color=GREY, wrap=True)
-    engine = drawn.figure.get_layout_engine()
+        picture.figure.supxlabel(note, x=0.01, ha="left", fontsize=6.5, color=GREY, wrap=True)
+    engine = picture.figure.get_layout_engine()
     if engine is not None:
-        engine.execute(drawn.figure)
-    for place in drawn.then:
+        engine.execute(picture.figure)
+    for place in picture.then:
         place()
-    drawn.figure.set_layout_engine(None)  # else it would be drawn once more, only to be laid out
+    picture.figure.set_layout_engine(None)  # else it would be drawn once more, only to be laid out
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
-        drawn.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+        picture.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     if (images := _PIXELS.get()) is not None:
         pixels = io.BytesIO()
-        drawn.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
+        picture.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
         images[name] = pixels.getvalue()
-    return _finish_svg(buffer.getvalue(), name, title, drawn.hover)
+    return _finish_svg(buffer.getvalue(), name, title, picture.hover)
 
 
 def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> str:
@@ -233,25 +233,25 @@ class Label:
     y: float
 
 
-def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Return places at least `gap` apart, in the order of `wanted` and near them, inside low..high where they fit.
+def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+    """Return places at least `gap` apart, in the order of `targets` and near them, inside low..high where they fit.
 
     >>> spread([1.0, 1.0, 5.0], gap=1.0, low=0.0, high=10.0)
     [0.5, 1.5, 5.0]
     """
-    n = len(wanted)
+    n = len(targets)
     if not n:
         return []
-    order = np.argsort(wanted, kind="stable")
+    order = np.argsort(targets, kind="stable")
     steps = gap * np.arange(n)
     # Without the steps, labels at least `gap` apart are numbers that do not fall.
-    rising = isotonic_regression(np.asarray(wanted)[order] - steps).x
+    rising = isotonic_regression(np.asarray(targets)[order] - steps).x
     places = np.empty(n)
     places[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps
     return [float(place) for place in places]
 
 
-def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "") -> None:
+def label_right(picture: Sheet, axes: Axes, labels: Sequence[Label], head: str = "") -> None:
     """Write labels under `head` right of the axes, each with a line to its point, once the axes have their heights."""
     if not labels:
         return
@@ -261,7 +261,7 @@ def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "
     lines = [axes.plot([], [], color=GREY, linewidth=0.4, clip_on=False, zorder=1)[0] for _ in labels]
 
     def place() -> None:
-        height = axes.get_window_extent().height / drawn.figure.dpi * 72  # [pt]
+        height = axes.get_window_extent().height / picture.figure.dpi * 72  # [pt]
         (low, high), (left, right) = axes.get_ylim(), axes.get_xlim()
         gap = 1.3 * _TEXT * (high - low) / height
         places = spread([label.y for label in labels], gap, low, high - (gap if head else 0.0))
@@ -271,4 +271,4 @@ def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "
             line.set_data([label.x, end], [label.y, y])
         top.set_y(max(places) + gap)
 
-    drawn.then.append(place)
+    picture.then.append(place)

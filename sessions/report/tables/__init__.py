@@ -50,39 +50,40 @@ class Table:
     notes: tuple[tuple[str, str], ...]  # mark, sentence
 
 
+Format = Callable[[float], str]  # a number as text
 Row = tuple[Cell | str | int, ...]  # a text or a whole number stands for a cell of its own
 Rows = tuple[str, Iterable[Row]]  # the heading of a group, and its rows
 
 
-def number_cell(value: float | None, shown: Callable[[float], str], reason: str | None) -> Cell:
+def number_cell(value: float | None, as_text: Format, reason: str | None) -> Cell:
     """Return a number, or a dash with its reason."""
-    return Cell(NONE, reason or "not determined") if value is None else Cell(shown(value))
+    return Cell(NONE, reason or "not determined") if value is None else Cell(as_text(value))
 
 
 def estimate_cell(
     value: float | None,
-    shown: Callable[[float], str],
+    as_text: Format,
     reason: str | None,
     ends: tuple[float, float] | None,
     without: str | None = None,
     *,
-    of_ends: Callable[[float], str] | None = None,
+    of_ends: Format | None = None,
     unit: float = 1.0,
 ) -> Cell:
     """Return a number over its interval, `without` which it has a note that says why; or a dash with its reason.
 
-    `of_ends` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
+    `of_ends` shows an end of the interval where `as_text` shows more than a number; `unit` as for `wording.between`.
     """
     if value is None:
-        return number_cell(None, shown, reason)
+        return number_cell(None, as_text, reason)
     if ends is None:
-        return Cell(shown(value), f"no interval: {without or 'not computed'}")
-    return Cell(shown(value), interval=between(*ends, of_ends or shown, unit))
+        return Cell(as_text(value), f"no interval: {without or 'not computed'}")
+    return Cell(as_text(value), interval=between(*ends, of_ends or as_text, unit))
 
 
-def range_cell(low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None = None) -> Cell:
+def range_cell(low: float | None, high: float | None, as_text: Format, reason: str | None = None) -> Cell:
     """Return an interval as a cell of its own, a dash with the reason where there is none."""
-    return Cell(NONE, reason or "") if low is None or high is None else Cell(f"{shown(low)} to {shown(high)}")
+    return Cell(NONE, reason or "") if low is None or high is None else Cell(f"{as_text(low)} to {as_text(high)}")
 
 
 def table(name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Table | None:
@@ -92,18 +93,18 @@ def table(name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Tabl
     """
     marks: dict[str, str] = {}  # by the note
 
-    def marked(content: Cell | str | int) -> Cell:
+    def with_mark(content: Cell | str | int) -> Cell:
         cell = content if isinstance(content, Cell) else Cell(str(content))
         return replace(cell, mark=marks.setdefault(cell.note, _letters(len(marks)))) if cell.note else cell
 
-    cells = ((name, tuple(tuple(map(marked, row)) for row in rows)) for name, rows in groups)
-    kept = tuple(Group(name, rows) for name, rows in cells if rows)
-    if not kept:
+    cells = ((name, tuple(tuple(map(with_mark, row)) for row in rows)) for name, rows in groups)
+    non_empty = tuple(Group(name, rows) for name, rows in cells if rows)
+    if not non_empty:
         return None
     short, further = _in_short(caption)
     heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
     notes = ((mark, note) for note, mark in marks.items())
-    return Table(name, short, tuple(Column(head, unit) for head, _, unit in heads), kept, (*further, *notes))
+    return Table(name, short, tuple(Column(head, unit) for head, _, unit in heads), non_empty, (*further, *notes))
 
 
 def _letters(n: int) -> str:
@@ -118,14 +119,14 @@ def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
     sentences = re.split(r"(?<=[.;]) (?=\S)", caption)
     if len(caption.split()) <= CAPTION_WORDS:
         return caption, ()
-    kept = {n for n, sentence in enumerate(sentences) if "Model" in sentence or n == 0}
+    main = {n for n, sentence in enumerate(sentences) if "Model" in sentence or n == 0}
     for n in range(len(sentences)):
-        words = sum(len(sentences[k].split()) for k in {*kept, n})
-        if words > CAPTION_WORDS and n not in kept:
+        words = sum(len(sentences[k].split()) for k in {*main, n})
+        if words > CAPTION_WORDS and n not in main:
             break
-        kept.add(n)
-    short = " ".join(sentence for n, sentence in enumerate(sentences) if n in kept)
-    return short, (("", " ".join(sentence for n, sentence in enumerate(sentences) if n not in kept)),)
+        main.add(n)
+    short = " ".join(sentence for n, sentence in enumerate(sentences) if n in main)
+    return short, (("", " ".join(sentence for n, sentence in enumerate(sentences) if n not in main)),)
 
 
 def sections_of(sections: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
@@ -137,8 +138,8 @@ def split_off_appendix(
     sections: Mapping[str, tuple[Table, ...]], body: Set[str]
 ) -> tuple[dict[str, tuple[Table, ...]], tuple[Table, ...]]:
     """Return the sections with those tables that are named in `body`, and all others, for the appendix."""
-    kept = {section: tuple(each for each in tables if each.name in body) for section, tables in sections.items()}
-    return kept, tuple(each for tables in sections.values() for each in tables if each.name not in body)
+    main = {section: tuple(each for each in tables if each.name in body) for section, tables in sections.items()}
+    return main, tuple(each for tables in sections.values() for each in tables if each.name not in body)
 
 
 def group_by_experiment(

@@ -10,6 +10,7 @@ from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.tables import (
     TOO_SHORT,
     Cell,
+    Format,
     Row,
     Rows,
     Table,
@@ -41,14 +42,14 @@ def prediction_table(report: Report) -> Table | None:
         stroke = strokes.get(p.stroke or 0)  # they are counted from 1
         intervals = {} if stroke is None else stroke.bootstrap
         mu = intervals.get(model_mu(stroke, p)[0])
-        bound = intervals.get("tau_max")
-        if bound is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
-            bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
-        missing, error = p.reasons.get("sed"), None if p.doubt else p.error_estimate
+        tau_max = intervals.get("tau_max")
+        if tau_max is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
+            tau_max = tau_max[0] * p.tau_max / stroke.tau_max, tau_max[1] * p.tau_max / stroke.tau_max  # as it was read
+        why, error = p.reasons.get("sed"), None if p.doubt else p.error_estimate
         return (
-            estimate_cell(p.mu, places(3), p.reasons.get("mu") or missing, mu, TOO_SHORT),
+            estimate_cell(p.mu, places(3), p.reasons.get("mu") or why, mu, TOO_SHORT),
             {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
-            estimate_cell(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, TOO_SHORT, unit=1e3),
+            estimate_cell(p.tau_max, tau, p.reasons.get("tau_max") or why, tau_max, TOO_SHORT, unit=1e3),
             _depth(p),
             _stroke_sed(p),
             number_cell(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
@@ -74,15 +75,15 @@ class _Estimate(NamedTuple):
     doubt: str = ""  # why no finger can be in that state
 
 
-def _cell(of: _Estimate, shown: Callable[[float], str], least: int, unit: float = 1.0) -> Cell:
+def _cell(of: _Estimate, as_text: Format, least: int, unit: float = 1.0) -> Cell:
     """Return a number ± its error, over its interval; in doubt without both, which would speak for it."""
     if of.doubt and of.value is not None:
-        return estimate_cell(of.value, shown, None, None, of.doubt)
+        return estimate_cell(of.value, as_text, None, None, of.doubt)
 
     def shown_with_error(value: float) -> str:
         return with_error(unit * value, None if of.error is None else unit * of.error * abs(value), least)
 
-    return estimate_cell(of.value, shown_with_error, of.reason, of.ends, of.without, of_ends=shown, unit=unit)
+    return estimate_cell(of.value, shown_with_error, of.reason, of.ends, of.without, of_ends=as_text, unit=unit)
 
 
 def _sed(
@@ -107,28 +108,28 @@ def afferent_table(report: Report) -> Table | None:
     """Return the firing rates of an afferent, where they were asked for."""
     if all(p.settled_rate is None for p in report.predictions):
         return None
-    shown = shown_response(report.afferent_quantity)
-    published = shown.name == SED.name
-    columns = f"{shown.label} [{shown.unit}] | peak rate [imp/s] | settled rate [imp/s]"
+    quantity = shown_response(report.afferent_quantity)
+    published = quantity.name == SED.name
+    columns = f"{quantity.label} [{quantity.unit}] | peak rate [imp/s] | settled rate [imp/s]"
 
     def row(p: PredictionFinding) -> Row:
-        firing = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
+        estimates = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), _of(p.interval)[1] if published else _SED_ALONE
-        rates = (estimate_cell(rate, places(1), why, ends, without) for rate, ends in firing)
-        return (_stroke_sed(p) if published else _responding(p, shown), *rates)
+        rates = (estimate_cell(rate, places(1), why, ends, without) for rate, ends in estimates)
+        return (_stroke_sed(p) if published else _response_cell(p, quantity), *rates)
 
     below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
-    words = caption("afferent", label=shown.label, below=below if published else "", model=report.model)
+    words = caption("afferent", label=quantity.label, below=below if published else "", model=report.model)
     return _table(report, "table-afferent", words, columns, _rows(report, row))
 
 
-def _responding(p: PredictionFinding, shown: ShownResponse) -> Cell:
+def _response_cell(p: PredictionFinding, quantity: ShownResponse) -> Cell:
     """Return a quantity at the ending in the unit shown, ± its error from the mesh."""
-    numbers = shown.of(p)
+    numbers = quantity.of(p)
     if not numbers:
         return number_cell(None, str, p.reasons.get("sed"))
-    value, error = (shown.factor * number for number in (*numbers, 0.0)[:2])
-    return Cell(with_error(value, error, shown.places))
+    value, error = (quantity.factor * number for number in (*numbers, 0.0)[:2])
+    return Cell(with_error(value, error, quantity.places))
 
 
 def variants_table(report: Report) -> Table | None:

@@ -16,37 +16,36 @@ MANY = 3  # responses of the model that are no longer named one by one
 _LINE = 44  # characters that a line of a picture's title has room for
 
 
-Compared = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
+RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
 
 
-def rival_tables(compared: Compared, quantity: str, model: str) -> tuple[Table | None, Table | None]:
+def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table | None, Table | None]:
     """Return what was measured beside a quantity of the `model`, named in short, and the model's other quantities."""
-    within = "Steiger (1980), within subjects by the jackknife" if _weighed(compared) else "Steiger (1980)"
-    aic = "AIC: crossed mixed models. " if _weighed(compared) else ""
+    within = "Steiger (1980), within subjects by the jackknife" if _have_weights(groups) else "Steiger (1980)"
+    aic = "AIC: crossed mixed models. " if _have_weights(groups) else ""
     measured = caption("rivals", label=quantity, model=model, within=within, aic=aic)
     responses = caption("responses", model=model, label=quantity)
     return (
-        _table("table-rivals", measured, compared, quantity, lambda name: name == quantity or name not in RESPONSES),
-        _table("table-responses", responses, compared, quantity, lambda name: name != quantity and name in RESPONSES),
+        _table("table-rivals", measured, groups, quantity, lambda name: name == quantity or name not in RESPONSES),
+        _table("table-responses", responses, groups, quantity, lambda name: name != quantity and name in RESPONSES),
     )
 
 
-def _weighed(compared: Compared) -> bool:
+def _have_weights(groups: RivalGroups) -> bool:
     """Say whether mixed models weigh the rivals, as they do within the subjects of a study."""
-    return any(one.weight is not None or "weight" in one.reasons for _, rivals in compared for one in rivals)
+    return any(one.weight is not None or "weight" in one.reasons for _, rivals in groups for one in rivals)
 
 
-def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: Callable[[str], bool]) -> Table | None:
+def _table(anchor: str, caption: str, groups: RivalGroups, quantity: str, holds: Callable[[str], bool]) -> Table | None:
     columns = (
         f"quantity | n | r | r of {quantity} minus this | Steiger's Z | p | r given the model's µ | "
-        f"left-out error [0–100]{' | AIC weight' if _weighed(compared) else ''}"
+        f"left-out error [0–100]{' | AIC weight' if _have_weights(groups) else ''}"
     )
     width = columns.count("|") + 1
-    groups = [
-        (name, tuple(_row(rival, quantity)[:width] for rival in rivals if shown(rival.name)))
-        for name, rivals in compared
+    rows = [
+        (name, tuple(_row(rival, quantity)[:width] for rival in rivals if holds(rival.name))) for name, rivals in groups
     ]
-    return table(anchor, caption, columns, groups)
+    return table(anchor, caption, columns, rows)
 
 
 def rival_words(rivals: Sequence[Rival]) -> str:
@@ -61,10 +60,10 @@ def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
     """Return what the scores can and what they cannot tell apart, a sentence each; none without rivals."""
     if len(rivals) < 2:
         return []
-    compared = [rival for rival in rivals if rival.contrast is not None]
+    contrasts = [rival for rival in rivals if rival.contrast is not None]
     why = next((one.reasons["contrast"] for one in rivals if "contrast" in one.reasons), "")
     none = f"Of {name}, the {rivals[0].name} is compared with no rival: {why}."
-    return [*_alike(name, rivals[0].name, rivals), _verdict(name, rivals[0].name, compared) if compared else none]
+    return [*_alike(name, rivals[0].name, rivals), _verdict(name, rivals[0].name, contrasts) if contrasts else none]
 
 
 def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
@@ -74,8 +73,8 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
         return []
     order, them = ("orders", "it") if len(alike) == 1 else ("order", "them")
     names = _rival_names([rival.name for rival in alike])
-    needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
-    figures = {_two_figures(count): name for count, name in (*needed[-1:], *needed[:1])}
+    counts = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
+    figures = {_two_figures(count): name for count, name in (*counts[-1:], *counts[:1])}
     each = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
     opening = (
         f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
@@ -89,18 +88,18 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     ]
 
 
-def _verdict(name: str, model: str, compared: Sequence[Rival]) -> str:
+def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
     """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
-    contrasts = [(rival.name, rival.contrast) for rival in compared if rival.contrast is not None]
+    contrasts = [(rival.name, rival.contrast) for rival in rivals if rival.contrast is not None]
     adjusted = holm([1.0 if contrast.p is None else contrast.p for _, contrast in contrasts])
     for (rival, contrast), p in zip(contrasts, adjusted, strict=True):
         sides["neither" if p >= _ALPHA else "more" if contrast.difference < 0.0 else "less"].append(rival)
-    followed = [
+    clauses = [
         f"{_rival_names(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]
     ]
     sentence = (
-        f"the scores follow {' and '.join(followed)} (p < 0.05 by Holm over {len(adjusted)} rivals)" if followed else ""
+        f"the scores follow {' and '.join(clauses)} (p < 0.05 by Holm over {len(adjusted)} rivals)" if clauses else ""
     )
     if sides["neither"]:
         sentence += (

@@ -45,10 +45,10 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
 
 def _latent(one: DescriptorFindings, kind: Judgement, index: int) -> Cell:
     values = one.latent.get(kind)
-    scaled = None if values is None else values.get(index)
-    if scaled is None:
+    value = None if values is None else values.get(index)
+    if value is None:
         return number_cell(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
-    return estimate_cell(scaled.value, places(2), None, scaled.ends, "too few subjects")
+    return estimate_cell(value.value, places(2), None, value.ends, "too few subjects")
 
 
 def _rows(one: DescriptorFindings) -> Iterable[Row]:
@@ -101,10 +101,10 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
 
 Means = tuple[Average | None, Average | None]  # of log PSE and of log JND over subjects
 LEAST_OF_A_MEAN = 2  # subjects
-Judged = tuple[str, Mapping[str, Psychometric], Means]  # what was judged, each subject's function, and means
+PsychometricResults = tuple[str, Mapping[str, Psychometric], Means]  # descriptor, each subject's function, means
 
 
-def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
+def psychometric_table(judgements: Iterable[PsychometricResults]) -> Table | None:
     """Return PSE, JND, lapses, order and scatter of each subject, under the name of what was judged."""
     groups = [
         (name, (*(_row(who, one) for who, one in functions.items()), *_mean_row(means)))
@@ -115,7 +115,7 @@ def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
     return table("table-psychometric", caption("psychometric"), columns, groups)
 
 
-def session_functions(report: Report) -> list[Judged]:
+def session_functions(report: Report) -> list[PsychometricResults]:
     """Return the psychometric functions of a session, which are one subject's."""
     return [
         (e.name, {"this session": e.psychometric}, (None, None))
@@ -124,17 +124,17 @@ def session_functions(report: Report) -> list[Judged]:
     ]
 
 
-def study_functions(study: StudyFindings) -> list[Judged]:
+def study_functions(study: StudyFindings) -> list[PsychometricResults]:
     """Return the psychometric functions of a study: every subject's, and means over them."""
     pairs = ((one.descriptor, one.constant_stimuli) for one in study.descriptors)
     return [(name, one.functions, (one.pse, one.jnd)) for name, one in pairs if one is not None]
 
 
-def psychometric_sentences(judged: Judged) -> list[str]:
+def psychometric_sentences(results: PsychometricResults) -> list[str]:
     """Return what comparisons with a standard say: of one subject, or of subjects at large."""
-    name, functions, (pse, jnd) = judged
+    name, functions, (pse, jnd) = results
     title = capital(name)
-    fitted = [one for one in functions.values() if one.pse is not None and one.jnd is not None]
+    fits = [one for one in functions.values() if one.pse is not None and one.jnd is not None]
     sentences: list[str] = []
     if len(functions) == 1:
         sentences += [_of_one(title, one) for one in functions.values()]
@@ -147,9 +147,9 @@ def psychometric_sentences(judged: Judged) -> list[str]:
         )
     elif functions:
         sentences.append(f"{title}: no subject's answers give a psychometric function; the table says why.")
-    falling = sum(not one.rises for one in fitted)
+    falling = sum(not one.rises for one in fits)
     if falling:
-        of = f"{falling} of {plural(len(fitted), 'subject')}"
+        of = f"{falling} of {plural(len(fits), 'subject')}"
         sentences.append(f"{title}: {of} chose the surface of less µ more often.")
     return sentences
 

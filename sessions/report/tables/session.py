@@ -8,6 +8,7 @@ from sessions.report.contents import GroundTruth, Report, StrokeFinding
 from sessions.report.tables import (
     TOO_SHORT,
     Cell,
+    Format,
     Row,
     Rows,
     Table,
@@ -39,14 +40,12 @@ from sessions.statistics.correlations import Relation, slope_interval
 from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
 from sessions.statistics.scores import MeanScore, sd_interval
 
-Format = Callable[[float], str]
-
 _WITHOUT = {
     "onset": "the force had left its noise before, or too few readings measure its noise",
     "break_away": "too few readings to fit the rise of T/N",
     "slide_onset": "too few readings to measure the speed",
 }
-_MISSING = {
+_WHY_MISSING = {
     "break_away": "T/N does not rise before the slide, so there is no stick phase, or rises on while it slides",
     "slide_onset": "the start of the slide cannot be determined",
 }
@@ -106,19 +105,19 @@ def _table(report: Report, name: str, caption: str, columns: str, row: Callable[
     def name_row(stroke: StrokeFinding) -> Row:
         if not planned:
             return (stroke.number, *row(stroke))
-        cell = partial(number_cell, shown=places(0), reason="no trial asks for it")
-        coded = stroke.index is None and stroke.code
-        return (stroke.number, cell(stroke.trial), stroke.code if coded else cell(stroke.index), *row(stroke))
+        cell = partial(number_cell, as_text=places(0), reason="no trial asks for it")
+        by_code = stroke.index is None and stroke.code
+        return (stroke.number, cell(stroke.trial), stroke.code if by_code else cell(stroke.index), *row(stroke))
 
     groups = group_by_experiment(report, report.strokes, lambda s: s.experiment, name_row)
     return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups)
 
 
-def _estimate(stroke: StrokeFinding, name: str, shown: Format, unit: float = 1.0) -> Cell:
+def _estimate(stroke: StrokeFinding, name: str, as_text: Format, unit: float = 1.0) -> Cell:
     """Return one number of a stroke over its bootstrap interval, or why it has none."""
     without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, TOO_SHORT)
-    why = stroke.reasons.get(name) or _MISSING.get(name)
-    return estimate_cell(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, unit=unit)
+    why = stroke.reasons.get(name) or _WHY_MISSING.get(name)
+    return estimate_cell(getattr(stroke, name), as_text, why, stroke.bootstrap.get(name), without, unit=unit)
 
 
 def ground_truth_table(report: Report) -> Table | None:
@@ -141,12 +140,12 @@ def ground_truth_table(report: Report) -> Table | None:
             ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
             ("speed", p.speed, stroke.speed if stroke else None, places(1), 1.0),
         )
-        for name, truth, value, shown, unit in quantities:
+        for name, truth, value, as_text, unit in quantities:
             reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
             ends = stroke.bootstrap.get(name) if stroke else None
-            cell = estimate_cell(value, shown, reason, ends, TOO_SHORT, unit=unit)
+            cell = estimate_cell(value, as_text, reason, ends, TOO_SHORT, unit=unit)
             off = None if value is None else 100 * (value / truth - 1)
-            cells += [shown(truth), cell, number_cell(off, with_sign, reason)]
+            cells += [as_text(truth), cell, number_cell(off, with_sign, reason)]
         right = stroke is not None and stroke.direction == p.direction
         cells.append(Cell("right" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
@@ -170,9 +169,9 @@ def score_cells(mean: MeanScore) -> Row:
     return mean.index, mean.n, digits(mean.mean, 1), interval, sd
 
 
-def spread_cell(sd: float | None, n: int, shown: Format, reason: str | None) -> Cell:
+def spread_cell(sd: float | None, n: int, as_text: Format, reason: str | None) -> Cell:
     """Return the standard deviation of n values over its interval."""
-    return estimate_cell(sd, shown, reason, sd_interval(sd, n) if sd else None, "all are alike")
+    return estimate_cell(sd, as_text, reason, sd_interval(sd, n) if sd else None, "all are alike")
 
 
 def answer_tables(report: Report) -> tuple[Table | None, ...]:
@@ -194,45 +193,45 @@ def other_answer_table(report: Report) -> Table | None:
 
 def relation_table(report: Report) -> Table | None:
     """Return how the predicted quantity goes with mean scores and with the indices."""
-    shown = shown_response(report.response)
+    quantity = shown_response(report.response)
     groups: list[Rows] = []
     for e in report.experiments:
-        related = (("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation))
-        groups.append((e.name, [_relation_row(name, r) for name, r in related if r is not None]))
+        relations = (("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation))
+        groups.append((e.name, [_relation_row(name, r) for name, r in relations if r is not None]))
     columns = (
-        f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
-        f"exact p of rho | slope [{shown.step} a point] | r without one"
+        f"{quantity.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
+        f"exact p of rho | slope [{quantity.step} a point] | r without one"
     )
     any_own = any(e.own_relation is not None for e in report.experiments)
     own = "The forces are those of one subject, whose scores are the own ones. " if any_own else ""
     scores = "scores and to " if report.scored else ""
-    words = caption("session-relation", label=shown.label, model=report.model, scores=scores, own=own)
+    words = caption("session-relation", label=quantity.label, model=report.model, scores=scores, own=own)
     return table("table-relation", words, columns, groups)
 
 
-def rank_interval(related: Relation) -> Cell:
+def rank_interval(relation: Relation) -> Cell:
     """Return the interval of Spearman's rho, or why it has none."""
-    alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
-    why = alike if related.spearman is not None else related.reason
-    return range_cell(related.spearman_low, related.spearman_high, correlation, why)
+    alike = "no interval of a perfect rho" if relation.n > 3 else f"no interval of rho from {relation.n} points"
+    why = alike if relation.spearman is not None else relation.reason
+    return range_cell(relation.spearman_low, relation.spearman_high, correlation, why)
 
 
-def _relation_row(name: str, related: Relation) -> Row:
-    without = [(label, NONE if r is None else correlation(r)) for label, r in related.without]
+def _relation_row(name: str, relation: Relation) -> Row:
+    without = [(label, NONE if r is None else correlation(r)) for label, r in relation.without]
     no_slope = "no line has one through two points, or through points wholly on it"
     return (
         name,
-        related.n,
-        number_cell(related.pearson, correlation, related.reason),
-        range_cell(related.low, related.high, correlation, related.reason),
-        number_cell(related.spearman, correlation, related.reason),
-        rank_interval(related),
-        number_cell(related.spearman_p, p_value, related.reason or "too many orders to count"),
+        relation.n,
+        number_cell(relation.pearson, correlation, relation.reason),
+        range_cell(relation.low, relation.high, correlation, relation.reason),
+        number_cell(relation.spearman, correlation, relation.reason),
+        rank_interval(relation),
+        number_cell(relation.spearman_p, p_value, relation.reason or "too many orders to count"),
         estimate_cell(
-            related.slope,
+            relation.slope,
             lambda v: significant(1e6 * v, 3),
-            related.reason,
-            slope_interval(related),
+            relation.reason,
+            slope_interval(relation),
             no_slope,
             unit=1e6,
         ),
@@ -240,12 +239,12 @@ def _relation_row(name: str, related: Relation) -> Row:
     )
 
 
-Named = tuple[str, Sequence[PathFinding]]
+NamedPaths = tuple[str, Sequence[PathFinding]]
 
 
-def paths_table(named: Iterable[Named]) -> Table | None:
+def paths_table(path_groups: Iterable[NamedPaths]) -> Table | None:
     """Return the distribution of the correlation over all paths and over those with each choice, by descriptor."""
-    groups = [(name, _rows(findings)) for name, findings in named if findings]
+    groups = [(name, _rows(findings)) for name, findings in path_groups if findings]
     columns = (
         "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
     )
@@ -259,8 +258,8 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     start = f"{capital(name)}: of {len(findings)} paths of the analysis"
     if whole is None:
         return f"{start} none gives a correlation."
-    turned = sum(r is not None and r * usual < 0.0 for r in values)
-    turn = f", {turned} with another sign than the usual path" if turned else ""
+    opposite_count = sum(r is not None and r * usual < 0.0 for r in values)
+    turn = f", {opposite_count} with another sign than the usual path" if opposite_count else ""
     differ = "all agree within" if whole.distinct == 1 else f"{whole.distinct} of these differ by more than"
     return (
         f"{start} {whole.correlated} give a correlation, from {correlation(whole.least)} to "
@@ -288,7 +287,7 @@ def _spread(of: Spread | None, paths: int) -> Row:
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
-    compared = [(e.name, e.rivals) for e in report.experiments]
+    rival_groups = [(e.name, e.rivals) for e in report.experiments]
     sections = {
         "relation": (relation_table(report),),
         "strokes": (stroke_table(report), course_table(report)),
@@ -299,7 +298,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             of_predictions.variants_table(report),
             of_predictions.variant_forces_table(report),
         ),
-        "rivals": rival_tables(compared, BY_NAME[report.response].label, report.model),
+        "rivals": rival_tables(rival_groups, BY_NAME[report.response].label, report.model),
         "scores": (
             score_table(report),
             *answer_tables(report),

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
-from sessions.report.tables import Cell, Row, Table, number_cell, range_cell, sections_of, table
+from sessions.report.tables import Cell, Format, Row, Table, number_cell, range_cell, sections_of, table
 from sessions.report.tables.rivals import rival_tables
 from sessions.report.tables.scales import latent_table, psychometric_table, scales_table, study_functions
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
@@ -141,27 +141,27 @@ def _estimates(study: StudyFindings) -> Table | None:
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]
-    left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
-    return _table(study, "table-estimates", caption("study-estimates", left=left), columns, rows)
+    note = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
+    return _table(study, "table-estimates", caption("study-estimates", left=note), columns, rows)
 
 
 def _surfaces(study: StudyFindings) -> Table | None:
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces if any(s.subjects for s in one.surfaces) else ():
-            cells = (*_mean(s.mu, places(3)), *_mean(s.response, written))
-            yield (s.index, s.subjects, *cells, _spread(s.response, shown.factor))
+            cells = (*_mean(s.mu, places(3)), *_mean(s.response, in_unit))
+            yield (s.index, s.subjects, *cells, _spread(s.response, quantity.factor))
 
-    def written(response: float) -> str:
-        return digits(shown.factor * response, shown.places)
+    def in_unit(response: float) -> str:
+        return digits(quantity.factor * response, quantity.places)
 
-    shown = shown_response(study.response)
-    unit = shown.unit
+    quantity = shown_response(study.response)
+    unit = quantity.unit
     columns = (
-        f"index | subjects | µ [1] | 95 % interval [1] | {shown.label} [{unit}] | 95 % interval [{unit}] | "
+        f"index | subjects | µ [1] | 95 % interval [1] | {quantity.label} [{unit}] | 95 % interval [{unit}] | "
         f"standard deviation [{unit}]"
     )
-    words = caption("study-surfaces", label=shown.label, model=study_model(study))
+    words = caption("study-surfaces", label=quantity.label, model=study_model(study))
     return _table(study, "table-surfaces", words, columns, row)
 
 
@@ -192,23 +192,23 @@ _NOT_OF_PEOPLE = "no interval of two subjects, of some who are all alike, or of 
 _NO_STROKE = "no subject's stroke gives this number"
 
 
-def _mean(mean: Average | None, shown: Callable[[float], str]) -> Row:
+def _mean(mean: Average | None, as_text: Format) -> Row:
     """Return a mean and its interval, or dashes with the reason."""
     if mean is None:
         return (number_cell(None, str, _NO_STROKE),) * 2
-    return shown(mean.mean), range_cell(mean.low, mean.high, shown, no_interval(mean))
+    return as_text(mean.mean), range_cell(mean.low, mean.high, as_text, no_interval(mean))
 
 
 def _relation(study: StudyFindings) -> Table | None:
 
     def rows(one: DescriptorFindings) -> tuple[Row, ...]:
-        estimated = None if one.estimates is None else one.estimates.repeated
+        of_estimates = None if one.estimates is None else one.estimates.repeated
         return (
             *_of_means("means", one.mean_relation),
             *_of_means("means, standardised", one.normalised.mean_relation),
             *_within_subjects("within subjects", one.repeated, one.repeated_holm, one.without_subject),
             *_within_subjects("within, standardised", one.normalised.repeated),
-            *_within_subjects("within, log estimates", estimated),
+            *_within_subjects("within, log estimates", of_estimates),
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
@@ -217,26 +217,26 @@ def _relation(study: StudyFindings) -> Table | None:
 
 
 def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
-    compared = [
+    rival_groups = [
         (f"{one.descriptor}, {kind}", rivals)
         for one in study.descriptors
         for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
     ]
-    return rival_tables(compared, BY_NAME[study.response].label, study_model(study))
+    return rival_tables(rival_groups, BY_NAME[study.response].label, study_model(study))
 
 
-def _of_means(name: str, related: Relation | None) -> Iterable[Row]:
-    if related is not None and related.pearson is not None:
+def _of_means(name: str, relation: Relation | None) -> Iterable[Row]:
+    if relation is not None and relation.pearson is not None:
         yield (
             name,
-            f"{related.n} surfaces",
-            correlation(related.pearson),
-            range_cell(related.low, related.high, correlation, related.reason),
-            _or_dash(related.spearman, correlation),
-            rank_interval(related),
-            _or_dash(related.spearman_p, p_value),
+            f"{relation.n} surfaces",
+            correlation(relation.pearson),
+            range_cell(relation.low, relation.high, correlation, relation.reason),
+            _or_dash(relation.spearman, correlation),
+            rank_interval(relation),
+            _or_dash(relation.spearman_p, p_value),
             NONE,
-            _without([(f"index {label}", r) for label, r in related.without if r is not None]),
+            _without([(f"index {label}", r) for label, r in relation.without if r is not None]),
         )
 
 
@@ -260,8 +260,8 @@ def _within_subjects(
         )
 
 
-def _or_dash(value: float | None, shown: Callable[[float], str]) -> str:
-    return NONE if value is None else shown(value)
+def _or_dash(value: float | None, as_text: Format) -> str:
+    return NONE if value is None else as_text(value)
 
 
 def _without(left_out: Sequence[tuple[str, float]]) -> str:

@@ -1,10 +1,10 @@
 """Tables of a study's page: mixed models, true and estimated values, and every trial."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from itertools import combinations
 
 from sessions.prediction import BY_NAME, Quantity
-from sessions.report.tables import Cell, Row, Table, estimate_cell, number_cell, range_cell, table
+from sessions.report.tables import Cell, Format, Row, Table, estimate_cell, number_cell, range_cell, table
 from sessions.report.trials import model_in_short
 from sessions.report.wording import NONE, caption, digits, p_value, places, plural, sed, significant, tau, three_figures
 from sessions.statistics.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
@@ -71,9 +71,9 @@ def missing_scores(study: StudyFindings) -> list[str]:
         order = "it takes two subjects who scored each of three surfaces or more, not all alike"
         within = "they take two subjects who scored each of two surfaces"
         pairs = "it takes three subjects who scored both, not all with the same difference"
-        known = {(pair.low_index, pair.high_index) for pair in one.differences}
-        scored = sorted(mean.index for mean in one.scores)
-        without = [f"{b} − {a}" for a, b in combinations(scored, 2) if (a, b) not in known]
+        index_pairs = {(pair.low_index, pair.high_index) for pair in one.differences}
+        indices = sorted(mean.index for mean in one.scores)
+        without = [f"{b} − {a}" for a, b in combinations(indices, 2) if (a, b) not in index_pairs]
         sentences += [] if one.agreement else [f"No agreement on the order: {order}; {have}."]
         sentences += [] if one.within else [f"No intervals within subjects: {within}; {have}."]
         if without:
@@ -96,7 +96,7 @@ def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
     of = model.spreads
     if of is not None:
         slopes = ("spread of subjects' slopes", units[first], of.slope)
-        for name, unit, s in ((LEVELS, "points", of.level), slopes, (NOISE, "points", of.left)):
+        for name, unit, s in ((LEVELS, "points", of.level), slopes, (NOISE, "points", of.residual)):
             if s is not None:
                 yield row(name, unit, s.sd, s)
 
@@ -145,8 +145,8 @@ def trials_table(study: StudyFindings) -> Table | None:
         for visit in study.visits
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
     ]
-    known = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
-    calibrations = f" (calibration: {'; '.join(known)})" if known else ""
+    distinct = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
+    calibrations = f" (calibration: {'; '.join(distinct)})" if distinct else ""
     words = caption("study-trials", calibrations=calibrations, model=study_model(study))
     return table("table-trials", words, columns, groups)
 
@@ -163,9 +163,9 @@ def _row(row: TrialRow) -> Row:
     answer = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
 
-    def estimate(name: str, shown: Callable[[float], str], unit: float = 1.0, without: str = _FEW) -> Cell:
+    def estimate(name: str, as_text: Format, unit: float = 1.0, without: str = _FEW) -> Cell:
         interval = bounds(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
-        return estimate_cell(getattr(row, name), shown, why, interval, without, unit=unit)
+        return estimate_cell(getattr(row, name), as_text, why, interval, without, unit=unit)
 
     return (
         row.trial,

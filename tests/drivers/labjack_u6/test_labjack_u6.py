@@ -228,7 +228,7 @@ def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plug_in, cal
     assert health.restarted == 0
     assert health.lost > 200
     # What the converter still held when it was stopped, 164 scans at most, is dropped at the end.
-    assert 0 <= device._done - (health.received + health.lost) <= 170
+    assert 0 <= device._scan_count - (health.received + health.lost) <= 170
 
 
 class Forgetful(LabJackU6Box):
