@@ -136,13 +136,13 @@ class Visit:
             "tau_max": (drag * systematic.gain_t + systematic.shares(along)[0] * normal, drag, true),
         }
         ends = {
-            name: (*np.quantile(draw, (0.025, 0.975)), reported, truth)
-            for name, (draw, reported, truth) in draws.items()
+            name: (*np.quantile(draw, (0.025, 0.975)), estimate, truth)
+            for name, (draw, estimate, truth) in draws.items()
         }
         levelled = settings.tilt == (0.0, 0.0)
         return {
-            name: low <= truth <= high or (not levelled and min(low, reported) <= truth <= max(high, reported))
-            for name, (low, high, reported, truth) in ends.items()
+            name: low <= truth <= high or (not levelled and min(low, estimate) <= truth <= max(high, estimate))
+            for name, (low, high, estimate, truth) in ends.items()
         }
 
     def _truth(self, stroke: StrokeGroundTruth) -> Truth:

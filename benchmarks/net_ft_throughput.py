@@ -129,7 +129,7 @@ def send(rate: int, seconds: float, pipe: Connection) -> None:
     count = round(rate * seconds)
     records = np.zeros(count, RECORD)
     records["number"] = records["counter"] = np.arange(1, count + 1)
-    packed, size = records.tobytes(), RECORD.itemsize
+    data, size = records.tobytes(), RECORD.itemsize
     port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     port.bind(("127.0.0.1", 0))
     pipe.send(port.getsockname()[1])
@@ -140,7 +140,7 @@ def send(rate: int, seconds: float, pipe: Connection) -> None:
         while sent < count:
             due = min(round((time.monotonic() - began) * rate), count)
             for i in range(sent, due):
-                port.send(packed[i * size : (i + 1) * size])
+                port.send(data[i * size : (i + 1) * size])
             sent = due
             time.sleep(0.0002)
 

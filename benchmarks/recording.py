@@ -61,9 +61,9 @@ def main() -> None:
 @contextmanager
 def print_time(what: str) -> Iterator[None]:
     """Print how long something took, by the clock and by the processor: others may be using the machine."""
-    began, worked = time.perf_counter(), time.process_time()
+    began, cpu = time.perf_counter(), time.process_time()
     yield
-    print(f"{what}: {time.perf_counter() - began:.2f} s ({time.process_time() - worked:.2f} s of processor time)")
+    print(f"{what}: {time.perf_counter() - began:.2f} s ({time.process_time() - cpu:.2f} s of processor time)")
 
 
 def memory() -> float:
@@ -80,7 +80,7 @@ def measure_writer(folder: Path, seconds: int) -> None:
     raw = np.round(np.random.default_rng(0).normal(0, 4000, (BLOCK, 6)))
     calls: list[float] = []
     early_s = min(10, seconds // 2)
-    worked = time.process_time()
+    cpu_s = time.process_time()
     for first in range(0, seconds * RATE, BLOCK):
         i = np.arange(first, first + BLOCK)
         block = ReadingBlock(i, i, i * 0, i / RATE, np.full(BLOCK, clock.now_ns()), raw)
@@ -90,7 +90,7 @@ def measure_writer(folder: Path, seconds: int) -> None:
         calls.append(time.perf_counter() - began)
         if first == early_s * RATE:
             early = memory()
-    worked = time.process_time() - worked
+    cpu_s = time.process_time() - cpu_s
     late = memory()
     event_times: list[float] = []
     for _ in range(50):
@@ -100,7 +100,7 @@ def measure_writer(folder: Path, seconds: int) -> None:
     writer.event("ended", data={"reason": "the benchmark is over"})
     writer.close()
     print(
-        f"writing: {100 * sum(calls) / seconds:.2f} % of real time by the clock, {100 * worked / seconds:.2f} % by the"
+        f"writing: {100 * sum(calls) / seconds:.2f} % of real time by the clock, {100 * cpu_s / seconds:.2f} % by the"
         f" processor, the making of the readings included; longest call {1e3 * max(calls):.0f} ms"
     )
     print(f"memory of the writer: {early:.0f} MB after {early_s} s, {late:.0f} MB after {seconds} s")
@@ -150,7 +150,7 @@ def listen(recorder: Recorder, seconds: int) -> None:
     lags: list[float] = []
     readings = left_out = 0
     process = psutil.Process(recorder.pid)
-    worked, began = sum(process.cpu_times()[:2]), time.perf_counter()
+    cpu_s, began = sum(process.cpu_times()[:2]), time.perf_counter()
     while time.perf_counter() - began < seconds:
         for report in recorder.poll(0.005):
             if isinstance(report, m.Live):
@@ -158,11 +158,11 @@ def listen(recorder: Recorder, seconds: int) -> None:
                 readings, left_out = readings + len(report.sequence), left_out + report.left_out
             elif isinstance(report, Status):
                 lags.append(report.lag_ms)
-    passed = time.perf_counter() - began
-    share = (sum(process.cpu_times()[:2]) - worked) / passed
+    wall_s = time.perf_counter() - began
+    share = (sum(process.cpu_times()[:2]) - cpu_s) / wall_s
     ages.sort()
     late = ages[len(ages) * 99 // 100]
-    print(f"  {readings / passed:.0f} readings a second in {len(ages) / passed:.0f} messages, {left_out} left out")
+    print(f"  {readings / wall_s:.0f} readings a second in {len(ages) / wall_s:.0f} messages, {left_out} left out")
     print(f"  newest reading at the client: median {statistics.median(ages):.1f} ms old, 99 % within {late:.1f} ms")
     print(f"  newest reading at the recorder: median {statistics.median(lags):.2f} ms old")
     print(f"  processor: {100 * share:.0f} % of one core")

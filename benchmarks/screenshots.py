@@ -98,7 +98,7 @@ def health(**counts: int) -> m.HealthReport:
     return m.HealthReport(totals, 6999.7, (0.0,) * 7, (0.0,) * 7, 0)
 
 
-def logged(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:
+def log_line(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:
     """Return a line of the log."""
     return LoggedEvent(1, 0, kind, trial, 0, data)
 
@@ -108,9 +108,9 @@ def status(safe_ns: int) -> Status:
     return Status("", 1, 10, 1000, 0, 2.0, Acknowledged(1000, 3, safe_ns))
 
 
-def scored(trial: int, score: float) -> tuple[m.Report, ...]:
+def score_reports(trial: int, score: float) -> tuple[m.Report, ...]:
     """Return what is said when a trial is scored."""
-    return (logged("scored", trial, score=score), logged("take_kept", trial, take=1))
+    return (log_line("scored", trial, score=score), log_line("take_kept", trial, take=1))
 
 
 TARED = m.Tared((0.008, -0.007, -0.061, 1.2, -0.4, 0.02), (0.0041,) * 3 + (0.052,) * 3, (0.0,) * 6, 7000, 1.0)
@@ -221,10 +221,10 @@ class _Places:
         self.recorder.stroke(1, 4.0)
         self.play(steps.AskStroke(trial), until=5.0)
         self.picture("06-subject-stroke", self.subject)
-        self.play(logged("contact_onset", 1, time=4.7, noticed=4.71), until=6.5)
+        self.play(log_line("contact_onset", 1, time=4.7, noticed=4.71), until=6.5)
         self.wait(lambda: not model._under_way)
         self.picture("07-stroking")
-        self.play(logged("finger_lifted", 1, time=7.2, noticed=7.25), until=7.3)
+        self.play(log_line("finger_lifted", 1, time=7.2, noticed=7.25), until=7.3)
         self.play(steps.AskScore(trial, PLAN.blocks[0].scale_ends), until=8.5)
         self.wait(lambda: self.window.bridge.state.session.judged_trial == 1)
         self.picture("08-scoring")
@@ -232,12 +232,12 @@ class _Places:
         line = self.subject.line
         line._take(line.answer.press(1.0, 63.0, "mouse").release())
         self.picture("10-subject-line-answered", self.subject)
-        self.play(*scored(1, 63.0), steps.AskMount(second), until=9.0)
+        self.play(*score_reports(1, 63.0), steps.AskMount(second), until=9.0)
         self.window.act("skip")
         self.picture("11-reason")
         self.window.course.leave()
         for number in range(2, 6):
-            self.play(*scored(number, 20.0 * number), until=9.0 + number / 10)
+            self.play(*score_reports(number, 20.0 * number), until=9.0 + number / 10)
         self.play(steps.ShowInstruction(PLAN.blocks[1]), steps.AskMount(other), until=9.8)
         self.window.live.show_seconds(5)
         self.picture("12-second-block")

@@ -41,7 +41,7 @@ def _session(room: Path) -> Path:
 
 def _print_replay(recording: Recording, room: Path) -> None:
     """Print how many times faster than real time the session is replayed, the solver left out."""
-    lasted = (recording.events[-1].time_ns - recording.events[0].time_ns) * 1e-9
+    span_s = (recording.events[-1].time_ns - recording.events[0].time_ns) * 1e-9
     replay_s: list[float] = []
     total_s: list[float] = []
     for number in range(RUNS):
@@ -51,9 +51,9 @@ def _print_replay(recording: Recording, room: Path) -> None:
         differences = [*different_readings(recording, copy), *different_events(recording, copy)]
         analyse(copy)
         total_s.append(time.perf_counter() - began)
-    print(f"session of {lasted:.1f} s, {recording.events[-1].readings} readings")
-    print(f"replayed in {median(replay_s):.3f} s: {lasted / median(replay_s):.0f} times real time (median of {RUNS})")
-    print(f"compared and analysed too: {median(total_s):.3f} s, {lasted / median(total_s):.0f} times real time")
+    print(f"session of {span_s:.1f} s, {recording.events[-1].readings} readings")
+    print(f"replayed in {median(replay_s):.3f} s: {span_s / median(replay_s):.0f} times real time (median of {RUNS})")
+    print(f"compared and analysed too: {median(total_s):.3f} s, {span_s / median(total_s):.0f} times real time")
     print(f"differences: {len(differences)}")
 
 

@@ -57,8 +57,8 @@ def _first_paint(repeats: int) -> None:
     for _ in range(repeats + 1):
         began = time.time()
         out = subprocess.run([sys.executable, "-c", FIRST_PAINT], capture_output=True, text=True, check=True).stdout
-        painted, cpu = map(float, out.split())
-        wall.append(painted - began)
+        paint_time, cpu = map(float, out.split())
+        wall.append(paint_time - began)
         processor.append(cpu)
     print(
         f"first paint (warm, median of {repeats}): {statistics.median(wall[1:]):.2f} s from start, "
@@ -113,7 +113,7 @@ class _Observations:
         from daq_app.qt.live_plot import LivePlot
 
         self.window = None
-        self.painted: list[float] = []  # instants of a painted frame [s]
+        self.paints: list[float] = []  # instants of a painted frame [s]
         self.late: list[float] = []  # between two beats, beyond what was asked for [s]
         self.busy: list[float] = []  # processor time between two beats: what is left where nobody else wants it [s]
         self.behind: list[float] = []  # recorder to device [ms]
@@ -130,7 +130,7 @@ class _Observations:
 
     def begin(self, window: object) -> None:
         """Begin to count."""
-        for values in (self.painted, self.late, self.busy, self.behind, self.age, self.model_age):
+        for values in (self.paints, self.late, self.busy, self.behind, self.age, self.model_age):
             values.clear()
         self.window, self.predictions = window, window.bridge.model.predictions
         self._last, self._own, self._newest_ns, self._prediction = time.perf_counter(), time.thread_time(), 0, None
@@ -149,7 +149,7 @@ class _Observations:
             return
         bridge, now = self.window.bridge, time.monotonic()
         if plot is self.window.live.plots[0]:
-            self.painted.append(time.perf_counter())
+            self.paints.append(time.perf_counter())
             blocks = bridge.feed._take
             received = int(blocks[-1].received_ns[-1]) if blocks else self._newest_ns
             if received != self._newest_ns:
@@ -162,8 +162,8 @@ class _Observations:
     def report(self, seconds: float, cpu: dict[str, float]) -> None:
         """Print what was noted in so many seconds; `cpu` is processor time by process [s]."""
         count = self.window.bridge.model.predictions - self.predictions
-        print(f"  frames: {len(self.painted) / seconds:.0f} a second, {_parts(np.diff(self.painted))} ms apart")
-        print(f"  processor of the window: {1000 * cpu['window'] / len(self.painted):.1f} ms a frame, all it does")
+        print(f"  frames: {len(self.paints) / seconds:.0f} a second, {_parts(np.diff(self.paints))} ms apart")
+        print(f"  processor of the window: {1000 * cpu['window'] / len(self.paints):.1f} ms a frame, all it does")
         print("  processor by process: " + ", ".join(f"{name} {cpu_s / seconds:.2f}" for name, cpu_s in cpu.items()))
         late, busy = (sum(x > 0.05 for x in values) for values in (self.late, self.busy))
         print(f"  between two turns of the event loop: {_parts(self.late)} ms, over 50 ms {late} times")

@@ -57,8 +57,8 @@ def _leave(code: int) -> None:
     """Leave with an exit code; at once where the user asked to stop and nothing is left to be ended."""
     from daq_app.console import STOPPED
 
-    started = sys.modules.get("multiprocessing")  # which takes a while to import, and most verbs start none
-    if code == STOPPED and not (started and started.active_children()):
+    module = sys.modules.get("multiprocessing")  # which takes a while to import, and most verbs start none
+    if code == STOPPED and not (module and module.active_children()):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)  # taking the loaded libraries apart first takes longer than Ctrl-C may

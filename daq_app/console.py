@@ -23,16 +23,16 @@ _PATIENCE = 1.0  # of people, before they want to see that something is going on
 
 @dataclass(slots=True)
 class Underway:
-    """What work is at whose end nobody knows: half of what is left of the whole is thought to be what it is at."""
+    """Progress of work whose end nobody knows: its present task counts as half of what is left."""
 
-    doing: str
+    task: str
     part: float = 0.0  # of the whole, as shown
-    _start: float = 0.0  # the part when it began what it is doing
+    _start: float = 0.0  # the part of the whole when its task began
 
-    def hear(self, doing: str, part: float) -> None:
-        """Take what is being done, and which part of that is done."""
-        if doing != self.doing:
-            self.doing, self._start = doing, self.part
+    def hear(self, task: str, part: float) -> None:
+        """Take the name of the present task, and the part of it that is done."""
+        if task != self.task:
+            self.task, self._start = task, self.part
         self.reach(self._start + 0.5 * part * (1.0 - self._start))
 
     def reach(self, part: float) -> None:
@@ -165,10 +165,10 @@ class Console:
 
     @contextmanager
     def working(self, text: str) -> Generator[Callable[[float], bool]]:
-        """Show from the second second on what work is busy with whose end nobody knows, and how long it has taken.
+        """Show the task of work whose end nobody knows, once it has taken a second, and its time so far.
 
-        Yields what the work may tell the part done (0 to 1), where it knows it; the answer is always to go on. Of what
-        is left of the whole, half is thought to be what the solver is at: so the part shown moves, and never back.
+        Yields a callback that takes the part done (0 to 1), and always answers to go on. The solver's present task
+        counts as half of what is left: the part shown moves on, and never back.
         """
         start, over = time.monotonic(), threading.Event()
         at = Underway(text)
@@ -181,7 +181,7 @@ class Console:
             pause = _PATIENCE
             while not over.wait(pause):
                 self.progress(
-                    at.part, f"{at.doing}, {time.monotonic() - start:.0f} s so far; Ctrl-C stops", end_known=False
+                    at.part, f"{at.task}, {time.monotonic() - start:.0f} s so far; Ctrl-C stops", end_known=False
                 )
                 pause = 0.2
 
@@ -256,8 +256,8 @@ def table(rows: list[list[str]], *, head: list[str]) -> str:
     """
     lines = [head, *rows]
     widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-    aligned = [
+    texts = [
         "  ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True)))
         for line in lines
     ]
-    return "\n".join(text.rstrip() for text in aligned)
+    return "\n".join(text.rstrip() for text in texts)

@@ -20,12 +20,12 @@ PAGE = Path(__file__).with_name("against-the-paper.md.in")
 
 def page() -> str:
     """Return the page in Markdown."""
-    rows_of = {name: _solved(series) for name, series in SERIES.items()}
+    rows_of = {name: _rows(series) for name, series in SERIES.items()}
     text = PAGE.read_text(encoding="utf-8").format(tables=_tables(rows_of), **_numbers(rows_of))
     return text.replace("-0.", "\u22120.")
 
 
-def _solved(series: tuple[Surface, ...]) -> list[dict[str, float]]:
+def _rows(series: tuple[Surface, ...]) -> list[dict[str, float]]:
     """Return for each surface its SED [kPa] with error, slid the other way too, and at finite strain."""
     scenes = [replace(scene(one), solve=Solve(tolerance=0.005, evidence="quick")) for one in series]
     other = {"+x": "-x", "-x": "+x"}

@@ -77,9 +77,9 @@ def _parts() -> QWidget:
     rows.setCurrentRow(1)
     grid.addWidget(rows, 3, 1)
     for at, grade in enumerate(("wrong", "look")):
-        graded = label(f"This is {grade}.", "value")
-        graded.setProperty("grade", grade)
-        grid.addWidget(graded, at + 1, 2)
+        sample = label(f"This is {grade}.", "value")
+        sample.setProperty("grade", grade)
+        grid.addWidget(sample, at + 1, 2)
     return widget
 
 

@@ -122,8 +122,8 @@ def _share(answers: Sequence[bool | None]) -> str:
 
 def _hard(results: RunResults, kinematics: str) -> Table:
     rows = [row for row in results.of(HardCase) if row.kinematics == kinematics]
-    passed = sum(not row.flaw for row in rows)
-    caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
+    count = sum(not row.flaw for row in rows)
+    caption = f"Hard cases at {kinematics} strain: {count} of {len(rows)} ended as they must."
     outcomes = [f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary for row in rows]
     cells = tuple((row.case, row.must, outcome) for row, outcome in zip(rows, outcomes, strict=True))
     return Table(f"hard-{kinematics}", caption, ("case", "must", "outcome"), cells)

@@ -31,17 +31,17 @@ def compare_reports(first: Report, second: Report) -> ComparisonRows:
 
 
 def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
-    gathered: defaultdict[tuple[str, int], defaultdict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    samples: defaultdict[tuple[str, int], defaultdict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for one in report.predictions:
         if one.index is None:
             continue
         for name, value in (("µ", one.mu), ("SED [kPa]", None if one.sed is None else 1000.0 * one.sed)):
             if value is not None:
-                gathered[one.experiment, one.index][name].append(value)
+                samples[one.experiment, one.index][name].append(value)
     for experiment in report.experiments:
         for score in experiment.scores:
-            gathered[experiment.name, score.index]["score"].append(score.mean)
-    return {key: {name: sum(v) / len(v) for name, v in values.items()} for key, values in gathered.items()}
+            samples[experiment.name, score.index]["score"].append(score.mean)
+    return {key: {name: sum(v) / len(v) for name, v in values.items()} for key, values in samples.items()}
 
 
 def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
@@ -52,7 +52,7 @@ def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
     return automatic_range(field, (finger.frame for fingers in finger_maps for finger in fingers.values()))
 
 
-def shown_film(state: AnalystState) -> m.FingerHistory | None:
+def visible_film(state: AnalystState) -> m.FingerHistory | None:
     """Return the history that was asked for, where it is that of the chosen trial."""
     row = selected_row(state)
     return state.film if row is not None and state.film is not None and state.film.key == row.key else None

@@ -43,8 +43,8 @@ def words_of(row: Row) -> str:
         return _name_of(of) + ("" if row.prediction is None else tr("  no stroke")) + answer
     mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
-    failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
-    return f"{_name_of(row.stroke)}  {mu}{answer}{mark}{failed}"
+    cross = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
+    return f"{_name_of(row.stroke)}  {mu}{answer}{mark}{cross}"
 
 
 def marks_of(row: Row) -> str:

@@ -153,7 +153,7 @@ def reversal(decisions: Decisions, by: str, *, again: bool) -> Decision | None:
 
 def history(decisions: Decisions) -> History:
     """Return which decisions can be undone, and which redone."""
-    undone = [decision_meant(decisions, line) for line in reversed(_undone(decisions))]
+    undone = [effective_decision(decisions, line) for line in reversed(_undone(decisions))]
     return History(*(tuple(f"{one.what} of {one.of}" for one in lines) for lines in (_standing(decisions), undone)))
 
 
@@ -167,7 +167,7 @@ def _undone(decisions: Decisions) -> list[Decision]:
     return [line for line in decisions.standing if line.undoes in numbers and line.number > max(numbers)]
 
 
-def decision_meant(decisions: Decisions, line: Decision) -> Decision:
+def effective_decision(decisions: Decisions, line: Decision) -> Decision:
     """Return the decision that a line undoes or redoes, however often it was undone and redone before."""
     by_number = {one.number: one for one in decisions.lines}
     while line.undoes is not None:

@@ -10,7 +10,7 @@ from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports, film_words, name_and_errors
 from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Parts
 from daq_app.analyst.session_words import picture_errors, sed_words
-from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history, reversal
+from daq_app.analyst.stroke import RawFile, decision_of, effective_decision, history, reversal
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.console import is_ours
 from daq_app.wording import tr
@@ -58,7 +58,7 @@ class Work:
         self._ways: dict[m.Key, tuple[TrialPrediction, Way | None]] = {}  # no way at finite strain
         self._sketches: dict[int, Sketch] = {}
         self._other: Report | None = None  # that is compared
-        self._filmed: m.FingerHistory | None = None  # the last history
+        self._history: m.FingerHistory | None = None  # the last history
         self._analyse()
 
     @property
@@ -131,8 +131,8 @@ class Work:
             raise NothingToShow(tr("There is nothing to redo.") if again else tr("There is no decision to undo."))
         record = append(self._recording, line)
         self._analyse()
-        act, number, meant = tr("Redone") if again else tr("Undone"), record.number, decision_meant(decisions, line)
-        words = tr("{act}, as decision {number}: {sentence}", act=act, number=number, sentence=meant.sentence)
+        act, sentence = tr("Redone") if again else tr("Undone"), effective_decision(decisions, line).sentence
+        words = tr("{act}, as decision {number}: {sentence}", act=act, number=record.number, sentence=sentence)
         self._say(m.Done(words))
 
     def _first(self) -> int | None:
@@ -198,7 +198,7 @@ class Work:
             stroke, _, step = of.partition(" ")
             answers = (finding_of(row) for (_, number), (row, _) in self._ways.items() if number == int(stroke))
             sentences = (sed_words(self._report, answer) for answer in answers if answer.sed is not None)
-            words = film_words(self._filmed, int(step)) if step else next(sentences, "")
+            words = film_words(self._history, int(step)) if step else next(sentences, "")
             return f"{words}. {tr(FIELD_ERRORS)}"
         if what == "compared":
             return "\n".join(name_and_errors(one) for one in (self._report, self._other) if one is not None)
@@ -209,7 +209,7 @@ class Work:
         stroke, _, step = of.partition(" ")
         if not step:
             return every.get(int(stroke))
-        film = self._filmed
+        film = self._history
         if film is None or film.key[1] != int(stroke):
             return None
         finding = self._report.strokes[int(stroke) - 1]
@@ -249,8 +249,8 @@ class Work:
             film, stop = lost_film(way, sketch, progress)
             why = prediction.reasons.get("sed", "")
             why = tr("{first} Followed from first touch: {why}", first=why, why=stop) if stop else why
-        self._filmed = m.FingerHistory(key, film, why)
-        self._say(self._filmed)
+        self._history = m.FingerHistory(key, film, why)
+        self._say(self._history)
 
     def _compare(self, folder: Path) -> None:
         self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))

@@ -124,10 +124,10 @@ def by_cluster(
         while queue or under_way:
             there: dict[str, int] = client.nthreads()
             threads = sum(there.values())
-            joined = [worker for worker in there if worker not in compatible]
-            if joined:  # before it is given anything to compute, also where it comes later
-                refuse_other_workers(client, joined, address)
-                compatible.update(joined)
+            newcomers = [worker for worker in there if worker not in compatible]
+            if newcomers:  # before it is given anything to compute, also where it comes later
+                refuse_other_workers(client, newcomers, address)
+                compatible.update(newcomers)
             last_worker_time = time.monotonic() if threads else last_worker_time
             if time.monotonic() - last_worker_time > WITHOUT_WORKERS:
                 raise SchedulerError(
@@ -183,8 +183,8 @@ def refuse_unlike(there: Mapping[str, Any], address: str, who: str) -> None:
 async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: ANN401 - distributed declares no types
     """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
     try:
-        secured = security.get_connection_args("client")
-        async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=secured) as there:
+        options = security.get_connection_args("client")
+        async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=options) as there:
             return str((await there.identity())["type"])
     except Exception as error:  # any program may listen there and answer anything
         why = " ".join(str(error).split()) or f"nothing within {_ANSWERS:.0f} s"
@@ -255,8 +255,8 @@ def visits(
 
     What is on the shelf is not computed again. Raises SchedulerError, RecordingError for a shelf that takes nothing.
     """
-    keys, failed = _keys(folders, shelf)
-    console.note(*(f"{name}: {why}" for name, why in failed))
+    keys, failures = _keys(folders, shelf)
+    console.note(*(f"{name}: {why}" for name, why in failures))
     by_folder = {folder: shelf.load(key) for folder, key in keys.items()}
     results = [visit for visit in by_folder.values() if visit is not None]
     rest = [folder for folder, visit in by_folder.items() if visit is None]
@@ -279,8 +279,8 @@ def visits(
     try:
         for count, (name, answer) in enumerate(answers, 1):
             if isinstance(answer, str | Lost):
-                failed.append((name, answer if isinstance(answer, str) else answer.why))
-                console.note(": ".join(failed[-1]))
+                failures.append((name, answer if isinstance(answer, str) else answer.why))
+                console.note(": ".join(failures[-1]))
             else:
                 if address is not None:
                     refuse_unlike(answer["made_by"], address, "a worker")
@@ -294,19 +294,19 @@ def visits(
             f"{len(results)} of {len(folders)} sessions are computed and kept; the next run goes on from there"
         )
         raise
-    return results, failed
+    return results, failures
 
 
 def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[tuple[str, str]]]:
     """Return the key of each session, and the name of and the reason for each that cannot be read."""
     keys: dict[Path, str] = {}
-    failed: list[tuple[str, str]] = []
+    failures: list[tuple[str, str]] = []
     for folder in folders:
         try:
             keys[folder] = shelf.key(folder)
         except RecordingError as error:
-            failed.append((folder.name, str(error)))
-    return keys, failed
+            failures.append((folder.name, str(error)))
+    return keys, failures
 
 
 def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A | Lost]]:
@@ -336,7 +336,7 @@ def _in_pool(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generat
     except BaseException:
         for process in multiprocessing.active_children():
             process.kill()  # they hold nothing that is not computed again
-        ending = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
-        ending.start()
-        ending.join(KILLED)
+        thread = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+        thread.start()
+        thread.join(KILLED)
         raise

@@ -121,17 +121,17 @@ def sensitivity(
     answer = sed or _sed_of
     scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
     responses = np.empty(len(points))
-    failed: list[str] = []
+    failures: list[str] = []
     for i, sample in enumerate(scenes):
         try:
             responses[i] = answer(sample)
         except SolveFailure as failure:
-            failed.append(" ".join(str(failure).split()))
+            failures.append(" ".join(str(failure).split()))
         progress((i + 1) / len(points))
-    if failed:
+    if failures:
         raise TooFewAnswers(
-            f"{len(failed)} of {len(points)} scenes of the design have no settled state; narrow its ranges (the first: "
-            f"{failed[0]})"
+            f"{len(failures)} of {len(points)} scenes of the design have no settled state; narrow its ranges "
+            f"(the first: {failures[0]})"
         )
     return sobol_indices(design, responses, seed, lambda name: _one_sided(scene, name, design[name])), responses
 

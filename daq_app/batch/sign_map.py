@@ -104,7 +104,7 @@ def map_trials(kinematics: Kinematics) -> Mapping[float, Trial]:
     return {radius: Trial(finger, arcs=PLACES) for radius, finger in fingers.items()}
 
 
-def drawn_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
+def sample_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
     """Return the fingers at points (n, numbers) of the design."""
     return [_finger(dict(zip(DESIGN, point, strict=True)), published_finger(kinematics)) for point in points.tolist()]
 
@@ -126,13 +126,13 @@ def _finger(sample: Mapping[str, float], base: Scene) -> Trial:
     fat = replace(other.materials.fat, nu=nu)
     half = base.receptor.ending[0] / 2.0
     within = half + depth * ((epidermis + dermis) * radius - 2.0 * half)
-    drawn_scene = replace(
+    scene = replace(
         other,
         finger=scaled,
         materials=replace(other.materials, fat=fat),
         receptor=Receptor(depth=within, ending=base.receptor.ending),
     )
-    return Trial(drawn_scene, Press(depth=press), (place,))
+    return Trial(scene, Press(depth=press), (place,))
 
 
 def _scale_stiffness(scene: Scene, factors: Mapping[str, float]) -> Scene:
@@ -202,7 +202,7 @@ def _load_answers(keep: Path | None) -> dict[str, Any]:
     return answers
 
 
-def kept_signs(answers: Sequence[Answer | str], as_published: Answer) -> Array:
+def same_signs(answers: Sequence[Answer | str], as_published: Answer) -> Array:
     """Return which quantities keep the published signs in both series (n, q): 1 or 0, nan without an answer."""
     mine = _signs(as_published)
     rows = [np.full(mine.shape, np.nan) if isinstance(answer, str) else _signs(answer) for answer in answers]

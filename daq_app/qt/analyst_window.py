@@ -288,8 +288,8 @@ class AnalystWindow(QMainWindow):
         window.setObjectName("window")
         window.setMinimumSize(*_LEAST)  # the columns find room in less than they would like
         acts = self.stop, self.go_on, self.report, self.format, self.export
-        head, doing = hbox((self.way, 1), self._head), hbox((self._words, 1), self.progress)
-        self._foot = hbox((doing, 1), hbox(1, *acts))
+        head, status = hbox((self.way, 1), self._head), hbox((self._words, 1), self.progress)
+        self._foot = hbox((status, 1), hbox(1, *acts))
         head.setAlignment(self._head, Qt.AlignmentFlag.AlignTop)
         vbox(head, (self._panes, 1), (self._pages, 1), self._foot, on=window, margins=GRID)
         return window
@@ -351,6 +351,6 @@ class TrialsColumn(QWidget):
         if row >= 0:
             self._ask(m.Choose(row))
 
-    def _point_clicked(self, _item: object, clicked: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
-        if len(clicked) and clicked[0].data() is not None:
-            self._ask(m.Choose(int(clicked[0].data())))
+    def _point_clicked(self, _item: object, spots: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
+        if len(spots) and spots[0].data() is not None:
+            self._ask(m.Choose(int(spots[0].data())))

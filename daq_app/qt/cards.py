@@ -163,12 +163,12 @@ class ScreenFields(QWidget):
 
     def offer_languages(self) -> None:
         """Offer the languages of the form's protocol, and choose the one that was wished for where it is among them."""
-        offered, _ = subject_texts(self._form())
-        if list(offered) != [self.language.itemData(at) for at in range(self.language.count())]:
+        codes, _ = subject_texts(self._form())
+        if list(codes) != [self.language.itemData(at) for at in range(self.language.count())]:
             if self.language.findData(self._wish) >= 0:
                 self._wish = self.language.currentData()
             self.language.clear()
-            for code in offered:
+            for code in codes:
                 self.language.addItem(name_of(code), code)
             self.language.setCurrentIndex(max(self.language.findData(self._wish), 0))
 

@@ -194,8 +194,8 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         line = self.sight.line or ((part.center().x(), part.center().y()),) * 2
         across, up = (END_STEP * step * part.width() for step in _ARROWS[key])
         x, y = line[0 if begins else 1]
-        moved = (x + across, y + up)
-        self.sight.set_line((moved, line[1]) if begins else (line[0], moved))
+        end = (x + across, y + up)
+        self.sight.set_line((end, line[1]) if begins else (line[0], end))
 
     def _probe(self) -> None:
         at = self._pointer

@@ -131,8 +131,8 @@ class LivePlot(PaintedWidget):
         low, high = self._reach()
         per_unit = inside.height() / (high - low)
         above, below = (self._scale.high - high) * per_unit, (self._scale.low - low) * per_unit
-        moved = max(line / 2.0 - inside.top() + above, inside.bottom() - below + line / 2.0 - self.height(), 0.0)
-        room = (inside.height() + above - below - 2.0 * moved) / line  # the numbers at the edges are moved inside
+        shift = max(line / 2.0 - inside.top() + above, inside.bottom() - below + line / 2.0 - self.height(), 0.0)
+        room = (inside.height() + above - below - 2.0 * shift) / line  # the numbers at the edges are moved inside
         for value in ticks(self._scale.low, self._scale.high, room):
             y = inside.bottom() - (value - low) * per_unit
             painter.setPen(fine(sheer(self.theme.line, 110)))

@@ -57,9 +57,9 @@ class TrialStrip(QScrollArea):
         if tiles == self._view:
             return
         while len(self.tiles) > len(tiles):
-            gone = self.tiles.pop()
-            gone.hide()  # until it is deleted nobody can press it
-            gone.deleteLater()
+            surplus = self.tiles.pop()
+            surplus.hide()  # until it is deleted nobody can press it
+            surplus.deleteLater()
         while len(self.tiles) < len(tiles):
             self._add()
         for tile_button, tile in zip(self.tiles, tiles, strict=True):

@@ -14,7 +14,7 @@ from daq_app.analyst.finger_words import (
     finger_words,
     name_and_errors,
     other_finger,
-    shown_film,
+    visible_film,
     was_tried,
 )
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
@@ -104,7 +104,7 @@ class ModelColumn(QWidget):
 
     def show_state(self, state: AnalystState) -> None:
         before, self._state = self._state, state
-        film = shown_film(state)
+        film = visible_film(state)
         if film is not self._film:
             self._film = film
             self._at = None if film is None else len(film.film.instants) - 1
@@ -248,8 +248,8 @@ class ModelColumn(QWidget):
             self._say(tr("Saved: {path}", path=path))
 
     def _ask_film(self) -> None:
-        proposed = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save the film"), proposed, "GIF (*.gif);;MP4 (*.mp4)")
+        file_name = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save the film"), file_name, "GIF (*.gif);;MP4 (*.mp4)")
         if path:
             self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 

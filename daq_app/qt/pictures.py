@@ -53,11 +53,11 @@ class SaveButtons(QWidget):
             widget.setEnabled(bool(name))
 
     def _ask(self, kind: str) -> None:
-        ending = f".{kind.lower()}"
-        proposed = self._name.replace(" ", "-") + ending
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save as {kind}", kind=kind), proposed)
+        suffix = f".{kind.lower()}"
+        file_name = self._name.replace(" ", "-") + suffix
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save as {kind}", kind=kind), file_name)
         if path:
-            self._save(self._name, path if path.lower().endswith(ending) else path + ending)
+            self._save(self._name, path if path.lower().endswith(suffix) else path + suffix)
 
 
 class PictureView(QWidget):
@@ -191,10 +191,10 @@ def write_film(canvas: FingerCanvas, head: str, show: Callable[[int], None], cou
         dialog.setValue(count)
         dialog.setCancelButton(None)
         with ThreadPoolExecutor(1) as pool:
-            writing = pool.submit(_write_film, path, frames)
-            while wait([writing], _LOOK).not_done:
+            future = pool.submit(_write_film, path, frames)
+            while wait([future], _LOOK).not_done:
                 QApplication.processEvents()
-        if error := writing.exception():
+        if error := future.exception():
             return tr("The film could not be written: {error}", error=error)
         return tr("Saved: {path}", path=path)
     finally:

@@ -29,8 +29,8 @@ DRAGGED = "dragged by hand"
 class StrokeColumn(QWidget):
     """All that is known of one stroke."""
 
-    def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], replayed: Callable[[], None]) -> None:
-        """Show no stroke; `ask` orders work, `replayed` is called when a replay has come to its end."""
+    def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], on_end: Callable[[], None]) -> None:
+        """Show no stroke; `ask` orders work, `on_end` is called when a replay has come to its end."""
         super().__init__()
         self._ask = ask
         self._stroke: StrokeFinding | None = None
@@ -42,7 +42,7 @@ class StrokeColumn(QWidget):
         self.stroke.moved.connect(self._drag)
         self.player = TransportBar(tr("the recorded readings"))
         self.player.moved.connect(self._move)
-        self.player.ended.connect(replayed)
+        self.player.ended.connect(on_end)
         self.decisions = DecisionsBar(ask)
         self.save = SaveButtons(tr("the stroke"), lambda name, path: ask(m.Write(f"picture {name}", path)))
         self._lines: tuple[tuple[str, str], ...] = ()

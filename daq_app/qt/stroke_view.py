@@ -115,13 +115,13 @@ class StrokeView(QWidget):
             for _ in self._plots
         ]
         pen = pg.mkPen(sheer(tokens.quiet, 110), width=1)
-        self._recorded = [pg.PlotCurveItem(pen=pen, connect="finite") for _ in range(2)]
+        self._raw_curves = [pg.PlotCurveItem(pen=pen, connect="finite") for _ in range(2)]
         self._curves = [
             pg.PlotCurveItem(pen=pg.mkPen(colour, width=2), connect="finite", name=name)
             for colour, name in ((N, "N"), (T, "T"), (MU, "µ"))
         ]
         self._plots[0].name_curves(self._curves[:2], (0.5, 0.0))
-        for item in (*self._recorded, *self._curves[:2], self._windows[0]):
+        for item in (*self._raw_curves, *self._curves[:2], self._windows[0]):
             self._plots[0].addItem(item)
         for item in (self._curves[2], self._windows[1]):
             self._plots[1].addItem(item)
@@ -207,7 +207,7 @@ class StrokeView(QWidget):
         for curve, column in zip(self._curves, self._columns, strict=True):
             curve.setData(self._time[:until], column[:until])
         stop = 0 if raw is None else len(raw.block) if at is None else at + 1
-        for curve, name in zip(self._recorded, ("normal", "tangential"), strict=True):
+        for curve, name in zip(self._raw_curves, ("normal", "tangential"), strict=True):
             data = () if raw is None else (raw.block.time[:stop] - self._origin, getattr(raw, name)[:stop])
             curve.setData(*(data or ([], [])))
         for line in self._now:

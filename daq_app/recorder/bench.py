@@ -159,10 +159,10 @@ class Bench:
         self._display.take(block)
         if self._tare is not None and self._tare.feed(block):
             tare, self._tare = self._tare, None
-            tared = tare.result(self.connected.transducer.info)
-            self._display.set_zero(tared.mean)
-            remember_zero(self.connected.transducer.info, tared.mean, tared.spread)
-            self._send(tared)
+            zero = tare.result(self.connected.transducer.info)
+            self._display.set_zero(zero.mean)
+            remember_zero(self.connected.transducer.info, zero.mean, zero.spread)
+            self._send(zero)
 
     def _start(self) -> None:
         assert self.connected is not None
@@ -227,9 +227,9 @@ class _Tare:
 
     def result(self, info: TransducerInfo) -> Tared:
         """Return the zero. Raises NotNow where something moved."""
-        gathered = ReadingBlock.concatenate(self._blocks)
+        block = ReadingBlock.concatenate(self._blocks)
         # Readings come in lumps; the stretch has the length that was asked for.
-        stretch = gathered.between(0, int(np.count_nonzero(gathered.time <= gathered.time[0] + self._duration)))
+        stretch = block.between(0, int(np.count_nonzero(block.time <= block.time[0] + self._duration)))
         wrench = info.calibration.wrench(stretch.raw, np.zeros(6))
         settings = DetectorSettings()
         forces: list[Any] = [wrench[:, axis].tolist() for axis in range(3)]

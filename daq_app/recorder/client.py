@@ -173,6 +173,6 @@ class Recorder:
         """Send requests; a pipe that is full holds up nobody else."""
         assert self._process.stdin is not None
         with suppress(OSError, ValueError), self._process.stdin as pipe:  # it is gone: the reader says so
-            while (packed := self._to_send.get()) is not None:
-                pipe.write(packed)
+            while (message := self._to_send.get()) is not None:
+                pipe.write(message)
                 pipe.flush()

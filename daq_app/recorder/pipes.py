@@ -23,7 +23,7 @@ class Inbox:
         """Read from this file descriptor."""
         self._reading = reading
         self._queue: deque[m.Request] = deque()
-        self._nudging = threading.Lock()
+        self._nudge_lock = threading.Lock()
         self.client_gone = threading.Event()
         self.stop_wanted = threading.Event()
         self.leaving = threading.Event()  # a shutdown was asked for, or nobody is left to ask
@@ -35,7 +35,7 @@ class Inbox:
 
     def answer_stop(self) -> None:
         """End the nudging: what comes next is not to be broken off."""
-        with self._nudging:
+        with self._nudge_lock:
             self.stop_wanted.clear()
 
     def _read(self) -> None:
@@ -54,7 +54,7 @@ class Inbox:
     def _nudge(self) -> None:
         """Break off what the main thread waits for, again and again until it has noticed."""
         while True:
-            with self._nudging:
+            with self._nudge_lock:
                 if not self.stop_wanted.is_set():
                     return
                 press_ctrl_c()

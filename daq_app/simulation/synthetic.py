@@ -262,7 +262,7 @@ class SyntheticPeople(SimulatedPeople):
             case steps.AskMount(trial) if trial.number == self._faults.aborted:
                 self.put(steps.Abort("the subject had to leave"))
             case steps.AskScore(trial) if trial.number == self._faults.unanswered:
-                self.put(steps.Scored(None, (), None, 0, None, INPUT), self.judging)
+                self.put(steps.Scored(None, (), None, 0, None, INPUT), self.judgement_s)
             case _:
                 super().show(command)
 

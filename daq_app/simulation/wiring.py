@@ -65,8 +65,8 @@ def connect(uri: str, clock: Clock) -> Generator[Connection]:
     """
     if uri.startswith(REPLAY):
         recording = Recording.open(Path(uri.removeprefix(REPLAY)))
-        with closing(ReplayTransducer(recording, clock, uri)) as replayed:
-            yield Connection(replayed, recorded_frame=recording.plan.frame)
+        with closing(ReplayTransducer(recording, clock, uri)) as transducer:
+            yield Connection(transducer, recorded_frame=recording.plan.frame)
         return
     address = parse_address(uri)
     if address.scheme != _SIMULATED:
@@ -163,7 +163,7 @@ class SimulatedPeople(SimulatedHand):
         """Let the subject answer on the session's clock; for the rest see `SimulatedHand`."""
         super().__init__(subject, bench, surface)
         self.clock = clock
-        self.judging = JUDGING if bench else 0.0  # from lift to judgement [s]
+        self.judgement_s = JUDGING if bench else 0.0  # from lift to judgement [s]
         self._due: list[tuple[int, steps.Event]] = []  # session clock [ns]
 
     def put(self, event: steps.Event, after: float = 0.0) -> None:
@@ -188,7 +188,7 @@ class SimulatedPeople(SimulatedHand):
             case steps.AskStroke(trial) if self.connected is None:
                 self.put(steps.StrokeDone())
             case steps.AskScore() | steps.AskNumber() | steps.AskChoice():
-                self.put(self._judgement(command), after=self.judging)
+                self.put(self._judgement(command), after=self.judgement_s)
             case steps.AskRest(None):
                 self.put(steps.Resume())
             case steps.AskFinish():
@@ -202,7 +202,7 @@ class SimulatedPeople(SimulatedHand):
 
     def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
         """Return what the subject answers."""
-        at = self.clock.now_ns() * 1e-9 + self.judging
+        at = self.clock.now_ns() * 1e-9 + self.judgement_s
         match command:
             case steps.AskScore(trial):
                 score = self.score(trial)

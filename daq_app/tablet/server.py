@@ -61,17 +61,17 @@ class TabletServer:
         self._on_change = on_change
         self._lock = threading.Lock()
         self._door = threading.Lock()  # one guess at a time, however many ask at once
-        self._admitted: ServerConnection | None = None  # of the tablet that was let in
+        self._tablet: ServerConnection | None = None  # of the tablet that was let in
         self._token = ""
         self._wrong = 0
         self._last: dict[type, str] = {}  # what a tablet that comes back has to know
         self.code = _new_code()
-        listening = _listening(address, port)
-        self.url = "http://{}:{}".format(*listening.getsockname()[:2])
+        listener = _listen(address, port)
+        self.url = "http://{}:{}".format(*listener.getsockname()[:2])
         self._page = _PAGE.read_text(encoding="utf-8")
         self._server = serve(
             self._talk,
-            sock=listening,
+            sock=listener,
             process_request=self._answer,
             origins=[self.url],  # pyright: ignore[reportArgumentType]  a text, of a type of its own
             max_size=LARGEST,
@@ -85,7 +85,7 @@ class TabletServer:
     @property
     def connected(self) -> bool:
         """Say whether the tablet is there."""
-        return self._admitted is not None
+        return self._tablet is not None
 
     @property
     def link(self) -> str:
@@ -97,16 +97,16 @@ class TabletServer:
         text = encode(message)
         with self._lock:  # so that a tablet that comes now does not hear of it too early
             self._last[type(message)] = text
-            if self._admitted is not None:
-                _tell(self._admitted, text)
+            if self._tablet is not None:
+                _tell(self._tablet, text)
 
     def renew(self) -> None:
         """Let go of the tablet, and let in whoever says the new code."""
         with self._lock:
-            admitted, self._admitted, self._token = self._admitted, None, ""
+            tablet, self._tablet, self._token = self._tablet, None, ""
             self.code, self._wrong = _new_code(), 0
-        if admitted is not None:
-            admitted.close()
+        if tablet is not None:
+            tablet.close()
         self._on_change()
 
     def close(self) -> None:
@@ -140,9 +140,9 @@ class TabletServer:
                     self._on_message(decode(connection.recv()), time.monotonic())
             finally:
                 with self._lock:
-                    if gone := self._admitted is connection:
-                        self._admitted = None
-                if gone:
+                    if current := self._tablet is connection:
+                        self._tablet = None
+                if current:
                     self._on_change()
 
     def _let_in(self, connection: "ServerConnection", hello: Hello) -> bool:
@@ -162,7 +162,7 @@ class TabletServer:
             right = self.code if by_code else self._token
             if by_code == bool(self._token) or not secrets.compare_digest(secret.encode(), right.encode()):
                 return False
-            before, self._admitted = self._admitted, connection
+            before, self._tablet = self._tablet, connection
             self._token = self._token or secrets.token_urlsafe()
             for text in (encode(Welcome(self._token)), *self._last.values()):
                 _tell(connection, text)
@@ -197,7 +197,7 @@ def own_address() -> str:
             return "127.0.0.1"
 
 
-def _listening(address: str, port: int) -> socket.socket:
+def _listen(address: str, port: int) -> socket.socket:
     """Return a socket that listens at an address, at a free port where the one asked for is taken."""
     try:
         private = ipaddress.IPv4Address(address).is_private and address != "0.0.0.0"

@@ -71,8 +71,8 @@ def codes_in(folder: Path) -> tuple[str, ...]:
         names = sorted(place.parent.name for place in folder.glob("*/session.*") if place.stem == "session")
     except OSError:
         return ()
-    matched = (re.fullmatch(r"(.+)_[^_]+_\d{8}T\d{6}", name) for name in dict.fromkeys(names))
-    return tuple(match[1] for match in matched if match is not None)
+    matches = (re.fullmatch(r"(.+)_[^_]+_\d{8}T\d{6}", name) for name in dict.fromkeys(names))
+    return tuple(match[1] for match in matches if match is not None)
 
 
 def next_code(codes: tuple[str, ...]) -> str:
@@ -81,10 +81,10 @@ def next_code(codes: tuple[str, ...]) -> str:
     >>> next_code(("P01", "P09", "pilot")), next_code(())
     ('P10', 'P01')
     """
-    numbered = [match.groups() for code in codes if (match := re.fullmatch(r"(.*?)(\d{1,9})", code))]
-    if not numbered:
+    pairs = [match.groups() for code in codes if (match := re.fullmatch(r"(.*?)(\d{1,9})", code))]
+    if not pairs:
         return "P01"
-    before, digits = max(numbered, key=lambda parts: int(parts[1]))
+    before, digits = max(pairs, key=lambda parts: int(parts[1]))
     return f"{before}{int(digits) + 1:0{len(digits)}d}"
 
 

@@ -81,7 +81,7 @@ class TrialState:
     takes: int = 0
     answer: str | None = None  # in words; None: none was asked for yet
     quality: Quality | None = None
-    discarded: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
+    discard_reason: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
     has_stimulus: bool = True  # False: answers to come choose its stimulus
 
     @property
@@ -227,8 +227,8 @@ def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
     elif session.phase == "closing":
         trial = session.trials[-1]
     else:  # before the first take of a trial it is the one before
-        mounted = session.of(session.trial) if session.phase == "mounting" else None
-        trial = session.of(mounted.trial.number - 1) if mounted is not None and not mounted.takes else None
+        current = session.of(session.trial) if session.phase == "mounting" else None
+        trial = session.of(current.trial.number - 1) if current is not None and not current.takes else None
     if trial is None:
         return ()
     first = session.of(trial.trial.compared_with)
@@ -324,7 +324,7 @@ def _discard(session: SessionState, number: int | None, reason: str) -> SessionS
     of = session.of(number)
     earlier = () if of is None else (*of.earlier, replace(of, earlier=()))
     outcome = "skipped" if reason.startswith("skipped: ") else "coming"
-    return session.with_trial(number, outcome=outcome, answer=None, discarded=reason, earlier=earlier)
+    return session.with_trial(number, outcome=outcome, answer=None, discard_reason=reason, earlier=earlier)
 
 
 def _restore(session: SessionState, number: int | None, take: int) -> SessionState:
@@ -333,7 +333,7 @@ def _restore(session: SessionState, number: int | None, take: int) -> SessionSta
     was = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
     if was is None:
         return session
-    values = {name: getattr(was, name) for name in ("takes", "answer", "quality", "discarded")}
+    values = {name: getattr(was, name) for name in ("takes", "answer", "quality", "discard_reason")}
     return session.with_trial(number, outcome="coming", **values)
 
 

@@ -152,9 +152,9 @@ class _Tail:
         old_start = np.searchsorted(times, time - LAG - SMOOTH)
         now, known_now = _mean(total, bad, recent, ends)
         then, known_then = _mean(total, bad, old_start, old_end)
-        moved = now - then
+        step = now - then
         with np.errstate(divide="ignore", invalid="ignore"):
-            speed = np.hypot(moved[:, 0], moved[:, 1]) / moved[:, 2]
+            speed = np.hypot(step[:, 0], step[:, 1]) / step[:, 2]
         keep = times > (time[-1] - LAG - 2 * SMOOTH)
         return _Tail(times[keep], places[keep]), np.where(known_now & known_then, speed, np.nan)
 

@@ -131,7 +131,7 @@ class Follower:
             self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
-    def settling(self, request: Settle) -> Callable[[], SettledSolve]:
+    def settled_solver(self, request: Settle) -> Callable[[], SettledSolve]:
         """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
         first, last = request.steady
         values = np.array([sed for time, sed in self._seds if first <= time <= last])

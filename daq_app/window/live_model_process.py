@@ -36,14 +36,14 @@ def run(connection: Connection) -> None:
     from solver.mesh import MeshError
 
     follower: Follower | None = None
-    speaking = threading.Lock()
+    lock = threading.Lock()
 
     def say(message: Ready | Provisional | SettledSolve) -> None:
-        with speaking, suppress(OSError):  # a window that is gone is noticed below
+        with lock, suppress(OSError):  # a window that is gone is noticed below
             connection.send(message)
 
-    def solve(solving: Callable[[], SettledSolve]) -> None:
-        say(solving())
+    def solve(solver: Callable[[], SettledSolve]) -> None:
+        say(solver())
 
     with suppress(EOFError, OSError):
         while True:
@@ -60,7 +60,7 @@ def run(connection: Connection) -> None:
                     say(follower.take(forces))
                 case Settle() as request:
                     if follower is not None:  # beside the next stroke, which is followed meanwhile
-                        threading.Thread(target=solve, args=(follower.settling(request),), daemon=True).start()
+                        threading.Thread(target=solve, args=(follower.settled_solver(request),), daemon=True).start()
                 case _:
                     say(Ready(tr("no finger to follow")))
 
@@ -77,7 +77,7 @@ class LiveModel:
         self._under_way = 0
         self._unsent: list[Forces] = []
         self._requests: list[Use | Forces | Settle] = []
-        self._settling: tuple[float, float] | None = None  # steady window of the last stroke, until another touch
+        self._steady: tuple[float, float] | None = None  # steady window of the last stroke, until another touch
         self._plan: SessionPlan | None = None
         self.kinematics: Kinematics = "small"  # that is asked for
 
@@ -96,7 +96,7 @@ class LiveModel:
 
     def follow(self, plan: SessionPlan | None) -> None:
         """Follow the finger of another plan."""
-        self._plan, self.settled, self._settling = plan, None, None
+        self._plan, self.settled, self._steady = plan, None, None
         if self._child is None and self.problem:
             self.prepare()  # one that has ended gets another chance with the next session
         else:
@@ -150,9 +150,9 @@ class LiveModel:
                 self.provisional = message
                 self.predictions += 1
                 if message.sed.any():  # its forces came after the stroke: something touches again
-                    self.settled = self._settling = None
+                    self.settled = self._steady = None
             case SettledSolve():
-                if message.steady == self._settling:  # a slow one may be of a stroke before
+                if message.steady == self._steady:  # a slow one may be of a stroke before
                     self.settled = message
 
     def _send(self, child: Child) -> None:
@@ -162,7 +162,7 @@ class LiveModel:
                 return
             child.send(request)
             if isinstance(request, Settle):
-                self.settled, self._settling = None, request.steady
+                self.settled, self._steady = None, request.steady
                 return
         elif self._unsent and not self.problem:
             child.send(join_forces(self._unsent))

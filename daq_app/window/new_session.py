@@ -203,10 +203,10 @@ def enrolment(form: SessionForm) -> Enrolment | None:
         member = study.member(subject)
     except StudyError as error:
         return Enrolment(name, _sentence(error))
-    blinded = "" if study.key_sha256 is None or study.unblinded else tr("; blinded: codes alone are shown")
+    remark = "" if study.key_sha256 is None or study.unblinded else tr("; blinded: codes alone are shown")
     words = tr(
         "{subject} is enrolled: protocol {name}, row {row}{blinded}.",
-        subject=subject, name=name, row=study.row(member.slot), blinded=blinded,
+        subject=subject, name=name, row=study.row(member.slot), blinded=remark,
     )  # fmt: skip
     return Enrolment(name, words, enrolled=True)
 
@@ -227,11 +227,11 @@ def place_of(form: SessionForm) -> Path:
 
 def folder_of(form: SessionForm) -> Path:
     """Return the folder that a form names; as it was typed where it begins with the home of nobody."""
-    typed = Path(form.folder.strip() or ".")
+    folder = Path(form.folder.strip() or ".")
     try:
-        return typed.expanduser()
+        return folder.expanduser()
     except RuntimeError:
-        return typed
+        return folder
 
 
 def _choose_protocol(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
@@ -285,14 +285,14 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
     return tuple(unfinished)
 
 
-def _local_time(recorded: object) -> str:
+def _local_time(stamp: object) -> str:
     """Return day and time of this computer's zone; a dash where nothing readable is recorded.
 
     >>> _local_time("2026-11-26T19:51:33"), _local_time(None)
     ('2026-11-26 19:51', '–')
     """
     try:
-        return datetime.fromisoformat(str(recorded)).astimezone().strftime("%Y-%m-%d %H:%M")
+        return datetime.fromisoformat(str(stamp)).astimezone().strftime("%Y-%m-%d %H:%M")
     except ValueError:
         return "–"
 
@@ -331,12 +331,12 @@ def _refusals(form: SessionForm, bench: Bench) -> Refusal:
 def _why_unusable(place: Path) -> str:
     """Return why no session can be kept below a folder, "" where it can."""
     try:
-        existing = next((p for p in (place, *place.parents) if p.exists()), place)
-        if not existing.is_dir():
-            return tr("{place} is a file: choose a folder.", place=existing)
+        nearest = next((p for p in (place, *place.parents) if p.exists()), place)
+        if not nearest.is_dir():
+            return tr("{place} is a file: choose a folder.", place=nearest)
     except OSError as error:
         return _sentence(error)
-    if str(place).startswith("~") or not os.access(existing, os.W_OK):
+    if str(place).startswith("~") or not os.access(nearest, os.W_OK):
         return tr("Nothing can be written in {place}: choose another folder.", place=place)
     return ""
 

@@ -59,9 +59,9 @@ def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo,
     analysis = analyse_blocks([(trial, block)], TrialContext(plan, info, AnalysisSettings()))
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
-    mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in _FLAWS]
-    short = {flaw.name: _FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), "")) for flaw in mentioned}
-    remarks = [Remark(flaw.grade, short[flaw.name][0], flaw.sentence, short[flaw.name][1]) for flaw in mentioned]
+    notable = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in _FLAWS]
+    short = {flaw.name: _FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), "")) for flaw in notable}
+    remarks = [Remark(flaw.grade, short[flaw.name][0], flaw.sentence, short[flaw.name][1]) for flaw in notable]
     if stroke is None:
         worst, *milder = remarks or [Remark("refused", _FLAWS[FlawName.NO_STROKE][0], "", "")]
         advice = worst.advice or _FLAWS[FlawName.NO_STROKE][1]

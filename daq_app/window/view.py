@@ -35,7 +35,7 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
     >>> dict(life_rows(None, life))["moved"], dict(life_rows(None, life))["overloads"]
     ('41 mN, 1.3 N mm since the first', '2, the last on 2026-10-01')
     """
-    zeros, moved, noise, overloads = "–", "–", "–", "–" if life is None else tr("none")
+    zeros, drift, noise, overloads = "–", "–", "–", "–" if life is None else tr("none")
     if info is not None and info.simulated:
         zeros = tr("not kept while simulated")
     if life is not None and life.overloads:
@@ -43,8 +43,8 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
     if life is not None and life.zeros:
         zeros = tr("{count} since {since}", count=life.zeros, since=life.since)
         noise = tr("{noise} usually", noise=greatest(life.noise))
-        moved = "–" if life.zeros == 1 else tr("{drift} since the first", drift=greatest(life.drift))
-    return tuple(zip(HEALTH_NAMES, (zeros, moved, noise, overloads), strict=True))
+        drift = "–" if life.zeros == 1 else tr("{drift} since the first", drift=greatest(life.drift))
+    return tuple(zip(HEALTH_NAMES, (zeros, drift, noise, overloads), strict=True))
 
 
 def greatest(six: tuple[float, ...]) -> str:
@@ -224,8 +224,8 @@ def _drift(bench: BenchState) -> str:
         return "–"
     if bench.zero is bench.first_zero:
         return tr("first zero")
-    moved = max(abs(a - b) for a, b in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
-    return tr("{moved} since the first", moved=quantity(1000 * moved, 0, "mN"))
+    drift = max(abs(a - b) for a, b in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
+    return tr("{moved} since the first", moved=quantity(1000 * drift, 0, "mN"))
 
 
 def _devices(bench: BenchState) -> tuple[tuple[str, str], ...]:

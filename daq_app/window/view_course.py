@@ -114,12 +114,12 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
     (headline, primary), over = _to_do(session, bench), session.over
     again = redo_targets(session)
     stroke, trial = _stroke(session, again), session.of(session.trial)
-    waited = max(int(now - session.since), 0)
+    wait_s = max(int(now - session.since), 0)
     return CourseView(
         headline=headline,
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
-        timer="" if over else f"{waited // 60}:{waited % 60:02d}",
+        timer="" if over else f"{wait_s // 60}:{wait_s % 60:02d}",
         notice=tr("It is kept in {folder}", folder=session.folder) if over else session.notice or _undo_words(session),
         rows=_rows(session),
         tiles=tiles(session),
@@ -197,7 +197,7 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
             finish = Button(tr("End session"), "Space", sends=steps.Finish())
             return tr("Every trial is done. Press Space to end the session."), finish
         case "ended":
-            return _ending(session)
+            return _to_do_at_end(session)
         case _:
             trial = session.of(session.trial)
             return ("", None) if trial is None else _to_do_in(trial.trial, session)
@@ -258,7 +258,7 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     return sentence if session.plan.forces else tr("{sentence} Then press Space.", sentence=sentence)
 
 
-def _ending(session: SessionState) -> tuple[str, Button | None]:
+def _to_do_at_end(session: SessionState) -> tuple[str, Button | None]:
     if not session.over:
         return tr("The session is being ended."), None
     if session.resumable:
@@ -292,8 +292,8 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
     quality = trial.quality
     mu = _mu(quality.stroke) if quality is not None and "forces" in visible else ""
     answer = trial.answer if "answer" in visible else ""
-    flawed = "!" if quality is not None and quality.words else ""
-    return PlanRow("done", "✓", name, "   ".join(filter(None, (mu, answer, flawed))))
+    mark = "!" if quality is not None and quality.words else ""
+    return PlanRow("done", "✓", name, "   ".join(filter(None, (mu, answer, mark))))
 
 
 def _mu(stroke: Stroke | None) -> str:
@@ -339,7 +339,8 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     visible = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in visible:
         heading = f"{heading}, {trial.answer}"
-    details = tr("Its take before was discarded: {why}.", why=trial.discarded.rstrip(".")) if trial.discarded else ""
+    reason = trial.discard_reason.rstrip(".")
+    details = tr("Its take before was discarded: {why}.", why=reason) if reason else ""
     quality = trial.quality
     if "forces" not in visible:
         return Inspection(number, heading, tr(NO_FORCES), details)

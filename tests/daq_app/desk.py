@@ -21,7 +21,7 @@ class Desk:
         self.recorder = recorder
         self.instead = instead or {}
         self.reports = []
-        self.waiting = []
+        self.queue = []
 
     def begin(self, folder, people="simulated hand"):
         """Open the simulated bench and begin the short session in `folder`."""
@@ -32,9 +32,9 @@ class Desk:
         """Go on until so many more reports of a kind came, and return the last."""
         deadline = time.monotonic() + DEADLINE
         while time.monotonic() < deadline:
-            self.waiting += self.recorder.poll(0.0 if self.waiting else 0.05)
-            while self.waiting:
-                report = self.waiting.pop(0)
+            self.queue += self.recorder.poll(0.0 if self.queue else 0.05)
+            while self.queue:
+                report = self.queue.pop(0)
                 self.reports.append(report)
                 self.answer(report)
                 number -= isinstance(report, kind)

@@ -78,9 +78,9 @@ def test_a_line_says_what_the_subject_answered_to_its_trial(state, answer, words
 def test_the_answers_shown_are_those_that_the_session_recorded():
     recording = Recording.open(SESSION)
     scores = {event.trial: event.data["score"] for event in recording.events if event.kind == "scored"}
-    shown = findings(recording, analyse(recording)).answers
-    assert shown
-    assert {one.trial: one.answer for one in shown} == {trial: it for trial, it in scores.items() if it is not None}
+    answers = findings(recording, analyse(recording)).answers
+    assert answers
+    assert {one.trial: one.answer for one in answers} == {trial: it for trial, it in scores.items() if it is not None}
 
 
 def test_a_session_of_scores_alone_has_a_line_for_each_answer():
@@ -88,10 +88,10 @@ def test_a_session_of_scores_alone_has_a_line_for_each_answer():
     report = replace(example(), strokes=(), predictions=(), answers=tuple(answers))
     opened = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
     assert [words_of(row) for row in rows(opened)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
-    chosen = fold(opened, m.Choose(1))
-    assert selected_row(chosen).trial == 2
-    assert numbers(chosen) == ()
-    assert [link.place for link in lineage(chosen)] == ["session", "trial"]
+    second = fold(opened, m.Choose(1))
+    assert selected_row(second).trial == 2
+    assert numbers(second) == ()
+    assert [link.place for link in lineage(second)] == ["session", "trial"]
 
 
 def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state):
@@ -189,8 +189,8 @@ def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady)
 
 
 def test_edges_stand_in_order_of_time_and_say_who_moved_them(steady):
-    decided = replace(steady, decided={"steady": "decision 1 by E02"})
-    edges = edges_of(decided)
+    moved_stroke = replace(steady, decided={"steady": "decision 1 by E02"})
+    edges = edges_of(moved_stroke)
     assert [edge.edge for edge in edges] == list(EDGES)
     assert [edge.time for edge in edges] == sorted(edge.time for edge in edges)
     assert [bool(edge.decision) for edge in edges] == [False, True, True, False]
@@ -276,8 +276,8 @@ def test_two_sessions_are_held_against_each_other_stimulus_by_stimulus(state):
 def test_a_stimulus_that_one_session_lacks_has_no_number_of_it(state):
     report = state.report
     shorter = replace(report, predictions=report.predictions[1:])
-    missing = report.predictions[0]
-    first, second = dict(compare_reports(report, shorter))[f"{missing.experiment} {missing.index}"][0]
+    first_prediction = report.predictions[0]
+    first, second = dict(compare_reports(report, shorter))[f"{first_prediction.experiment} {first_prediction.index}"][0]
     assert first is not None
     assert second is None
 

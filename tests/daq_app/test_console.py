@@ -100,11 +100,11 @@ def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back
     for doing, part in [("solving on a mesh", 0.0), ("following", 0.5), ("following", 1.0), ("following", 0.2)]:
         with listening(work.hear):
             report_progress(doing, part)
-        states.append((work.doing, work.part))
+        states.append((work.task, work.part))
     work.hear("estimating", 0.5)
     work.reach(1.0)
     assert states == [("solving on a mesh", 0.0), ("following", 0.25), ("following", 0.5), ("following", 0.5)]
-    assert (work.doing, work.part) == ("estimating", 0.99)
+    assert (work.task, work.part) == ("estimating", 0.99)
 
 
 class _Terminal(io.StringIO):
@@ -121,9 +121,9 @@ def _lines_at_terminal(monkeypatch, calls, columns=80):
     monkeypatch.setattr("daq_app.console.time.monotonic", lambda: now[0])
     monkeypatch.setattr("daq_app.console.os.get_terminal_size", lambda _: os.terminal_size((columns, 24)))
     monkeypatch.setattr(err, "fileno", lambda: 2)
-    for instant, done, known in calls:
+    for instant, part, end_known in calls:
         now[0] = instant
-        speaker.progress(done, "solving", end_known=known)
+        speaker.progress(part, "solving", end_known=end_known)
     speaker.note("over")
     assert err.getvalue().endswith("\nover\n")
     return err.getvalue().removesuffix("\nover\n").split("\r\x1b[K")[1:]
@@ -162,9 +162,9 @@ def test_progress_elsewhere_is_a_plain_line_now_and_then(monkeypatch):
     speaker, _, err = console(as_json=False)
     now = [10.0]
     monkeypatch.setattr("daq_app.console.time.monotonic", lambda: now[0])
-    for instant, done in ((10.0, 0.25), (11.0, 0.3), (12.5, 0.5)):
+    for instant, part in ((10.0, 0.25), (11.0, 0.3), (12.5, 0.5)):
         now[0] = instant
-        speaker.progress(done, "solving")
+        speaker.progress(part, "solving")
     assert err.getvalue() == " 25 %  solving\n 50 %  solving\n"
 
 

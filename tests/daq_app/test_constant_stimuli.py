@@ -47,15 +47,15 @@ def recording(tmp_path_factory):
 
 
 def test_the_intervals_of_a_session_hold_the_subject_s_true_values(recording):
-    judged = experiments(recording.plan, [], stroked_visit(recording))
+    outcomes = experiments(recording.plan, [], stroked_visit(recording))
     truth = SubjectSettings()
-    for outcome in judged:
+    for outcome in outcomes:
         function = outcome.psychometric
         assert function.answers == 40
         assert function.pse.low < 0.0 < function.pse.high
         assert function.jnd.low < QUARTILE * truth.discrimination < (function.jnd.high or 9.0)
         assert function.lapse.low <= truth.lapse <= function.lapse.high
-    report = SimpleNamespace(experiments=judged)
+    report = SimpleNamespace(experiments=outcomes)
     table = psychometric_table(session_functions(report))
     assert [group.name for group in table.groups] == ["friction, pushed", "friction, pulled"]
     assert table.groups[0].rows[0][1].text == "40"

@@ -141,10 +141,10 @@ def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_kee
     report_dir, tmp_path, capsys
 ):
     session = shutil.copytree(report_dir, tmp_path / "P01")
-    stored = {name: json.loads((session / f"{name}.json").read_text()) for name in ("analysis", "prediction")}
-    assert stored["analysis"]["settings"]["area"]["law"] == stored["prediction"]["area"]["law"] == "hertz"
-    assert stored["analysis"]["bootstrap"]["settings"]["gain_error"] == 0.003
-    assert [row["indentation"] for row in stored["prediction"]["trials"]] == [1.2, 1.2]
+    documents = {name: json.loads((session / f"{name}.json").read_text()) for name in ("analysis", "prediction")}
+    assert documents["analysis"]["settings"]["area"]["law"] == documents["prediction"]["area"]["law"] == "hertz"
+    assert documents["analysis"]["bootstrap"]["settings"]["gain_error"] == 0.003
+    assert [row["indentation"] for row in documents["prediction"]["trials"]] == [1.2, 1.2]
     page = session / "report.html"
     text = page.read_text()
     assert "SIMULATED" in text
@@ -224,10 +224,10 @@ def test_the_options_of_a_prediction_of_an_older_program_are_read_by_their_prese
         assert (part["beside"], part["beside_intervals"]) == (part.pop("variants"), part.pop("variant_intervals"))
     present = stored_document(folder, "prediction.json")
     (folder / "prediction.json").write_text(json.dumps({**now, **older}))
-    stored = stored_document(folder, "prediction.json")
-    assert {name: stored[name] for name in older} == {name: present[name] for name in older}
-    assert "variants" in stored["options"]
-    assert "beside" not in stored["options"]
+    document = stored_document(folder, "prediction.json")
+    assert {name: document[name] for name in older} == {name: present[name] for name in older}
+    assert "variants" in document["options"]
+    assert "beside" not in document["options"]
 
 
 def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, capsys, tmp_path):
@@ -356,8 +356,8 @@ def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_
     with monkeypatch.context() as full_disk:
         full_disk.setattr("daq_app.batch.derived.store_derived", Mock(side_effect=RecordingError("the disk is full")))
         run(["predict", str(small), "--beside", "none"])
-    said = capsys.readouterr().err
-    assert ("not kept: the disk is full" in said, "intervals" in said) == (True, False)  # the file still holds them
+    errors = capsys.readouterr().err
+    assert ("not kept: the disk is full" in errors, "intervals" in errors) == (True, False)  # the file still holds them
     run(["predict", str(small), "--beside", "none"])
     assert "intervals of the SED (--intervals)" in capsys.readouterr().err
     document = json.loads((small / "prediction.json").read_text())["afferent"]

@@ -159,9 +159,9 @@ def pooled_study():
 def test_a_ground_truth_is_refused_as_a_whole_or_held_against_the_estimates(pooled_study, data):
     truth = spoil(data, TRUTH)
     try:
-        checked = check_ground_truth(truth)
+        valid = check_ground_truth(truth)
     except ValueError:
         return
-    effect_recoveries(pooled_study.descriptors, checked)
-    friction_recovery(pooled_study.visits, checked["strokes"])
-    assert len(flaw_detections(pooled_study.visits, {}, checked.get("spoilt", {}))) == len(checked.get("spoilt", {}))
+    effect_recoveries(pooled_study.descriptors, valid)
+    friction_recovery(pooled_study.visits, valid["strokes"])
+    assert len(flaw_detections(pooled_study.visits, {}, valid.get("spoilt", {}))) == len(valid.get("spoilt", {}))

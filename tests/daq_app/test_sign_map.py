@@ -18,7 +18,7 @@ def answer(sticky, slippery):
 
 
 def test_signs_are_kept_where_both_series_have_the_published_one_and_unknown_without_an_answer():
-    signs = sign_map.kept_signs(
+    signs = sign_map.same_signs(
         [answer(0.1, -0.2), answer(0.1, 0.2), answer(None, -0.2), "no mesh fits"], answer(0.9, -0.9)
     )
     assert signs[:2, 0].tolist() == [1.0, 0.0]
@@ -50,7 +50,7 @@ def test_a_block_with_a_finger_without_an_answer_is_left_out_whole():
 def test_every_corner_of_the_design_is_a_finger_that_can_be():
     low, high = np.array(list(sign_map.DESIGN.values())).T
     bits = np.random.default_rng(0).integers(0, 2, (500, len(low)))
-    sign_map.drawn_fingers(np.where(bits, high, low), "small")
+    sign_map.sample_fingers(np.where(bits, high, low), "small")
     sign_map.single_changes("finite")
     sign_map.map_trials("small")
 

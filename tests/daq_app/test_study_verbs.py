@@ -131,7 +131,7 @@ def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "named"),
+    ("words", "code", "excerpt"),
     [
         (["run", "--scores-only", "--subject", "P01"], 2, "give a PROTOCOL, or --study"),
         (
@@ -147,8 +147,8 @@ def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
         (["study", "--depths", "1.5"], 2, "give --power too"),
     ],
 )
-def test_what_is_wrong_with_a_command_about_studies_is_said_in_a_sentence(words, code, named, capsys):
+def test_what_is_wrong_with_a_command_about_studies_is_said_in_a_sentence(words, code, excerpt, capsys):
     assert run(words) == code
     message = capsys.readouterr().err
-    assert named in message
+    assert excerpt in message
     assert message.count("\n") == 1

@@ -106,11 +106,11 @@ def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
         raise AssertionError("a session was computed again")
 
     monkeypatch.setattr(pooling, "_in_pool", never)
-    pooled, failed = visits(
+    results, failures = visits(
         [study / "S01", study / "S02"], STEADY, Shelf(study / "pooled" / "results", STEADY), Console(as_json=True)
     )
-    assert not failed
-    assert {visit.session for visit in pooled} == {visit["session"] for visit in pool["visits"]}
+    assert not failures
+    assert {visit.session for visit in results} == {visit["session"] for visit in pool["visits"]}
 
 
 @pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"a": 1}', "digit"])
@@ -123,8 +123,8 @@ def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(p
     shelf.file(key).write_bytes(whole.replace(b'"mu": 0.', b'"mu": 9.', 1) if damage == "digit" else damage)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pooling, "_in_pool", lambda *_: iter([("S01", visit)]))
-        pooled, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
-    assert pooled[0].rows[0].mu == visit["rows"][0]["mu"]
+        results, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
+    assert results[0].rows[0].mu == visit["rows"][0]["mu"]
     assert f"{key}.json is damaged; the session is computed anew" in capsys.readouterr().err
     assert shelf.file(key).read_bytes() == whole
 
@@ -164,9 +164,9 @@ def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeyp
             yield name, compute_visit(*arguments)
 
     monkeypatch.setattr(pooling, "_in_pool", dying)
-    pooled, failed = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
-    assert [visit.session for visit in pooled] == ["S01"]
-    assert [name for name, _ in failed] == ["S02"]
+    results, failures = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
+    assert [visit.session for visit in results] == ["S01"]
+    assert [name for name, _ in failures] == ["S02"]
 
 
 def test_ctrl_c_keeps_what_is_done_and_says_so(pool, study, tmp_path, monkeypatch, capsys):
@@ -346,8 +346,8 @@ def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in
 @pytest.mark.usefixtures("pool")
 def test_a_cluster_is_not_asked_for_what_is_kept(study):
     shelf = Shelf(study / "pooled" / "results", STEADY)
-    pooled, failed = visits([study / "S01"], STEADY, shelf, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
-    assert ([visit.session for visit in pooled], failed) == (["S01"], [])
+    results, failures = visits([study / "S01"], STEADY, shelf, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
+    assert ([visit.session for visit in results], failures) == (["S01"], [])
 
 
 @pytest.mark.slow

@@ -95,7 +95,7 @@ class Killing:
 
     def __init__(self, folder, state, victim, chance):
         self.folder, self.state, self.victim = folder, state, victim
-        self.events, self.safe, self.shown, self.recorder = [], 0, {}, None
+        self.events, self.safe, self.newest_by_stream, self.recorder = [], 0, {}, None
         self.reached = False
         self.states = set()
         self.lost = 0.0  # told seconds of readings that were shown and are not in the file
@@ -170,7 +170,7 @@ class Killing:
         if "event" in fields:
             self.events.append(tuple(fields["event"]))
         if "shown" in fields:
-            self.shown[fields["stream"]] = fields["shown"]
+            self.newest_by_stream[fields["stream"]] = fields["shown"]
 
     def _count(self):
         try:
@@ -195,10 +195,10 @@ class Killing:
         block = recording.readings()
         assert len(block) >= self.safe
         assert np.all(np.diff(block.sequence) == 1)
-        if self.shown and len(block) > self._before:
+        if self.newest_by_stream and len(block) > self._before:
             seam = [event.data["sequence_offset"] for event in recording.events if event.kind == "readings_joined"]
-            shown = self.shown[max(self.shown)]
-            self.lost = max(shown + (seam[-1] if seam and self._before else 0) - int(block.sequence[-1]), 0) / 200.0
+            newest = self.newest_by_stream[max(self.newest_by_stream)]
+            self.lost = max(newest + (seam[-1] if seam and self._before else 0) - int(block.sequence[-1]), 0) / 200.0
         if self.victim == "client" and recording.end is not None:
             assert recording.end["cause"] in ("client", "finished")
             assert len(block) == recording.end["readings"]

@@ -127,11 +127,11 @@ def test_a_recorder_that_slept_loses_no_reading_that_the_system_kept_for_it(tmp_
         recording = Recording.open(tmp_path / "s")
         block = recording.readings()
         assert end.health.received == len(block) == end.readings
-        missing = int(block.sequence[-1]) + 1 - int(block.sequence[0]) - len(block)
-        assert missing == end.health.lost
+        gap = int(block.sequence[-1]) + 1 - int(block.sequence[0]) - len(block)
+        assert gap == end.health.lost
         losses = sum(event.data.get("lost", 0) for event in recording.events if event.kind == "losses")
-        assert losses == missing
-        print(f"\nasleep for {ASLEEP:g} s: {len(block)} readings, {missing} lost, and as many counted")
+        assert losses == gap
+        print(f"\nasleep for {ASLEEP:g} s: {len(block)} readings, {gap} lost, and as many counted")
     finally:
         box.terminate()
         box.communicate()

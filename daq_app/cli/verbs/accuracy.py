@@ -37,8 +37,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _docs(options, {})
     results = _measure_or_restore(options, console)
     if results.stopped:
-        unfilled = "; the docs stay as they are" if options.docs else ""
-        console.note(f"stopped; drawing what was measured until then{unfilled}")
+        remark = "; the docs stay as they are" if options.docs else ""
+        console.note(f"stopped; drawing what was measured until then{remark}")
     console.progress(0.99, "drawing")
     write(results, options.out)
     console.result({"page": str(options.out / PAGE), **results.to_dict()})

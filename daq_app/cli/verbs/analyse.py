@@ -36,7 +36,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         _print(recording, analysis, console)
     console.say(*(f"* {decision.sentence}" for decision in analysis.decisions))
     if analysis.tilt is not None:
-        console.say(_leaning(analysis.tilt, analysis.settings.tilt))
+        console.say(_tilt_words(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:
         where = "" if flaw.trial is None else f"trial {flaw.trial}: "
         console.say(f"{flaw.grade}: {where}{flaw.sentence}")
@@ -62,11 +62,11 @@ def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
     console.say(*table_texts(report, "strokes"))
 
 
-def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
+def _tilt_words(tilt: Tilt, angles: tuple[float, float]) -> str:
     ends = (tilt.x_interval, tilt.y_interval)
     rows = [
         f"{number(a)}° ({number(low)} to {number(high)}) to +{axis}"
         for axis, a, (low, high) in zip("xy", tilt.lean, ends, strict=True)
     ]
-    levelling = f"levelled by {levelled[0]:g}° and {levelled[1]:g}°" if levelled != (0.0, 0.0) else "not levelled"
+    levelling = f"levelled by {angles[0]:g}° and {angles[1]:g}°" if angles != (0.0, 0.0) else "not levelled"
     return f"tilt of the face, if the hand pressed straight down: {', '.join(rows)}; {tilt.kind}; {levelling}"

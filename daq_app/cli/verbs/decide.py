@@ -106,11 +106,11 @@ def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
 
 
 def _list(decisions: Decisions, console: Console) -> int:
-    acting = {decision.number for decision in decisions.in_force}
-    lines = [{**line.to_dict(), "in_force": line.number in acting} for line in decisions.lines]
+    in_force = {decision.number for decision in decisions.in_force}
+    lines = [{**line.to_dict(), "in_force": line.number in in_force} for line in decisions.lines]
     console.result({"decisions": lines, "problems": list(decisions.problems)})
     for line in decisions.lines:
-        over = "" if line.number in acting or line.undoes is not None else " (no longer in force)"
+        over = "" if line.number in in_force or line.undoes is not None else " (no longer in force)"
         console.say(f"{line.made_utc}  {line.sentence}{over}")
     console.say(*decisions.problems, None if decisions.lines else "nothing was decided")
     return FLAWED if decisions.problems else DONE

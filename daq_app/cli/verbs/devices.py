@@ -39,8 +39,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return _probe(options.words[1], console)
     devices = reachable(options.words)
     lines = serial_ports()
-    described = [_description(device) for device in devices] + [{"uri": "sim:", "simulated": True}]
-    console.result({"devices": described, "serial_ports": list(lines)})
+    documents = [_description(device) for device in devices] + [{"uri": "sim:", "simulated": True}]
+    console.result({"devices": documents, "serial_ports": list(lines)})
     rows = [
         [device.uri, device.info.model, device.info.serial, device.info.calibration.source]
         if device.info
@@ -128,8 +128,8 @@ def _listen(transducer: Transducer, clock: Clock, console: Console) -> ReadingBl
     transducer.start()
     began = clock.now_ns()
     blocks: list[ReadingBlock] = []
-    while (passed := (clock.now_ns() - began) / 1e9) < PROBED:
-        console.progress(passed / PROBED, f"listening, {transducer.health.received} readings")
+    while (elapsed_s := (clock.now_ns() - began) / 1e9) < PROBED:
+        console.progress(elapsed_s / PROBED, f"listening, {transducer.health.received} readings")
         blocks.append(transducer.read(0.1))
     transducer.stop()
     return ReadingBlock.concatenate(blocks)

@@ -73,7 +73,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.scene is not None:
         head = f"# {simulated}\n" if simulated else ""
         write_whole(options.scene, f"{head}{SCENE_HEAD}\n{toml_text(outcome.scene)}".encode())
-    assumed = {
+    assumptions = {
         "mu": options.mu,
         "prior_factor": options.prior,
         "calibration_error": settings.gain_uncertainty,
@@ -89,7 +89,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             "presses": list(curves.names),
             "flaws": flaws,
             "check": {"deviation": outcome.check.deviation, "shares": shares},
-            "assumed": assumed,
+            "assumed": assumptions,
         }
     )
     console.say(simulated)

@@ -68,12 +68,12 @@ def _restore_export(session: "ExportedSession", options: argparse.Namespace, con
         raise WrongValue(f"--{names[0]} says nothing of an export, which holds all that is known: leave it out")
     folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
-        imported = import_session(session, folder)
+        summary = import_session(session, folder)
         seal(folder)
-    console.result({"session": str(folder), "format": session.form, **asdict(imported)})
-    outcome = "with the above" if imported.differences else "as they were"
-    console.say(*imported.differences, f"{folder}: {imported.readings} readings, {imported.events} events, {outcome}")
-    return FLAWED if imported.differences else DONE
+    console.result({"session": str(folder), "format": session.form, **asdict(summary)})
+    outcome = "with the above" if summary.differences else "as they were"
+    console.say(*summary.differences, f"{folder}: {summary.readings} readings, {summary.events} events, {outcome}")
+    return FLAWED if summary.differences else DONE
 
 
 def _import_foreign(options: argparse.Namespace, console: Console) -> int:
@@ -95,14 +95,14 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     )
     folder = options.out or Path("recordings") / options.file.stem
     with _whole_session(folder):
-        imported = import_csv(options.file, folder, import_options)
-        seal(imported.folder)
-        list_in_manifest(imported.folder, (ORIGINAL_FILE,))
-    console.result({"session": str(imported.folder), **{k: v for k, v in asdict(imported).items() if k != "folder"}})
+        summary = import_csv(options.file, folder, import_options)
+        seal(summary.folder)
+        list_in_manifest(summary.folder, (ORIGINAL_FILE,))
+    console.result({"session": str(summary.folder), **{k: v for k, v in asdict(summary).items() if k != "folder"}})
     console.say(
-        f"{imported.folder}: {imported.readings} readings at {number(imported.rate, 4)} a second",
-        *(f"default: {default}" for default in imported.defaults),
-        f"kept in the original file alone: {', '.join(imported.extra)}" if imported.extra else None,
+        f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} a second",
+        *(f"default: {default}" for default in summary.defaults),
+        f"kept in the original file alone: {', '.join(summary.extra)}" if summary.extra else None,
     )
     return DONE
 

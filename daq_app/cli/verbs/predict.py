@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     afferent = _afferent(options)
-    scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
-    console.note(ignored or None)
+    scene, remark = (None, "") if options.scene is None else finger_in(options.scene)
+    console.note(remark or None)
     values = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
     choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **values)
     recording, _, unreadable = open_visit(options.session, options.subject, console)

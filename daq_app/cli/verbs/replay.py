@@ -58,7 +58,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, copy, decisions, recording))
             parts.append(PREDICTION)
     events = recording.events
-    lasted = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
+    duration_s = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
     notes = list(_notes(recording))
     console.result(
         {
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             "compared": parts,
             "differences": differences,
             "notes": notes,
-            "duration_s": lasted,
+            "duration_s": duration_s,
             "wall_s": wall_s,
         }
     )
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         *notes,
         *differences,
         f"{options.session}: {outcome} ({', '.join(parts)} compared)",
-        f"{lasted:.1f} s of session in {wall_s:.2f} s, the comparison not counted",
+        f"{duration_s:.1f} s of session in {wall_s:.2f} s, the comparison not counted",
     )
     return FLAWED if differences else DONE
 

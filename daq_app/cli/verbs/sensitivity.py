@@ -68,8 +68,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if options.design is not None:
             raise WrongValue("--design needs a scene: daq-app sensitivity SCENE.toml --design FILE")
         return _signs(options, samples, console)
-    if ignored := next((name for name, usual_one in _OF_FINGERS.items() if getattr(options, name) != usual_one), None):
-        raise WrongValue(f"--{ignored} is for many fingers, and a scene is one: leave out --{ignored} or the scene")
+    if option := next((name for name, usual_one in _OF_FINGERS.items() if getattr(options, name) != usual_one), None):
+        raise WrongValue(f"--{option} is for many fingers, and a scene is one: leave out --{option} or the scene")
     scene = load_toml(options.scene, Scene)
     if options.design is None:
         design, origin = usual_design(scene), "default: nobody set it"
@@ -108,10 +108,10 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     at = _NAMES.index(options.quantity)
     label = QUANTITIES[at].label
     changes = sign_map.single_changes(options.kinematics)
-    mapped = sign_map.map_trials(options.kinematics)
+    map_trials = sign_map.map_trials(options.kinematics)
     points = saltelli_points(sign_map.DESIGN, samples, options.seed)
-    fingers = sign_map.drawn_fingers(points, options.kinematics)
-    trials = [*changes.values(), *mapped.values(), *fingers]
+    fingers = sign_map.sample_fingers(points, options.kinematics)
+    trials = [*changes.values(), *map_trials.values(), *fingers]
     try:
         progress = console.counter("fingers", len(trials))
         answers = sign_map.answers_of(trials, progress, options.keep, options.workers, options.scheduler)
@@ -121,11 +121,11 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
         kind = WrongValue if error.errno in (errno.EEXIST, errno.EISDIR) else RecordingError
         raise kind(f"--keep {options.keep} cannot be used ({error.strerror}); {remedy(error, new=True)}") from error
     single = dict(zip(changes, answers, strict=False))
-    radii = dict(zip(mapped, answers[len(changes) :], strict=False))
-    random = answers[len(changes) + len(mapped) :]
+    radii = dict(zip(map_trials, answers[len(changes) :], strict=False))
+    random = answers[len(changes) + len(map_trials) :]
     published = single["as published"]
     assert not isinstance(published, str)  # a finger that can be
-    signs = sign_map.kept_signs(random, published)
+    signs = sign_map.same_signs(random, published)
     shares = {name: sign_map.share(column) for name, column in zip(_NAMES, signs.T, strict=True)}
     indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
     without_answer = int(np.isnan(signs[:, at]).sum())
@@ -142,18 +142,18 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             "fingers": len(random),
             "without_answer": without_answer,
             "shares": shares,
-            "indices": {name: [asdict(one) for one in computed] for name, (computed, _) in indices.items()},
+            "indices": {name: [asdict(one) for one in sobol] for name, (sobol, _) in indices.items()},
         }
     )
     _print_changes(single, at, console)
     _print_map(radii, at, console)
     _print_shares(shares, len(random), without_answer, console)
-    if moving := next((computed[0].name for computed, _ in indices.values() if computed), None):
-        _print_thirds(moving, points, signs[:, at], label, console)
-    for name, (computed, count) in indices.items():
+    if parameter := next((sobol[0].name for sobol, _ in indices.values() if sobol), None):
+        _print_thirds(parameter, points, signs[:, at], label, console)
+    for name, (sobol, count) in indices.items():
         console.say(f"\nWhat moves the change of the {label} over {name} (Sobol indices, {count} fingers):")
-        if computed:
-            console.say(_index_table(computed), *doubts(computed, samples))
+        if sobol:
+            console.say(_index_table(sobol), *doubts(sobol, samples))
         else:
             console.say("too few whole blocks of the design have an answer: ask for more --samples")
     return DONE

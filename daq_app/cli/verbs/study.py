@@ -48,8 +48,8 @@ RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
 
 def add_power(parser: argparse.ArgumentParser) -> None:
     """Declare --power and what goes with it."""
-    assumed = ", ".join(f"{one.name}={one.default:g}" for one in fields(AssumedEffects))
-    meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {assumed}"
+    defaults = ", ".join(f"{one.name}={one.default:g}" for one in fields(AssumedEffects))
+    meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {defaults}"
     parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
     meaning = "with --power: how often a study whose subjects press each surface to these depths tells --quantity from"
     meaning += " its rivals; some minutes"
@@ -193,20 +193,20 @@ def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console
     # What is wrong with these is said before hours of work.
     exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
     shelf = Shelf(out / "results", visit_options)
-    results, failed = visits(
+    results, failures = visits(
         sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers
     )
     if truth is not None and options.quantity == SED.name:
         from daq_app.simulation.synthetic import population_relations  # loaded only where it is needed
 
         truth["relation"] = population_relations(truth["people"], visit_options.prediction, visit_options.area)
-    study = pool_visits(results, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
+    study = pool_visits(results, failures, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
     _print(study, files, console)
     flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
-    return FLAWED if failed or flawed else DONE
+    return FLAWED if failures or flawed else DONE
 
 
 def _load_ground_truth(folder: Path) -> dict[str, Any] | None:

@@ -47,8 +47,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     names: list[str] = []
     for recording in recordings:
         # Numbers and pages that were made of it while it was blinded.
-        derived = [path for path in sorted(recording.folder.iterdir()) if path.is_file() and path.name not in RECORDED]
-        results = [path for path in derived if path.suffix in (".json", ".jsonl", ".html")]
+        files = [path for path in sorted(recording.folder.iterdir()) if path.is_file() and path.name not in RECORDED]
+        results = [path for path in files if path.suffix in (".json", ".jsonl", ".html")]
         made_before = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in results}
         document = {"unblinded_utc": utc, "by": options.by, "made_before": made_before, "key": key.to_dict()}
         try:

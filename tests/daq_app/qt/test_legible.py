@@ -207,12 +207,12 @@ def test_a_row_an_example_a_tab_a_head_and_a_cell_are_noticed_where_they_are_cut
 @pytest.fixture
 def windows(driver, type_size):
     """Return a function that makes the experimenter's window in a theme and at a size of type."""
-    shown, bridge = [], driver.window.bridge
+    open_windows, bridge = [], driver.window.bridge
 
     def make(size, scale, theme):
         type_size(scale)
         window = MainWindow(bridge)
-        shown.append(window)
+        open_windows.append(window)
         window.setStyleSheet(tokens.style_sheet(theme))
         window.resize(*size)
         window.show()
@@ -222,7 +222,7 @@ def windows(driver, type_size):
 
     yield make
     bridge.blockSignals(False)
-    for window in shown:
+    for window in open_windows:
         bridge.changed.disconnect(window.show_view)
         bridge.frame.disconnect(window._draw)
         for widget in (window.subject, window):
@@ -386,12 +386,12 @@ def test_the_names_of_a_plot_hide_nothing_of_its_curves(height):
     plot.show_columns(Columns(time, values), 10.0, [], 0.0)
     names = [text.place for text in painted_texts(plot) if text.words in ("Tx", "Ty", "Tz")]
     picture, colour = plot.grab().toImage(), QColor(FY)
-    seen = [
+    rows = [
         y
         for y in range(picture.height())
         for x in range(picture.width() - 40, picture.width())  # right of the names
         if picture.pixelColor(x, y) == colour
     ]
     assert len(names) == 3
-    assert seen
-    assert min(seen) >= max(place.bottom() for place in names) - 1
+    assert rows
+    assert min(rows) >= max(place.bottom() for place in names) - 1

@@ -56,16 +56,16 @@ def test_the_letters_of_a_tab_that_is_not_chosen_are_whole(application):
 @pytest.mark.parametrize("keeps", [False, True])
 def test_words_take_the_lines_they_need_at_the_width_they_have_now(keeps):
     window = QWidget()
-    shown, fresh = WrappedLabel("value", keeps_room=keeps), WrappedLabel("value")
-    for one in (shown, fresh):
+    narrow, fresh = WrappedLabel("value", keeps_room=keeps), WrappedLabel("value")
+    for one in (narrow, fresh):
         one.setParent(window)
     window.show()
     for width in (90, 400):
-        shown.resize(width, 20)
-        shown.show_text(10 * "several words ")
+        narrow.resize(width, 20)
+        narrow.show_text(10 * "several words ")
     fresh.resize(400, 20)
     fresh.show_text(10 * "several words ")
-    assert shown.height() == fresh.height()
+    assert narrow.height() == fresh.height()
     window.hide()
 
 

@@ -46,8 +46,8 @@ def test_what_is_below_the_top_stays_in_place_while_the_transducer_says_more(dri
             window.resize(width, 1000)
             for _ in range(3):  # until the rows at the top have found their heights
                 driver.application.processEvents()
-            for said in words:
-                bench = replace(driver.view.bench, name="SIMULATED Net F/T SI-36-0.5", lamp_words=said)
+            for lamp_words in words:
+                bench = replace(driver.view.bench, name="SIMULATED Net F/T SI-36-0.5", lamp_words=lamp_words)
                 window.header.show_view(replace(driver.view, bench=bench, heading="subject P07 · sensotact-friction"))
                 driver.application.processEvents()
                 places.setdefault(width, set()).add(window.to_do.mapTo(window, window.to_do.rect().topLeft()).y())
@@ -76,8 +76,8 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     )
     lines = row.words.text().split("\n")
     assert lines[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
-    shown, unit = lines[2].removeprefix("Noise: ").split(",")[0].split()
-    assert (float(shown), unit) == (float(f"{1000 * max(zero.noise[:3]):.2g}"), "mN")
+    noise, unit = lines[2].removeprefix("Noise: ").split(",")[0].split()
+    assert (float(noise), unit) == (float(f"{1000 * max(zero.noise[:3]):.2g}"), "mN")
     assert lines[3].startswith("Life: ")
     row.connect_button.click()
     driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
@@ -189,14 +189,14 @@ def test_a_subject_whose_mark_may_group_thousands_is_asked_which_of_two_numbers_
     window.show()
     for text, number in numbers.items():
         QTest.keyClicks(window.number.field, typed)
-        shown = " ".join(label.text() for label in window.findChildren(QLabel) if label.isVisible())
-        assert doubt in shown
+        page_text = " ".join(label.text() for label in window.findChildren(QLabel) if label.isVisible())
+        assert doubt in page_text
         assert not window.next.isVisible()
         window.number.field.clear()
         QTest.keyClicks(window.number.field, text)
-        shown = " ".join(label.text() for label in window.findChildren(QLabel) if label.isVisible())
-        assert "Give a number." in shown
-        assert doubt not in shown
+        page_text = " ".join(label.text() for label in window.findChildren(QLabel) if label.isVisible())
+        assert "Give a number." in page_text
+        assert doubt not in page_text
         assert window.next.isVisible()
         assert window.number.answer.value == number
         window.number.begin()

@@ -121,8 +121,8 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
 
 def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_stroke(driver):
     window, live = at_size(driver, 1000, 700)
-    for shown, folded in ((0, 3), (3, 0), (0, 3)):
-        assert live.plots[shown].isVisible()
+    for visible, folded in ((0, 3), (3, 0), (0, 3)):
+        assert live.plots[visible].isVisible()
         assert not live.plots[folded].isVisible()
         QTest.keyClick(window, Qt.Key.Key_D)
     assert preferences.settings().value(DRAWER) is None  # what there was no room for is no wish

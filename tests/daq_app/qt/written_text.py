@@ -53,10 +53,10 @@ def cut_off(window):
 
 def laid_over(window, parts):
     """Return the visible ones of some parts that reach beyond their window, or lie on another."""
-    seen = [part for part in parts if part.isVisible()]
-    boxes = [part.rect().translated(part.mapTo(window, part.rect().topLeft())) for part in seen]
+    visible = [part for part in parts if part.isVisible()]
+    boxes = [part.rect().translated(part.mapTo(window, part.rect().topLeft())) for part in visible]
     alone = [window.rect().contains(a) and sum(a.intersects(b) for b in boxes) == 1 for a in boxes]
-    return [part for part, is_alone in zip(seen, alone, strict=True) if not is_alone]
+    return [part for part, is_alone in zip(visible, alone, strict=True) if not is_alone]
 
 
 def controls(window):
@@ -77,8 +77,8 @@ def unreached_controls(window, reached):
     return [w.accessibleName() for w in stops if not (isinstance(w, QAbstractButton) and w.group() in groups)]
 
 
-def is_less(room, needed):
-    return any(has + ROUNDING < needs for has, needs in zip(room, needed, strict=True))
+def is_less(room, need):
+    return any(has + ROUNDING < needs for has, needs in zip(room, need, strict=True))
 
 
 def texts_of(widget):
@@ -102,9 +102,9 @@ def _in(font):
 
 
 def _label(widget):
-    needed = widget.sizeHint().width() if not widget.wordWrap() else 0
+    width = widget.sizeHint().width() if not widget.wordWrap() else 0
     high = widget.heightForWidth(widget.width()) if widget.wordWrap() else widget.sizeHint().height()
-    return [(widget.text(), widget.size().toTuple(), (needed, high))]
+    return [(widget.text(), widget.size().toTuple(), (width, high))]
 
 
 def _button(widget):

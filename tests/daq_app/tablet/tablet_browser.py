@@ -67,7 +67,7 @@ class Browser:
             self.wait()
         return value
 
-    def shown(self, name):
+    def is_visible(self, name):
         return self.value(f"!document.getElementById('{name}').hidden")
 
     def text(self):

@@ -131,13 +131,13 @@ def test_a_code_that_is_guessed_at_becomes_another(server):
 
 
 def test_many_who_guess_at_once_wait_for_each_other(server, monkeypatch):
-    waiting, most, pause = [], [], time.sleep
+    sleepers, most, pause = [], [], time.sleep
 
     def sleep_counted(seconds):
-        waiting.append(1)
-        most.append(len(waiting))
+        sleepers.append(1)
+        most.append(len(sleepers))
         pause(seconds)
-        waiting.pop()
+        sleepers.pop()
 
     monkeypatch.setattr(module.time, "sleep", sleep_counted)
     with ThreadPoolExecutor(8) as pool:

@@ -107,7 +107,7 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
 
     ask(driver)  # by touch
     browser.until("!document.getElementById('line').parentElement.hidden", "the line")
-    assert not browser.shown("next")
+    assert not browser.is_visible("next")
     assert browser.value("document.getElementById('line').getBoundingClientRect().width") == pytest.approx(
         100 * 100 * 96 / 25.4 / 80, abs=1
     )
@@ -201,7 +201,7 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     driver.phase("idle")
     ask(driver)
     browser.until("asked()", "the question")
-    assert not browser.shown("next")
+    assert not browser.is_visible("next")
     if protocol == "magnitude-estimation":
         for text, language, number in READ:
             browser.value(f"page.view.language = '{language}', document.getElementById('number').value = '{text}'")

@@ -49,17 +49,17 @@ def test_a_study_that_is_not_in_the_folder_is_named_with_those_that_are(form, tm
 def test_a_study_that_is_damaged_keeps_start_from_lighting(form, tmp_path):
     create_study(tmp_path / "pilot", protocol_file("sensotact-friction").read_text(encoding="utf-8"), 11, blinded=False)
     (tmp_path / "pilot" / "study.sqlite").write_bytes(b"not a database")
-    broken = card(replace(form, study="pilot"), "Study and protocol")
-    assert not broken.ready
-    assert "cannot be read" in broken.words
+    study_card = card(replace(form, study="pilot"), "Study and protocol")
+    assert not study_card.ready
+    assert "cannot be read" in study_card.words
 
 
 def test_a_broken_protocol_is_named_with_its_file_before_start(form, tmp_path):
     (tmp_path / "own.toml").write_text("name = [")
-    broken = card(replace(form, protocol=str(tmp_path / "own.toml")), "Study and protocol")
-    assert not broken.ready
-    assert "own.toml" in broken.words
-    assert "\n" not in broken.words
+    protocol_card = card(replace(form, protocol=str(tmp_path / "own.toml")), "Study and protocol")
+    assert not protocol_card.ready
+    assert "own.toml" in protocol_card.words
+    assert "\n" not in protocol_card.words
 
 
 def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypatch, tmp_path):

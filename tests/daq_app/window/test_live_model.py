@@ -129,7 +129,7 @@ def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again
 def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
     monkeypatch.setattr("daq_app.window.live_follower.solve", solve_once)
     shown_values = follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
+    settled = follower.settled_solver(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     steady = shown_values.sed[(shown_values.time >= 1.2) & (shown_values.time <= 2.0)]
     assert settled.provisional == pytest.approx(steady.mean())
     assert abs(settled.difference) < 0.02
@@ -145,14 +145,14 @@ def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_stead
 def test_a_full_solve_whose_nested_mesh_has_no_such_state_has_no_estimate_from_the_mesh(follower, monkeypatch):
     monkeypatch.setattr("daq_app.window.live_follower.solve", lambda scene: replace(solve_once(scene), nested=None))
     follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
+    settled = follower.settled_solver(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     assert settled.error is None
     assert f"SED {1000 * settled.sed:.2f} kPa; mesh: no estimate; model: " in model_words(None, settled, "").words
 
 
 def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
     follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(PLAN, replace(FRICTION, mu=None), NORMAL, (1.2, 2.0)))()
+    settled = follower.settled_solver(Settle(PLAN, replace(FRICTION, mu=None), NORMAL, (1.2, 2.0)))()
     assert settled.sed is None
     assert settled.difference is None
     assert settled.provisional is not None
@@ -168,7 +168,7 @@ def test_a_solve_that_finds_nothing_is_marked_in_the_last_state_that_was_followe
 
     monkeypatch.setattr("daq_app.window.live_follower.solve", wedged)
     follower.take(forces_of(stroke(), FRAME))
-    settled = follower.settling(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
+    settled = follower.settled_solver(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     x, y = settled.picture.lost  # squeezed most between bone and surface, above the contact
     assert abs(x) < 4.0
     assert 0.0 < y < 4.0

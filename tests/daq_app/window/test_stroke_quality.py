@@ -43,9 +43,9 @@ def test_a_force_that_falls_by_half_asks_for_another_stroke(judge_stroke):
 
 
 def test_the_worst_comes_first_and_says_what_to_do(judge_stroke):
-    refused = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"), (FlawName.TOO_LITTLE_FORCE, "refused"))
-    assert verdict(refused) == "Redo: pressed too lightly. Press harder."
-    assert refused.words[1:] == (stroke_quality.LEAVING, "stick slip")
+    refusal = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"), (FlawName.TOO_LITTLE_FORCE, "refused"))
+    assert verdict(refusal) == "Redo: pressed too lightly. Press harder."
+    assert refusal.words[1:] == (stroke_quality.LEAVING, "stick slip")
     doubtful = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"))
     assert verdict(doubtful).startswith("Redo: pressed less than half as hard")
 

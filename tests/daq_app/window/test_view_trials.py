@@ -90,9 +90,9 @@ def test_a_trial_without_a_stroke_says_why(messages, number, why):
 
 def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
     blind = replace(PLAN, shown=Visibility(experimenter=()))
-    begun = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
+    beginning = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
     quality = Judged(1, 1, replace(GOOD, stroke=STROKE))
-    view = inspection(after(BEGUN[0], begun, *TARE[2:], quality, *KEPT).session, 1)
+    view = inspection(after(BEGUN[0], beginning, *TARE[2:], quality, *KEPT).session, 1)
     assert view.verdict == "Forces are not shown in this protocol."
     assert view.stroke is None
     assert "score" not in view.heading

@@ -106,8 +106,8 @@ def test_no_mark_of_an_ended_session_is_drawn_on_the_clock_of_the_next_stream():
 
 def test_a_session_that_goes_on_begins_without_the_marks_of_the_stream_before():
     before = (log("take_started", 1, take=1), log("contact_onset", 1, time=1.5, noticed=1.51))
-    begun = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
-    assert after(m.Device(INFO, None), begun).session.marks == ()
+    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
+    assert after(m.Device(INFO, None), beginning).session.marks == ()
 
 
 def test_the_banner_of_a_session_cut_short_blames_the_transducer_only_until_it_answers_again():
@@ -164,8 +164,8 @@ def test_redo_names_the_trial_it_discards(messages, trial):
 
 def test_redo_names_both_of_two_that_are_compared():
     first, second = PAIRS.trials[:2]
-    begun = m.SessionBegun("recordings/P07", PAIRS, "people", None, 0, 1.0)
-    state = after(begun, steps.AskMount(second), steps.StartTake(2, 1), steps.AskChoice(first, second, "Which?"))
+    beginning = m.SessionBegun("recordings/P07", PAIRS, "people", None, 0, 1.0)
+    state = after(beginning, steps.AskMount(second), steps.StartTake(2, 1), steps.AskChoice(first, second, "Which?"))
     redo = derive_view(state).course.buttons["redo"]
     assert redo.label == "Redo 1–2"
     assert first.stimulus.code in redo.question

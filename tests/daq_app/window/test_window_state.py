@@ -233,11 +233,11 @@ def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
 
 
 def test_no_reading_counts_as_of_now_once_the_recorder_is_dead_or_not_heard():
-    heard = after(Tick(100.0), *MOUNT, health_report((0.1,) * 7), Tick(101.0))
-    assert not derive_view(heard).bench.silent
-    assert derive_view(after(Tick(105.0), state=heard)).bench.silent
-    assert derive_view(after(m.Gone(False, "signal 9"), state=heard)).bench.silent
-    assert derive_view(after(m.Disconnect(), m.NoDevice(), state=heard)).bench.silent
+    state = after(Tick(100.0), *MOUNT, health_report((0.1,) * 7), Tick(101.0))
+    assert not derive_view(state).bench.silent
+    assert derive_view(after(Tick(105.0), state=state)).bench.silent
+    assert derive_view(after(m.Gone(False, "signal 9"), state=state)).bench.silent
+    assert derive_view(after(m.Disconnect(), m.NoDevice(), state=state)).bench.silent
 
 
 # ---- the bench
@@ -259,18 +259,18 @@ def test_what_was_lost_and_a_rate_that_is_not_known_are_said_in_the_experimenter
 
 
 def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_still_come_back():
-    def shown(silence, *session):
+    def view_after(silence, *session):
         report = structs.replace(health_report((0.1,) * 7), silence=silence)
         return derive_view(after(m.Device(INFO, None), *session, report))
 
-    quiet, silent = shown(0.9, *TOUCH), shown(2.2, *TOUCH)
+    quiet, silent = view_after(0.9, *TOUCH), view_after(2.2, *TOUCH)
     assert (quiet.bench.lamp, quiet.bench.silent, quiet.banner) == ("well", False, None)
     assert (silent.bench.lamp, silent.bench.lamp_words) == ("wrong", "no readings for 2 s")
     assert silent.bench.silent
     assert silent.banner.grade == "wrong"
     assert silent.banner.sentence.startswith("No readings for 2 s: check power and cable")
     assert derive_view(after(m.Device(INFO, None), m.LinkDown("the cable is out"))).bench.silent
-    before = shown(2.2)  # nothing is lost where nothing is recorded
+    before = view_after(2.2)  # nothing is lost where nothing is recorded
     assert (before.bench.lamp, before.banner) == ("look", None)
 
 
@@ -366,7 +366,7 @@ def test_a_session_that_goes_on_shows_what_was_done_before():
         log("take_started", 2, take=1),
         log("take_discarded", 2, take=1, reason="cut short"),
     )
-    begun = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
-    rows = derive_view(after(m.Device(INFO, None), begun, steps.AskMount(SECOND))).course.rows
+    beginning = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
+    rows = derive_view(after(m.Device(INFO, None), beginning, steps.AskMount(SECOND))).course.rows
     assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
     assert rows[1].outcome == "score 40"

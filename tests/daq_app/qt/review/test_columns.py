@@ -281,16 +281,16 @@ def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
     window.take(m.Excerpt(stroke.number, raw(stroke)))
     player, view = window.stroke.player, window.stroke.stroke
     player.seek(20)
-    assert len(view._recorded[0].getData()[0]) == 21
+    assert len(view._raw_curves[0].getData()[0]) == 21
     QTest.keyClick(player, Qt.Key.Key_Right)
-    assert len(view._recorded[0].getData()[0]) == 22
+    assert len(view._raw_curves[0].getData()[0]) == 22
     player.speed.setCurrentIndex(0)
     player.speed.activated.emit(0)
     player.toggle()
     assert player.playing
     player.toggle()
     QTest.keyClick(player, Qt.Key.Key_End)
-    assert len(view._recorded[0].getData()[0]) == 50
+    assert len(view._raw_curves[0].getData()[0]) == 50
 
 
 def test_every_link_of_the_way_back_is_followed_by_keys(application, window):

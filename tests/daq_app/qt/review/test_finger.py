@@ -340,8 +340,8 @@ def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
 def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
     row = selected_row(window.state)
     window.take(m.TrialAnswer(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
-    missing = row.prediction.experiment, row.prediction.index
-    remaining = tuple(p for p in example().predictions if (p.experiment, p.index) != missing)
+    stimulus = row.prediction.experiment, row.prediction.index
+    remaining = tuple(p for p in example().predictions if (p.experiment, p.index) != stimulus)
     window.take(m.OtherSession("other", replace(example(), session="later", predictions=remaining)))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
