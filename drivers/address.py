@@ -91,11 +91,11 @@ def at(address: Address) -> Generator[None]:
         raise type(error)(f"{address.uri}: {error}") from None
 
 
-def check_options(address: Address, allowed: frozenset[str]) -> None:
-    """Raise SetupError when the address has an option that is not `allowed`."""
+def check_options(address: Address, option_names: frozenset[str]) -> None:
+    """Raise SetupError when the address has an option that is not in `option_names`."""
     for option in address.options:
-        if option not in allowed:
-            names = ", ".join(sorted(allowed | {"tool"}))  # which every transducer takes, see `without_tool`
+        if option not in option_names:
+            names = ", ".join(sorted(option_names | {"tool"}))  # which every transducer takes, see `without_tool`
             raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {names}")
 
 

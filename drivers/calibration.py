@@ -91,5 +91,5 @@ def loads(wrench: Array, rated: Array) -> Array:
     array([[0.5 , 0.  , 0.25, 0.  , 0.  , 0.5 , 1.  ]])
     """
     fx, fy, fz, tx, ty, tz = parts = np.abs(wrench / rated).T
-    combined = np.maximum(np.hypot(fx, fy) + tz, fz + np.hypot(tx, ty))
-    return np.column_stack([*parts, combined])
+    sums = np.maximum(np.hypot(fx, fy) + tz, fz + np.hypot(tx, ty))
+    return np.column_stack([*parts, sums])

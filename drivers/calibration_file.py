@@ -154,13 +154,13 @@ def _transform(body: Element) -> Array:
     return wrench_transform(np.array(values[:3]) * distance, np.array(values[3:]) * angle)
 
 
-def _check(matrix: Array, printed: Array, rounding: Array) -> None:
+def _check(matrix: Array, working: Array, rounding: Array) -> None:
     """Raise where the file's own working matrix is another than the one computed, beyond its rounding."""
-    apart = np.abs(matrix - printed) > 1.01 * rounding
+    apart = np.abs(matrix - working) > 1.01 * rounding
     if np.any(apart):
         axis, gauge = (int(i) for i in np.argwhere(apart)[0])
         raise _Unusable(
-            f"its UserAxis {AXES[axis]} says {printed[axis, gauge]:.5f} for gauge {gauge} where its Axis rows give "
+            f"its UserAxis {AXES[axis]} says {working[axis, gauge]:.5f} for gauge {gauge} where its Axis rows give "
             f"{matrix[axis, gauge]:.5f}"
         )
 

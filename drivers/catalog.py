@@ -37,10 +37,10 @@ def open_transducer(uri: str, clock: Clock) -> Transducer:
     return WrappedTransducer(transducer, with_tool(transducer.info, tool)) if tool else transducer
 
 
-def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Probe, ...]:
-    """Return what answers at the usual addresses and those `named`, within `patience` [s] each; disturbs no device."""
+def reachable(uris: Iterable[str] = (), patience: float = 0.5) -> tuple[Probe, ...]:
+    """Return what answers at the usual addresses and at `uris`, within `patience` [s] each; disturbs no device."""
     usual = [uri for driver in DRIVERS for uri in driver.usual]
-    return tuple(_probe(uri, patience) for uri in dict.fromkeys([*usual, *named]))
+    return tuple(_probe(uri, patience) for uri in dict.fromkeys([*usual, *uris]))
 
 
 def _probe(uri: str, patience: float) -> Probe:

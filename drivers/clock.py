@@ -64,8 +64,8 @@ class PacedClock:
     def sleep(self, seconds: float) -> None:
         """Wait for `seconds` of this clock."""
         until = self.now_ns() + int(max(seconds, 0.0) * 1e9)
-        while (remaining := until - self.now_ns()) > 0:
-            time.sleep(min(remaining, self._longest_ns) * 1e-9 / self.factor)
+        while (remaining_ns := until - self.now_ns()) > 0:
+            time.sleep(min(remaining_ns, self._longest_ns) * 1e-9 / self.factor)
 
 
 def clock_at(factor: float, longest_step: float = math.inf) -> Clock:

@@ -186,12 +186,12 @@ class ClockRecovery:
             self._held_late = self._lateness(damaged, received_ns)
         self._held_damaged.append(damaged)
         self._held_until_ns = received_ns
-        passed = (received_ns - self._looked_ns) * 1e-9
-        if passed < self._settle:
+        elapsed_s = (received_ns - self._looked_ns) * 1e-9
+        if elapsed_s < self._settle:
             return _NONE
         late, before = self._lateness(np.concatenate(self._held_damaged), received_ns), self._held_late
         self._looked_ns, self._held_late = received_ns, late
-        steady = abs(late - before) < _STEADY * passed
+        steady = abs(late - before) < _STEADY * elapsed_s
         if late < 0.5 * self._limit or steady or received_ns - self._held_since_ns > self._longest * 1e9:
             return self.release()
         return _NONE
@@ -204,10 +204,10 @@ class ClockRecovery:
         self._held_damaged = []
         late = self._lateness(damaged, self._held_until_ns)
         if late > 0.5 * self._limit:
-            missing = round(late / self._period)
-            self._sequence += missing
-            self._time += missing * self._period
-            self.lost += missing
+            gap = round(late / self._period)
+            self._sequence += gap
+            self._time += gap * self._period
+            self.lost += gap
         return self._place(damaged, self._held_until_ns)
 
     def bridge(self, received_ns: int) -> None:
@@ -216,10 +216,10 @@ class ClockRecovery:
             return
         self.watch.begin_anew()
         away = (received_ns - self._zero_ns) * 1e-9 - self._time
-        missing = max(round(away / self._period) - 1, 1)
-        self._sequence += missing
-        self._time += missing * self._period
-        self.lost += missing
+        gap = max(round(away / self._period) - 1, 1)
+        self._sequence += gap
+        self._time += gap * self._period
+        self.lost += gap
 
     def _lateness(self, damaged: Indices, received_ns: int) -> float:
         """Return how much later than at a steady rate the last of these records came [s]."""
@@ -294,9 +294,9 @@ class ScanCount:
         self.watch.begin_anew()
         if self._behind is not None:
             away = self._arrival_minus_time(self._sequence, received_ns) - self._behind
-            missing = max(round(away * self._rate) - 1, 1)
-            self._sequence += missing
-            self.lost += missing
+            gap = max(round(away * self._rate) - 1, 1)
+            self._sequence += gap
+            self.lost += gap
 
     def _arrival_minus_time(self, sequence: int, received_ns: int) -> float:
         return received_ns * 1e-9 - (sequence - 1) / self._rate

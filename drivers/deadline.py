@@ -90,9 +90,9 @@ class _BoundLink:
         until = time.monotonic() + timeout
         while True:
             self.deadline.check()
-            remaining = until - time.monotonic()
-            data = self.link.receive(max(min(remaining, TICK, self.deadline.remaining), 0.0))
-            if data is not None or remaining <= TICK:
+            remaining_s = until - time.monotonic()
+            data = self.link.receive(max(min(remaining_s, TICK, self.deadline.remaining), 0.0))
+            if data is not None or remaining_s <= TICK:
                 return data
 
     def close(self) -> None:

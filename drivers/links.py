@@ -178,10 +178,10 @@ def resolve(host: str, deadline: Deadline) -> str:
         with contextlib.suppress(OSError, UnicodeError):
             hosts.append(socket.gethostbyname(host))
 
-    looking = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
-    looking.start()
-    while looking.is_alive() and (remaining_s := deadline.remaining) > 0.0:
-        looking.join(min(remaining_s, TICK))
+    search = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
+    search.start()
+    while search.is_alive() and (remaining_s := deadline.remaining) > 0.0:
+        search.join(min(remaining_s, TICK))
     if not hosts:
         raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1")
     return hosts[0]

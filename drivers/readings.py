@@ -25,9 +25,9 @@ class ReadingBlock:
         n = len(self.sequence)
         for field in fields(self):
             column = getattr(self, field.name)
-            expected = (n, 6) if field.name == "raw" else (n,)
-            if column.shape != expected:
-                raise ValueError(f"{field.name} has shape {column.shape}, not {expected}")
+            shape = (n, 6) if field.name == "raw" else (n,)
+            if column.shape != shape:
+                raise ValueError(f"{field.name} has shape {column.shape}, not {shape}")
             view = column.view()
             view.flags.writeable = False
             object.__setattr__(self, field.name, view)

@@ -146,8 +146,8 @@ class StreamingTransducer(ThreadedTransducer):
 
     def never_came(self, seconds: float) -> str:
         """Return why no reading came within `seconds`, in a sentence."""
-        broken = self.health.malformed
-        what = f"{broken} broken records and no reading" if broken else "no reading"
+        count = self.health.malformed
+        what = f"{count} broken records and no reading" if count else "no reading"
         return f"{self.info.uri} sent {what} within {seconds:.1f} s; check its power, the cable and the address"
 
     def reset(self) -> None:
@@ -155,12 +155,12 @@ class StreamingTransducer(ThreadedTransducer):
         super().reset()
         self._pending.clear()
         self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
-        self._unpaced: list[_Arrival] = []  # arrivals that the numbering keeps back
+        self._held_back: list[_Arrival] = []  # arrivals that the numbering keeps back
         self._restarted = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()
         self._ever = False  # a record has come
-        self._heard = time.monotonic()  # when the last one did
+        self._last_arrival = time.monotonic()  # when the last one did
 
     def run(self) -> None:
         """Bring the device to stream, take what comes, and bring it back when it is lost."""
@@ -169,7 +169,7 @@ class StreamingTransducer(ThreadedTransducer):
             try:
                 self._stream()
             except (LinkLost, SetupError):
-                silent = time.monotonic() - self._heard
+                silent = time.monotonic() - self._last_arrival
                 if not self._ever or silent > _SILENCE + 4.0 * self._period:
                     raise
                 tries = 0 if silent < 2.0 * _QUIET else tries + 1
@@ -196,25 +196,24 @@ class StreamingTransducer(ThreadedTransducer):
     def _listen(self, link: Link, decoder: RecordDecoder, data: bytes | None) -> None:
         """Decode what comes. A pause of the device is waited out as long as it may be one."""
         quiet = (_QUIET if self._ever else _FIRST) + 4.0 * self._period
-        silence, looked = 0.0, time.monotonic()
+        silence, last_look = 0.0, time.monotonic()
         while True:
             received_ns = self.clock.now_ns()
             records = decoder.feed(data) if data else None
             now = time.monotonic()
-            silence += min(now - looked, TICK + _GATHER)  # beyond that this computer was busy, and records may wait
-            looked = now
+            silence += min(now - last_look, TICK + _GATHER)  # beyond that this computer was busy, and records may wait
+            last_look = now
             if records is not None and len(records.status):
                 self._pending.append(_Arrival(records, received_ns))
-                self._heard, self._ever = now, True
+                self._last_arrival, self._ever = now, True
                 silence, quiet = 0.0, _QUIET + 4.0 * self._period
                 if not self.news.is_set():
                     self.news.set()
             if self.stopping.is_set():
                 return
             if silence > quiet:
-                raise LinkLost(
-                    f"{self.info.uri} has sent no reading for {now - self._heard:.1f} s; check its power and cable"
-                )
+                since = now - self._last_arrival
+                raise LinkLost(f"{self.info.uri} has sent no reading for {since:.1f} s; check its power and cable")
             if self._gather and data and len(data) < _LUMP:
                 time.sleep(self._gather)
             data = link.receive(TICK)
@@ -222,30 +221,30 @@ class StreamingTransducer(ThreadedTransducer):
     def digest(self, *, end: bool = False) -> None:
         """Turn pending records into readings. The lock is held."""
         while self._pending:
-            arrived = self._pending.popleft()
-            if arrived.records is None:
+            arrival = self._pending.popleft()
+            if arrival.records is None:
                 self._hand_on(self._numbering.release())
-                self._numbering.bridge(arrived.received_ns)
+                self._numbering.bridge(arrival.received_ns)
                 self._restarted += 1
             else:
-                self._unpaced.append(arrived)
-                self._hand_on(self._numbering.take(arrived.records.damaged, arrived.received_ns))
+                self._held_back.append(arrival)
+                self._hand_on(self._numbering.take(arrival.records.damaged, arrival.received_ns))
         if end:
             self._hand_on(self._numbering.release())
 
-    def _hand_on(self, paced: Placement) -> None:
+    def _hand_on(self, placement: Placement) -> None:
         """Return a block of all arrivals that the numbering has placed."""
-        if not len(paced.sequence):
+        if not len(placement.sequence):
             return
-        arrivals, self._unpaced = self._unpaced, []
+        arrivals, self._held_back = self._held_back, []
         parts = [(a.records, a.received_ns) for a in arrivals if a.records is not None]
         status = np.concatenate([records.status for records, _ in parts])
         self.hand_over(
             ReadingBlock(
-                sequence=paced.sequence,
-                counter=paced.sequence,
+                sequence=placement.sequence,
+                counter=placement.sequence,
                 status=status,
-                time=paced.time,
+                time=placement.time,
                 received_ns=np.concatenate([np.full(len(records.status), at, np.int64) for records, at in parts]),
                 raw=np.concatenate([records.raw for records, _ in parts]),
             )

@@ -93,10 +93,10 @@ class ThreadedTransducer(ABC):
                 return block
             if not streaming and self.ended is not None:
                 raise LinkLost(str(self.ended))
-            remaining = deadline - time.monotonic()
-            if not streaming or remaining <= 0.0:
+            remaining_s = deadline - time.monotonic()
+            if not streaming or remaining_s <= 0.0:
                 return ReadingBlock.empty()
-            self.news.wait(min(remaining, self.longest_wait))
+            self.news.wait(min(remaining_s, self.longest_wait))
 
     def reset(self) -> None:
         """Forget what an earlier stream left. Raises SetupError while one runs, or has not let go of the device."""

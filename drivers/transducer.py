@@ -107,8 +107,8 @@ def flagged_words(flagged: Mapping[str, int]) -> str:
     >>> flagged_words({"HTTP error": 2, "gauge excitation current too low": 200})
     'gauge excitation current too low (200), HTTP error (2)'
     """
-    ordered = sorted(flagged.items(), key=lambda item: -item[1])
-    return ", ".join(f"{words} ({count})" for words, count in ordered)
+    by_count = sorted(flagged.items(), key=lambda item: -item[1])
+    return ", ".join(f"{words} ({count})" for words, count in by_count)
 
 
 class SetupError(Exception):

@@ -55,11 +55,11 @@ class UsbLink:
 
     def receive(self, timeout: float) -> bytes | None:
         """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
-        awaited = self._awaits_answer
-        endpoint = self._endpoints.answers if awaited else self._endpoints.stream
+        awaits = self._awaits_answer
+        endpoint = self._endpoints.answers if awaits else self._endpoints.stream
         parts: list[bytes] = []
         wait_ms = max(round(timeout * 1000), 1)
-        while len(parts) < (1 if awaited else _PACKETS):
+        while len(parts) < (1 if awaits else _PACKETS):
             try:
                 parts.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
                 self._awaits_answer = False  # only now: who waits in short turns must still find the answer

@@ -24,12 +24,12 @@ def _white_noise(seed: int, times: Array, channels: int = 6) -> Array:
 
     instants = np.rint(times * 1e6).astype(np.int64).astype(np.uint64)
     key = np.random.SeedSequence(seed).generate_state(1, np.uint64)  # an array: scalars would warn on wrapping
-    counted = instants[:, None] * np.uint64(channels) + np.arange(channels, dtype=np.uint64)
-    mixed = key + counted * np.array([0x9E3779B97F4A7C15], np.uint64)
-    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.array([0xBF58476D1CE4E5B9], np.uint64)
-    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.array([0x94D049BB133111EB], np.uint64)
-    mixed ^= mixed >> np.uint64(31)
-    uniform = ((mixed >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+    counter = instants[:, None] * np.uint64(channels) + np.arange(channels, dtype=np.uint64)
+    bits = key + counter * np.array([0x9E3779B97F4A7C15], np.uint64)
+    bits = (bits ^ (bits >> np.uint64(30))) * np.array([0xBF58476D1CE4E5B9], np.uint64)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.array([0x94D049BB133111EB], np.uint64)
+    bits ^= bits >> np.uint64(31)
+    uniform = ((bits >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
     return np.asarray(ndtri(uniform), np.float64)
 
 
@@ -85,7 +85,7 @@ class Bench:
         self.seed = seed
         self.serial = f"SIM{seed:05d}"  # of the transducer, where it has a wire
         self._lock = threading.Lock()
-        self._mounted: Surface | None = None
+        self._surface: Surface | None = None
         # Beginning [s], course and truth of each stroke; in order, never overlapping. Replaced, never changed.
         self._strokes: tuple[tuple[float, Course, StrokeGroundTruth], ...] = ()
         self._rotation = _rotation(*self.settings.tilt)
@@ -99,7 +99,7 @@ class Bench:
     def mount(self, surface: Surface) -> None:
         """Put a stimulus on the transducer; later strokes rub on it."""
         with self._lock:
-            self._mounted = surface
+            self._surface = surface
 
     def begin_stroke(self, stroke: Stroke, at: float) -> StrokeGroundTruth:
         """Let a stroke over the mounted stimulus begin at time `at` [s]; return its ground truth.
@@ -107,7 +107,7 @@ class Bench:
         Raises ValueError when nothing is mounted or the stroke before has not ended by then.
         """
         with self._lock:
-            surface = self._mounted
+            surface = self._surface
             if surface is None:
                 raise ValueError("nothing is mounted on the bench: mount a surface before a stroke begins")
             if self._strokes and at < self._strokes[-1][0] + self._strokes[-1][1].lift:
@@ -127,11 +127,11 @@ class Bench:
         if not len(times):
             return wrench
         first, last = float(np.min(times)), float(np.max(times))
-        for begun, course, _ in reversed(self._strokes):
-            if begun + course.lift < first:
+        for began, course, _ in reversed(self._strokes):
+            if began + course.lift < first:
                 break
-            if begun + course.touch <= last:
-                wrench += _course_wrench(course, times - begun, self.settings.height)
+            if began + course.touch <= last:
+                wrench += _course_wrench(course, times - began, self.settings.height)
         forces, torques = wrench[:, :3], wrench[:, 3:]
         return np.hstack([forces @ self._rotation.T, torques @ self._rotation.T])
 
@@ -142,14 +142,14 @@ class Bench:
         wrench += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
         return wrench + _white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
 
-    def _stroke_ground_truth(self, begun: float, course: Course, surface: Surface) -> StrokeGroundTruth:
+    def _stroke_ground_truth(self, began: float, course: Course, surface: Surface) -> StrokeGroundTruth:
         start, stop = course.steady
         travel = course.position(np.array([start, stop]))
         limit = 3.0 * self.settings.noise_force
-        pressing = np.linspace(course.touch, course.touch + PRESS, 15001)
-        onset = pressing[np.argmax(course.normal_force(pressing) > limit)]
-        releasing = np.linspace(course.lift, course.lift - RELEASE, 12001)
-        lift = releasing[np.argmax(course.normal_force(releasing) > limit)]
+        press_times = np.linspace(course.touch, course.touch + PRESS, 15001)
+        onset = press_times[np.argmax(course.normal_force(press_times) > limit)]
+        release_times = np.linspace(course.lift, course.lift - RELEASE, 12001)
+        lift = release_times[np.argmax(course.normal_force(release_times) > limit)]
         peak = course.stroke.peak_normal_force
         return StrokeGroundTruth(
             surface=surface,
@@ -158,13 +158,13 @@ class Bench:
             peak_normal_force=peak,
             speed=float((travel[1] - travel[0]) / (stop - start)),
             direction=course.stroke.direction,
-            touch=begun + course.touch,
-            onset=begun + float(onset),
-            slip=begun + course.slip,
-            peak=begun + course.peak,
-            steady=(begun + start, begun + stop),
-            lift=begun + float(lift),
-            end=begun + course.lift,
+            touch=began + course.touch,
+            onset=began + float(onset),
+            slip=began + course.slip,
+            peak=began + course.peak,
+            steady=(began + start, began + stop),
+            lift=began + float(lift),
+            end=began + course.lift,
         )
 
 
@@ -280,8 +280,8 @@ class DirectTransducer:
         self._lost += len(numbers) - len(present)
         time = present / _RATE
         start, stop = self._middle(self._frozen_stroke)
-        sampled = np.where((time >= start) & (time < stop), start, time)
-        counts = np.rint(self._bench.wrench(sampled) / _SCALE)
+        sample_times = np.where((time >= start) & (time < stop), start, time)
+        counts = np.rint(self._bench.wrench(sample_times) / _SCALE)
         received = self._began_ns + np.rint(time * 1e9).astype(np.int64)
         return ReadingBlock(present, present, np.zeros_like(present), time, received, counts)
 
@@ -291,9 +291,9 @@ class DirectTransducer:
 
     def _middle(self, number: int) -> tuple[float, float]:
         """Return the middle stretch [s, bench] of a stroke that was begun; nothing of another number."""
-        begun = self._bench.ground_truth()
-        if not 0 < number <= len(begun):
+        truths = self._bench.ground_truth()
+        if not 0 < number <= len(truths):
             return np.inf, np.inf
-        stroke = begun[number - 1]
+        stroke = truths[number - 1]
         first, last = (stroke.slip + part * (stroke.lift - stroke.slip) for part in _MIDDLE)
         return first, last

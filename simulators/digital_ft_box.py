@@ -50,7 +50,7 @@ class DigitalFtBox(LineBox):
         self._rate = _RATE * (1.0 + rate_error)
         self._rated = np.array(bench.settings.rated)
         self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
-        self._stored = self._calibration()
+        self._memory = self._calibration()
         self.power_up(0.0)
         self._deaf_until = 0.0
         self._streaming_since = 0.0 if streaming else None
@@ -75,8 +75,8 @@ class DigitalFtBox(LineBox):
         self.is_on = True
         self._unlocked = False
         self._registers = bytearray(2 * _SIZE)
-        self._registers[2 * _CALIBRATION : 2 * _CALIBRATION + len(self._stored)] = self._stored
-        self._heard = bytearray()
+        self._registers[2 * _CALIBRATION : 2 * _CALIBRATION + len(self._memory)] = self._memory
+        self._inbox = bytearray()
         self._streaming_since: float | None = None
         self._sent = 0  # packets of this stream
         self._jammed_by = 0  # bytes heard while streaming
@@ -87,14 +87,14 @@ class DigitalFtBox(LineBox):
         """Send packets and answer requests; while it streams, whatever is heard jams it."""
         self._send_due(port, now)
         wait = _NAP if self._streaming_since is None else _SHORTEST_NAP
-        heard = port.heard(wait)
+        data = port.receive(wait)
         if self._streaming_since is not None:
-            self._jammed_by += len(heard)
+            self._jammed_by += len(data)
             if self._jammed_by >= _JAM:
                 self._streaming_since = None
                 self._deaf_until = self.now() + _DEAF
         elif self.now() >= self._deaf_until:
-            self._heard += heard
+            self._inbox += data
             port.say(self._answers())
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
@@ -120,16 +120,16 @@ class DigitalFtBox(LineBox):
     def _answers(self) -> bytes:
         """Return the answers to all whole requests heard; what is none is forgotten."""
         answers = b""
-        while len(self._heard) >= 5:
-            function = self._heard[1]
-            long = {0x03: 8, 0x10: 9 + self._heard[6] if len(self._heard) > 6 else 300}.get(function, 5)
-            if len(self._heard) < long:
+        while len(self._inbox) >= 5:
+            function = self._inbox[1]
+            long = {0x03: 8, 0x10: 9 + self._inbox[6] if len(self._inbox) > 6 else 300}.get(function, 5)
+            if len(self._inbox) < long:
                 break
-            frame = bytes(self._heard[:long])
+            frame = bytes(self._inbox[:long])
             if frame[0] != 0x0A or _crc(frame[:-2]) != frame[-2:]:
-                self._heard.clear()
+                self._inbox.clear()
                 break
-            del self._heard[:long]
+            del self._inbox[:long]
             answer = b"\x0a" + self._carry_out(function, frame[2:-2])
             answers += answer + _crc(answer)
         return answers

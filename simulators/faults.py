@@ -55,8 +55,8 @@ class Faults:
         self._seed = seed
         self._repeat = repeat
         self._clock = _device_clock(self._timetable, repeat)
-        self._swapped: bytes | None = None
-        self._delayed: list[tuple[float, bytes]] = []  # when each leaves
+        self._swap: bytes | None = None
+        self._delays: list[tuple[float, bytes]] = []  # when each leaves
 
     def put(self, *timetable: Fault) -> None:
         """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""
@@ -73,7 +73,7 @@ class Faults:
         fault = self._at("status", time)
         return 0 if fault is None else fault.status
 
-    def counting(self, time: float) -> float:
+    def count_factor(self, time: float) -> float:
         """Return how many times as much as at first the box counts to a unit at `time` [s]."""
         fault = self._at("units", time)
         return 1.0 if fault is None else fault.share
@@ -90,14 +90,14 @@ class Faults:
         """Tell of `times` (n,) [s] whether a fault of the box itself is on."""
         return np.array([self.active(kind, time) for time in times.tolist()], np.bool_)
 
-    def due(self, begun: float, now: float, rate: float, previous: int, most: int = 2**31) -> tuple[Array, int]:
-        """Return when (n,) [s] the next records of a stream begun at `begun` [s] were due by `now`, and their number.
+    def due(self, start: float, now: float, rate: float, previous: int, most: int = 2**31) -> tuple[Array, int]:
+        """Return when (n,) [s] the next records of a stream since `start` [s] were due by `now`, and their number.
 
         `previous` records were sent before, and count in that number. The device's own clock gives `rate` records a
         second. Of more than `most` at one go the first are left out: a line would have carried on while the computer
         was busy.
         """
-        since, age = self.device_time(np.array([begun, now])).tolist()
+        since, age = self.device_time(np.array([start, now])).tolist()
         total = max(int((age - since) * rate), previous)
         return self.instants(since + np.arange(max(previous, total - most), total) / rate), total
 
@@ -116,49 +116,49 @@ class Faults:
 
     def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
         """Return what leaves by `now` [s] of `datagrams`, each at its time [s], and of those held back before."""
-        leaving: list[bytes] = []
+        departures: list[bytes] = []
         for time, datagram in datagrams:
-            leaving += self._overdue(time)
+            departures += self._overdue(time)
             hurt = self._hurt(time, datagram)
-            leaving += [] if self.active("unplug", time) else hurt
-        return leaving + self._overdue(now)
+            departures += [] if self.active("unplug", time) else hurt
+        return departures + self._overdue(now)
 
     def _overdue(self, time: float) -> list[bytes]:
-        leaving: list[bytes] = []
-        while self._delayed and self._delayed[0][0] <= time:
-            leaves, datagram = heapq.heappop(self._delayed)
-            leaving += [] if self.active("unplug", leaves) else [datagram]
-        return leaving
+        datagrams: list[bytes] = []
+        while self._delays and self._delays[0][0] <= time:
+            leaves, datagram = heapq.heappop(self._delays)
+            datagrams += [] if self.active("unplug", leaves) else [datagram]
+        return datagrams
 
     def _hurt(self, time: float, datagram: bytes) -> list[bytes]:
         """Return what becomes of one datagram, in the order it leaves."""
-        leaving = [datagram]
+        datagrams = [datagram]
         for kind in _ON_THE_WAY:
             fault = self._at(kind, time)
             if fault is None:
                 continue
             draw = np.random.default_rng([self._seed, round(time * 1e6), FAULT_KINDS.index(kind)])
             if draw.uniform() < fault.share:
-                leaving = self._carry_out(fault, time, datagram, draw)
+                datagrams = self._carry_out(fault, time, datagram, draw)
                 break
-        if leaving and self._swapped is not None:
-            leaving.append(self._swapped)
-            self._swapped = None
-        return leaving
+        if datagrams and self._swap is not None:
+            datagrams.append(self._swap)
+            self._swap = None
+        return datagrams
 
     def _carry_out(self, fault: Fault, time: float, datagram: bytes, draw: np.random.Generator) -> list[bytes]:
         match fault.kind:
             case "repeat":
                 return [datagram, datagram]
-            case "reorder" if self._swapped is None:
-                self._swapped = datagram
+            case "reorder" if self._swap is None:
+                self._swap = datagram
                 return []
             case "corrupt":
                 return [draw.bytes(len(datagram))]
             case "shorten":
                 return [datagram[: int(draw.integers(0, len(datagram)))]]
             case "delay":
-                heapq.heappush(self._delayed, (time + fault.delay, datagram))
+                heapq.heappush(self._delays, (time + fault.delay, datagram))
                 return []
             case "lose":
                 return []

@@ -75,8 +75,8 @@ class LabJackU6Box:
             with self._lock:
                 self._convert()
                 self._send()
-                if self._leaving:
-                    return self._leaving.pop(0)
+                if self._outbox:
+                    return self._outbox.pop(0)
             if time.monotonic() >= deadline or not self.is_plugged:
                 return None
             time.sleep(_NAP)
@@ -86,8 +86,8 @@ class LabJackU6Box:
         self._scan: tuple[list[int], int, float] | None = None  # channels, readings a packet, scans a second
         self._streams = False
         self._buffer: list[int] = []  # codes converted and not sent
-        self._leaving: list[bytes] = []
-        self._missed = 0  # scans thrown away since the buffer was full
+        self._outbox: list[bytes] = []
+        self._lost_scans = 0  # scans thrown away since the buffer was full
         self._report: tuple[int, int] | None = None  # where in the buffer scans are missing, and how many
 
     def _respond(self, request: bytes) -> bytes:
@@ -149,42 +149,42 @@ class LabJackU6Box:
 
     def _begin(self) -> None:
         self._streams = True
-        self._begun = self.now()
+        self._start_time = self.now()
         self._scan_count = 0  # scans converted since
         self._sent = 0  # packets of this stream
-        self._buffer, self._leaving, self._missed, self._report = [], [], 0, None
+        self._buffer, self._outbox, self._lost_scans, self._report = [], [], 0, None
 
     def _convert(self) -> None:
         """Convert what is due. A full buffer throws the newest away until half of it is sent, then says how many."""
         if not self._streams or self._scan is None:
             return
         gauges, _, rate = self._scan
-        times, self._scan_count = self._faults.due(self._begun, self.now(), rate, self._scan_count)
+        times, self._scan_count = self._faults.due(self._start_time, self.now(), rate, self._scan_count)
         room = (_ROOM - len(self._buffer)) // len(gauges)
-        if self._missed and self._report is None and room > _ROOM // len(gauges) // 2:
+        if self._lost_scans and self._report is None and room > _ROOM // len(gauges) // 2:
             # One scan of ones stands for those lost; the guide counts it among them.
-            self._report = (len(self._buffer), self._missed)
+            self._report = (len(self._buffer), self._lost_scans)
             self._buffer += [0xFFFF] * len(gauges)
-            self._missed = 0
-        count = 0 if self._missed else min(len(times), room)
-        self._missed += len(times) - count
+            self._lost_scans = 0
+        count = 0 if self._lost_scans else min(len(times), room)
+        self._lost_scans += len(times) - count
         self._buffer += self._codes(times[:count])[:, gauges].ravel().tolist()
 
     def _send(self) -> None:
         """Pack what fills a packet; while some are missing packets say 59, the one that tells how many says 60."""
-        if self._leaving or self._scan is None or len(self._buffer) < (samples := self._scan[1]):
+        if self._outbox or self._scan is None or len(self._buffer) < (samples := self._scan[1]):
             return
         codes, self._buffer = self._buffer[:samples], self._buffer[samples:]
-        missed, error = 0, 59 if self._missed else 0
+        loss, error = 0, 59 if self._lost_scans else 0
         if self._report is not None:
-            at, missing = self._report
-            self._report = (at - samples, missing) if at >= samples else None
-            missed, error = (0, 59) if at >= samples else (missing, 60)
+            at, reported_loss = self._report
+            self._report = (at - samples, reported_loss) if at >= samples else None
+            loss, error = (0, 59) if at >= samples else (reported_loss, 60)
         error = error or self._faults.status(self.now()) & 0xFF
-        data = missed.to_bytes(4, "little") + bytes([self._sent % 256, error])
+        data = loss.to_bytes(4, "little") + bytes([self._sent % 256, error])
         data += b"".join(code.to_bytes(2, "little") for code in codes) + bytes([min(len(self._buffer) // 4, 255), 0])
         self._sent += 1
-        self._leaving += self._faults.route(self.now(), [(self.now(), _long(0xC0, data, 0xF9))])
+        self._outbox += self._faults.route(self.now(), [(self.now(), _long(0xC0, data, 0xF9))])
 
     def _codes(self, times: Array) -> Indices:
         """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""

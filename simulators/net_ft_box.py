@@ -61,21 +61,21 @@ class NetFtBox(ServedBox):
         first_tick, self._first_record = first
         self._inside = Electronics(bench, self.faults, rate=rate, first_tick=first_tick, product=product)
         kinds = socket.SOCK_DGRAM, socket.SOCK_STREAM, socket.SOCK_STREAM
-        self._wanted = tuple(zip(kinds, ("rdt", "tcp", "http"), ports, strict=True))
+        self._addresses = tuple(zip(kinds, ("rdt", "tcp", "http"), ports, strict=True))
         self._on = True
         self._stream: _Stream | None = None
         self._selector = selectors.SelectSelector()  # the one whose waits are finer than a millisecond
-        self._bound: list[socket.socket] = []
+        self._sockets: list[socket.socket] = []
         self.uri = ""  # the address to open it at; known once it is started
 
     def start(self) -> None:
         """Open the ports and begin to serve. Raises SetupError when a port is in use."""
-        with contextlib.ExitStack() as opened:  # which closes those that are open where one cannot be had
-            self._bound = [opened.enter_context(_open_port(*wanted)) for wanted in self._wanted]
-            opened.pop_all()
-        for bound, serve in zip(self._bound, (self._on_datagram, self._on_caller, self._on_caller), strict=True):
-            self._selector.register(bound, selectors.EVENT_READ, serve)
-        rdt, tcp, http = (bound.getsockname()[1] for bound in self._bound)
+        with contextlib.ExitStack() as stack:  # which closes those that are open where one cannot be had
+            self._sockets = [stack.enter_context(_open_port(*address)) for address in self._addresses]
+            stack.pop_all()
+        for server, serve in zip(self._sockets, (self._on_datagram, self._on_caller, self._on_caller), strict=True):
+            self._selector.register(server, selectors.EVENT_READ, serve)
+        rdt, tcp, http = (server.getsockname()[1] for server in self._sockets)
         self.uri = f"net-ft://{HOST}?rdt={rdt}&tcp={tcp}&http={http}"
         self.serve(self._serve, "net-ft box")
 
@@ -114,7 +114,7 @@ class NetFtBox(ServedBox):
         if on and not self._on:
             self._inside.reboot(now)
             self._stream = None
-            while self._heard() is not None:  # what came while it was off is forgotten too
+            while self._receive() is not None:  # what came while it was off is forgotten too
                 pass
         self._on = on
         return on
@@ -145,13 +145,13 @@ class NetFtBox(ServedBox):
             return False
         for datagram in self.faults.route(now, datagrams):
             with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
-                self._bound[0].sendto(datagram, stream.to)
+                self._sockets[0].sendto(datagram, stream.to)
         return self._stream is not None and count < due
 
-    def _heard(self) -> tuple[bytes, tuple[str, int]] | None:
+    def _receive(self) -> tuple[bytes, tuple[str, int]] | None:
         """Return the next request and who asked, if there is one."""
         try:
-            return self._bound[0].recvfrom(2048)
+            return self._sockets[0].recvfrom(2048)
         except ConnectionError:  # what we sent before was refused: the reader has gone
             return b"", (HOST, 0)
         except BlockingIOError:
@@ -159,7 +159,7 @@ class NetFtBox(ServedBox):
 
     def _on_datagram(self, _: socket.socket) -> None:
         """Carry out one request. Whoever asks for a stream last has it."""
-        request, asker = self._heard() or (b"", (HOST, 0))
+        request, asker = self._receive() or (b"", (HOST, 0))
         if len(request) != 8 or request[:2] != b"\x12\x34":
             return
         command, count = struct.unpack(">HI", request[2:])
@@ -183,17 +183,17 @@ class NetFtBox(ServedBox):
         """Take a connection to the TCP command port or to the web pages."""
         connection, _ = listener.accept()
         connection.setblocking(False)
-        answer = self._answer_page if listener is self._bound[2] else self._answer_commands
+        answer = self._answer_page if listener is self._sockets[2] else self._answer_commands
         self._selector.register(connection, selectors.EVENT_READ, partial(self._on_call, bytearray(), answer))
 
     def _on_call(
-        self, heard: bytearray, answer: Callable[[bytearray], tuple[bytes, bool]], caller: socket.socket
+        self, request: bytearray, answer: Callable[[bytearray], tuple[bytes, bool]], caller: socket.socket
     ) -> None:
         """Answer what a connection has said so far, and hang up when it is done."""
         try:
-            said = caller.recv(4096)
-            heard += said
-            reply, hang_up = answer(heard) if said else (b"", True)
+            data = caller.recv(4096)
+            request += data
+            reply, hang_up = answer(request) if data else (b"", True)
             caller.sendall(reply)
         except (BlockingIOError, ConnectionError):
             hang_up = True
@@ -201,19 +201,19 @@ class NetFtBox(ServedBox):
             self._selector.unregister(caller)
             caller.close()
 
-    def _answer_commands(self, heard: bytearray) -> tuple[bytes, bool]:
+    def _answer_commands(self, request: bytearray) -> tuple[bytes, bool]:
         """Return the replies to all whole commands, which are 20 bytes each; the connection stays."""
         replies = b""
-        while len(heard) >= 20:
-            replies += self._inside.tcp_reply(bytes(heard[:20]), self.now())
-            del heard[:20]
+        while len(request) >= 20:
+            replies += self._inside.tcp_reply(bytes(request[:20]), self.now())
+            del request[:20]
         return replies, False
 
-    def _answer_page(self, heard: bytearray) -> tuple[bytes, bool]:
+    def _answer_page(self, request: bytearray) -> tuple[bytes, bool]:
         """Return the page asked for, once the request is whole."""
-        if b"\r\n\r\n" not in heard:
-            return b"", len(heard) > 8192
-        return self._inside.http_reply(bytes(heard), self.now()), True
+        if b"\r\n\r\n" not in request:
+            return b"", len(request) > 8192
+        return self._inside.http_reply(bytes(request), self.now()), True
 
 
 def _open_port(kind: socket.SocketKind, option: str, port: int | None) -> socket.socket:
@@ -222,22 +222,22 @@ def _open_port(kind: socket.SocketKind, option: str, port: int | None) -> socket
         with contextlib.suppress(SetupError):
             return _open_port(kind, option, 80)
         port = 0
-    bound = socket.socket(socket.AF_INET, kind)
+    server = socket.socket(socket.AF_INET, kind)
     try:
         if kind == socket.SOCK_STREAM and os.name == "posix":  # there it lets a port be had again soon after its end
-            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        bound.bind((HOST, port))
+            server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        server.bind((HOST, port))
         if kind == socket.SOCK_STREAM:
-            bound.listen()
+            server.listen()
     except OSError as error:
-        bound.close()
+        server.close()
         name = "UDP" if kind == socket.SOCK_DGRAM else "TCP"
         raise SetupError(
             f"{name} port {port} on {HOST} cannot be opened ({(error.strerror or 'refused').lower()}); "
             f"end the program that holds it, or choose another {option} port"
         ) from None
-    bound.setblocking(False)
-    return bound
+    server.setblocking(False)
+    return server
 
 
 _ERROR = 1 << 31  # set beside any other bit

@@ -62,7 +62,7 @@ class Pages:
         self._rated = rated  # (6,) [N, N mm]
         self._values = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
         self._bias = [0] * 6
-        self.counting = 1.0  # times as many counts to a unit as usual
+        self.count_factor = 1.0  # times as many counts to a unit as usual
         self.force_code = 2
         self.torque_code = 3
         self.buffered = 10  # records in a datagram of buffered streaming
@@ -83,7 +83,7 @@ class Pages:
     @property
     def counts(self) -> int:
         """Counts in one unit."""
-        return max(round(_COUNTS * self.counting), 1)
+        return max(round(_COUNTS * self.count_factor), 1)
 
     def answer(self, target: str, status: int, counts: list[int]) -> tuple[int, str]:
         """Return (HTTP status, page) for a GET of `target`, with the box's status and counts of this instant."""
@@ -200,22 +200,22 @@ class Electronics:
         self.pages = Pages(bench.serial, self._rated, rate, product)
         self._ticks_a_second = product.ticks * (1.0 + rate_error)
         self._bias = np.zeros(6)  # software bias [N, N mm]
-        self._powered = 0.0  # when the counter stood at _first_tick [s]
+        self._power_up = 0.0  # when the counter stood at _first_tick [s]
         self._first_tick = first_tick
         self._last = bytes(32)  # the last reading streamed: a stalled converter gives it again
 
     def reboot(self, now: float) -> None:
         """Forget what is not kept over power-off."""
-        self._powered, self._first_tick = now, 0
+        self._power_up, self._first_tick = now, 0
         self._bias = np.zeros(6)
 
     def tick(self, time: float) -> int:
         """Return the counter at `time`."""
-        return self._first_tick + int((self._age(time) - self._age(self._powered)) * self._ticks_a_second)
+        return self._first_tick + int((self._age(time) - self._age(self._power_up)) * self._ticks_a_second)
 
     def time(self, tick: int) -> float:
         """Return when the counter reaches `tick`."""
-        age = self._age(self._powered) + (tick - self._first_tick) / self._ticks_a_second
+        age = self._age(self._power_up) + (tick - self._first_tick) / self._ticks_a_second
         return float(self._faults.instants(np.array([age]))[0])
 
     def _age(self, time: float) -> float:
@@ -225,15 +225,15 @@ class Electronics:
         """Return counter, status and six counts, packed, at each of `ticks`."""
         if not ticks:
             return []
-        ages = self._age(self._powered) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
+        ages = self._age(self._power_up) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
         times = self._faults.instants(ages)
         status, counts = self._status_and_counts(times)
-        packed: list[bytes] = []
+        records: list[bytes] = []
         for tick, time, word, six in zip(ticks, times.tolist(), status, counts.tolist(), strict=True):
             if not self._faults.active("stall", time):
                 self._last = struct.pack(">II6i", tick % 2**32, word, *six)
-            packed.append(self._last)
-        return packed
+            records.append(self._last)
+        return records
 
     def set_bias(self, now: float) -> None:
         """Let the present load read as zero."""
@@ -241,7 +241,7 @@ class Electronics:
 
     def tcp_reply(self, request: bytes, now: float) -> bytes:
         """Return the reply to the 20 bytes of a TCP request; none to a command that is not simulated."""
-        self.pages.counting = self._faults.counting(now)
+        self.pages.count_factor = self._faults.count_factor(now)
         if request[0] == 0:  # READFT: counts in 16 bits, and system commands in the last two bytes
             if request[19] & 1:
                 self.set_bias(now)
@@ -259,7 +259,7 @@ class Electronics:
         target = words[1] if len(words) == 3 and words[0] == "GET" else "/"
         if target.startswith("/rundata.cgi") and "cmd=bias" in target:
             self.set_bias(now)
-        self.pages.counting = self._faults.counting(now)
+        self.pages.count_factor = self._faults.count_factor(now)
         status, counts = self._status_and_counts(np.array([now]))
         code, page = self.pages.answer(target, status[0], counts[0].tolist())
         body = page.encode()
@@ -269,11 +269,11 @@ class Electronics:
     def _status_and_counts(self, times: Array) -> tuple[list[int], Indices]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
         wrench = self._faults.sensed_wrench(self._bench, times)
-        forced = self._faults.during("saturate", times)
-        wrench[forced] = self._rated  # what a clipped converter shows
-        over = forced | np.any(np.abs(wrench) > self._rated, axis=1)
+        saturation = self._faults.during("saturate", times)
+        wrench[saturation] = self._rated  # what a clipped converter shows
+        over = saturation | np.any(np.abs(wrench) > self._rated, axis=1)
         counts = (np.clip(wrench, -self._rated, self._rated) - self._bias) * self.pages.counts_per_wrench
-        counts *= np.array([self._faults.counting(time) for time in times.tolist()])[:, None]
+        counts *= np.array([self._faults.count_factor(time) for time in times.tolist()])[:, None]
         whole = np.clip(np.rint(counts), -(2**31), 2**31 - 1).astype(np.int64)
         saturated = self.pages.product.saturated
         flags = zip(over.tolist(), times.tolist(), strict=True)

@@ -43,8 +43,8 @@ class SimulatedNidaqmx(ModuleType):
         self.bench = bench
         self.faults = faults or Faults()
         self.gauges = np.linalg.inv(FT32831)  # V for one N or N mm
-        self.open = 0  # tasks not closed
-        self.begun: list[float] = []  # when acquisitions began [s]
+        self.open_tasks = 0
+        self.starts: list[float] = []  # when acquisitions began [s]
         self.range = (-10.0, 10.0)  # that the device takes, whatever is asked [V]
         self.requests: list[tuple[Any, ...]] = []  # channels, terminals and limits
         self._clock = clock
@@ -78,10 +78,10 @@ class SimulatedNidaqmx(ModuleType):
 class _Task:
     def __init__(self, library: SimulatedNidaqmx) -> None:
         self._library = library
-        self._begun: float | None = None
+        self._start_time: float | None = None
         self._delivered = 0
         self._last = np.zeros(6)
-        library.open += 1
+        library.open_tasks += 1
         self.ai_channels = SimpleNamespace(add_ai_voltage_chan=self._channels)
         self.timing = SimpleNamespace(cfg_samp_clk_timing=self._timing, samp_clk_rate=0.0)
 
@@ -96,22 +96,22 @@ class _Task:
 
     def start(self) -> None:
         self._refuse_without_device()
-        self._begun, self._delivered = self._library.now(), 0
-        self._library.begun.append(self._begun)
+        self._start_time, self._delivered = self._library.now(), 0
+        self._library.starts.append(self._start_time)
 
     def stop(self) -> None:
-        self._begun = None
+        self._start_time = None
 
     def close(self) -> None:
-        self._library.open -= 1
+        self._library.open_tasks -= 1
 
     def read(self, number_of_samples_per_channel: int) -> list[list[float]]:
         assert number_of_samples_per_channel == -1
         self._refuse_without_device()
         library, faults = self._library, self._library.faults
-        if self._begun is None or faults.active("lose", library.now()):
+        if self._start_time is None or faults.active("lose", library.now()):
             raise DaqError(OVERFLOW)
-        times, self._delivered = faults.due(self._begun, library.now(), self.timing.samp_clk_rate, self._delivered)
+        times, self._delivered = faults.due(self._start_time, library.now(), self.timing.samp_clk_rate, self._delivered)
         volts = faults.sensed_wrench(library.bench, times) @ library.gauges.T
         for time, six in zip(times.tolist(), volts, strict=True):
             if faults.active("stall", time):
@@ -130,7 +130,7 @@ def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> RunningS
     library = SimulatedNidaqmx(bench, clock, faults)
     library.install()
     uri = f"nidaq://Dev1?cal={calibration_file(folder, bench.serial)}"
-    return RunningSimulator(uri, bench, library.now, unplug(faults), lambda: library.open, library.remove)
+    return RunningSimulator(uri, bench, library.now, unplug(faults), lambda: library.open_tasks, library.remove)
 
 
 SIMULATOR = Simulator(

@@ -22,7 +22,7 @@ _NAP = 0.01  # longest wait, and so for an end [real s]
 _SHORTEST_NAP = 0.0005
 _BURST = 400  # records at one go after the computer was busy
 _START_UP = 0.2  # from power to prompt [s]
-_TAKEN = (b"SA", b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
+_COMMANDS = (b"SA", b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
 
 
 class SerialFtBox(LineBox):
@@ -67,7 +67,7 @@ class SerialFtBox(LineBox):
             self._ready_at = None
             self._say(port, BANNER % self._bench.serial.encode() + b">")
         self._send_due(port, now)
-        for byte in port.heard(self._until_due()):
+        for byte in port.receive(self._until_due()):
             if self._ready_at is None:
                 self._on_byte(port, byte if port.baud == self._baud else byte ^ 0x55)
 
@@ -132,7 +132,7 @@ class SerialFtBox(LineBox):
             self._biases = []
         elif name == b"SA" and argument != b"0":
             return b"not simulated\r\n>"
-        elif name and name not in _TAKEN:
+        elif name and name not in _COMMANDS:
             return b"not a command\r\n>"
         return b"\r\n>"
 
@@ -144,7 +144,7 @@ class SerialFtBox(LineBox):
         if not len(times):
             return []
         wrench = self.faults.sensed_wrench(self._bench, times)
-        packed: list[bytes] = []
+        records: list[bytes] = []
         over = np.any(np.abs(wrench) > self._rated, axis=1)
         bias = self._biases[-1] if self._biases else np.zeros(6)
         counts = np.rint((np.clip(wrench, -self._rated, self._rated) - bias) * self._counts)
@@ -154,10 +154,10 @@ class SerialFtBox(LineBox):
                 self._last = (self.faults.status(time) or int(above or self.faults.active("saturate", time)), six)
             error, values = self._last
             if self._binary:
-                packed.append(struct.pack(">B6h", error, *values))
+                records.append(struct.pack(">B6h", error, *values))
             else:
-                packed.append((f"{error}" + "".join(f",{value:6d}" for value in values) + "\r\n").encode())
-        return packed
+                records.append((f"{error}" + "".join(f",{value:6d}" for value in values) + "\r\n").encode())
+        return records
 
 
 SIMULATOR = Simulator(

@@ -59,18 +59,18 @@ class ScriptedBench(Bench):
         super().__init__(seed, settings)
         self._timetable = timetable
         self._subject = SimulatedSubject(seed)
-        self._begun = 0  # strokes so far
+        self._stroke_count = 0  # so far
 
     def wrench(self, times: Array) -> Array:
         """Return what the transducer feels (n, 6) at `times` (n,) [s], after beginning the strokes due by then."""
         strokes = self._timetable.strokes
         while len(times) and strokes:
-            cycle, position = divmod(self._begun, len(strokes))
+            cycle, position = divmod(self._stroke_count, len(strokes))
             at, surface = strokes[position]
             at += cycle * self._timetable.repeat
             if at > times[-1] or (cycle > 0 and self._timetable.repeat == 0.0):
                 break
-            self._begun += 1
+            self._stroke_count += 1
             if at + APART < times[0]:  # nobody asked in its time
                 continue
             self.mount(surface)

@@ -72,7 +72,7 @@ class PseudoTerminal:
         self._ours = self._theirs = -1
         self._buffer.clear()
 
-    def heard(self, timeout: float) -> bytes:
+    def receive(self, timeout: float) -> bytes:
         """Return what the other side has sent, waiting up to `timeout` real seconds for it."""
         self._obey()
         self._flush()
@@ -185,7 +185,7 @@ class LineBox(ServedBox):
             port.plug_in()
             if self.faults.active("reboot", now):
                 self.is_on = False
-                port.heard(_NAP)
+                port.receive(_NAP)
                 continue
             if not self.is_on:
                 self.power_up(now)

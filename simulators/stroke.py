@@ -155,8 +155,8 @@ class Course:
         wander = 0.6 * np.sin(2 * np.pi * 0.9 * since + first) + 0.4 * np.sin(2 * np.pi * 2.3 * since + second)
         away = 1.0 - np.exp(-0.5 * ((time - self.peak) / stroke.peak_width) ** 2)
         level = 1.0 - away * (stroke.sag + stroke.wander * wander)
-        pressed = minimum_jerk(since / PRESS) * (1.0 - minimum_jerk((time - self.lift + RELEASE) / RELEASE))
-        return stroke.peak_normal_force * level * pressed
+        press = minimum_jerk(since / PRESS) * (1.0 - minimum_jerk((time - self.lift + RELEASE) / RELEASE))
+        return stroke.peak_normal_force * level * press
 
     def ratio(self, time: Array) -> Array:
         """Return T/N (n,) [-]: a straight climb from touch to slip where the surface holds, then mu."""
@@ -173,9 +173,9 @@ class Course:
         sliding = np.maximum(time - self.slip, 0.0)
         rate = 2 * np.pi * 1.3  # of the wandering [rad/s]
         sway = stroke.speed * stroke.speed_wander / rate * np.sin(rate * sliding + stroke.phases[2])
-        travelled = stroke.speed * _jerk_integral(sliding, SPEED_UP) + sway * minimum_jerk(sliding / 0.3)
-        rolled = ROLL * self.ratio(time) / self.mu if self.holds else 0.0
-        return travelled + rolled - 0.5 * stroke.speed * stroke.slide
+        travel = stroke.speed * _jerk_integral(sliding, SPEED_UP) + sway * minimum_jerk(sliding / 0.3)
+        roll = ROLL * self.ratio(time) / self.mu if self.holds else 0.0
+        return travel + roll - 0.5 * stroke.speed * stroke.slide
 
 
 def minimum_jerk(phase: Array) -> Array:

@@ -76,8 +76,8 @@ class SimulatedSubject:
         """Return what `score` would be without the noise of a single judgement and without an end of the line."""
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
-        rubbing = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
-        judgement = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
+        friction_score = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
+        judgement = friction_score if surface.descriptor == "stickiness" else 100.0 - friction_score
         target = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * judgement
         carry_over = 0.0 if before is None else settings.carry_over * (before - 50)
         return 50.0 + self._gain * (target - 50.0) + self._offset + settings.drift * place + carry_over

@@ -76,13 +76,13 @@ def _read_calibration(place: _Where, link: Link) -> wire.StoredCalibration:
         raise SetupError(f"{place.address.uri}: calibration {place.number} {error}") from None
 
 
-def _info(place: _Where, stored: wire.StoredCalibration, status: int | None, measured: float) -> TransducerInfo:
-    as_stated = math.isnan(measured) or abs(measured / wire.STREAM_RATE - 1.0) < _AS_STATED
-    day = stored.calibrated or "on a day not stated"
+def _info(place: _Where, calibration: wire.StoredCalibration, status: int | None, rate: float) -> TransducerInfo:
+    as_stated = math.isnan(rate) or abs(rate / wire.STREAM_RATE - 1.0) < _AS_STATED
+    day = calibration.calibrated or "on a day not stated"
     settings = {
         "line": f"{place.baud} baud, 8 data bits, parity {place.parity}, 1 stop bit",
-        "calibration": f"number {place.number}, {stored.part_number}, calibrated {day}",
-        "gauge gains and offsets": stored.gains_and_offsets.hex(" ", 2),
+        "calibration": f"number {place.number}, {calibration.part_number}, calibrated {day}",
+        "gauge gains and offsets": calibration.gains_and_offsets.hex(" ", 2),
         "bias": "none in the transducer",
         "filter": "none",
         "time": "host arrival at the stated rate; packets carry no clock or number, "
@@ -90,18 +90,18 @@ def _info(place: _Where, stored: wire.StoredCalibration, status: int | None, mea
     }
     if status is not None:
         settings["status at opening"] = "; ".join(wire.status_words(status)) or "healthy"
-    if not math.isnan(measured):
+    if not math.isnan(rate):
         how = "as stated by the maker to 0.5 %" if as_stated else "as measured, not as stated by the maker"
-        settings["rate"] = f"{how}; {measured:.0f} Hz measured at opening"
+        settings["rate"] = f"{how}; {rate:.0f} Hz measured at opening"
     return TransducerInfo(
         uri=place.address.uri,
         driver="digital-ft",
-        model=f"Digital F/T {stored.part_number}".strip(),
-        serial=stored.calibration.serial,
-        simulated="SIMULATED" in stored.part_number.upper(),
-        rate=wire.STREAM_RATE if as_stated else measured,
+        model=f"Digital F/T {calibration.part_number}".strip(),
+        serial=calibration.calibration.serial,
+        simulated="SIMULATED" in calibration.part_number.upper(),
+        rate=wire.STREAM_RATE if as_stated else rate,
         counter_rate=math.nan,
-        calibration=stored.calibration,
+        calibration=calibration.calibration,
         settings=settings,
         status=wire.STATUS_BITS,
     )
@@ -139,22 +139,22 @@ class _DigitalConversation:
         first = wire.calibration_address(self.number)
         stored = read(link, first, wire.CALIBRATION_SIZE)
         serial = stored[:8].split(b"\0")[0].decode("ascii", "replace").strip()
-        expected = self.stored.calibration.serial
-        if serial != expected:
-            raise DeviceFault(f"transducer {serial or 'without a name'} answers where {expected} was; open it anew")
-        wanted = self.stored.gains_and_offsets
+        own_serial = self.stored.calibration.serial
+        if serial != own_serial:
+            raise DeviceFault(f"transducer {serial or 'without a name'} answers where {own_serial} was; open it anew")
+        gains_and_offsets = self.stored.gains_and_offsets
         _carry_out(link, wire.request(wire.UNLOCK, bytes([wire.UNLOCK_KEY])), "to be unlocked")
-        _carry_out(link, wire.write_registers(wire.GAINS_AND_OFFSETS, wanted), "its gains and offsets")
+        _carry_out(link, wire.write_registers(wire.GAINS_AND_OFFSETS, gains_and_offsets), "its gains and offsets")
         _carry_out(link, wire.request(wire.UNLOCK, bytes([wire.LOCK_KEY])), "to be locked")
-        if read(link, wire.GAINS_AND_OFFSETS, len(wanted) // 2) != wanted:
+        if read(link, wire.GAINS_AND_OFFSETS, len(gains_and_offsets) // 2) != gains_and_offsets:
             raise DeviceFault(
                 "the transducer did not take the gains and offsets of its calibration; switch it off and on"
             )
-        start, started = (wire.request(wire.START_STREAM, bytes([key])) for key in (wire.START_KEY, 1))
-        response = _response(link, start, started, _PATIENCE[-1] * _ANSWER)
-        if started not in response:
+        start, reply = (wire.request(wire.START_STREAM, bytes([key])) for key in (wire.START_KEY, 1))
+        response = _response(link, start, reply, _PATIENCE[-1] * _ANSWER)
+        if reply not in response:
             raise LinkLost("the transducer does not begin to stream; switch it off and on")
-        return response.partition(started)[2]
+        return response.partition(reply)[2]
 
     def end(self, link: Link) -> None:
         link.send(wire.JAM)

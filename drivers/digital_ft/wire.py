@@ -186,20 +186,20 @@ class StreamDecoder:
         self._buffer += data
         batches: list[NDArray[np.uint8]] = []
         damaged: list[Indices] = []
-        while (count := len(self._buffer) // PACKET_SIZE) >= (needed := 2 if self._in_step else _PROOF):
+        while (count := len(self._buffer) // PACKET_SIZE) >= (least := 2 if self._in_step else _PROOF):
             packets = np.frombuffer(self._buffer, np.uint8, count * PACKET_SIZE).reshape(count, PACKET_SIZE)
             sound = _sound(packets)
             good = count if sound.all() else int(np.argmin(sound))
-            if good < needed:
+            if good < least:
                 self._in_step = False
                 self._skip()
                 continue
             first = 1 if self._skipped else 0  # the one behind a break may be pieced together from two
-            broken = -(-self._skipped // PACKET_SIZE) + first
-            self.malformed += broken
+            loss = -(-self._skipped // PACKET_SIZE) + first
+            self.malformed += loss
             self._skipped = 0
             batches.append(packets[first : good - 1])
-            damaged.append(np.concatenate([[broken], np.zeros(good - 2 - first, np.int64)]))
+            damaged.append(np.concatenate([[loss], np.zeros(good - 2 - first, np.int64)]))
             self._buffer = self._buffer[(good - 1) * PACKET_SIZE :]
             self._in_step = True
         return _records(batches, damaged, self._flagged)

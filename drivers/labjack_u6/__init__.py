@@ -63,31 +63,31 @@ def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
 
 def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
     """Open the converter that the address names, and return its link and identity."""
-    fitting: dict[int, tuple[Any, wire.Identity]] = {}
-    refused: list[SetupError] = []
+    matches: dict[int, tuple[Any, wire.Identity]] = {}
+    refusals: list[SetupError] = []
     for one in devices(_VENDOR, _PRODUCT):
         try:
             link = UsbLink(one, _ENDPOINTS, place.uri)
         except SetupError as error:
-            refused.append(error)
+            refusals.append(error)
             continue
         try:
             identity = _identity(deadline.bound(link))
         except (LinkLost, DeviceFault) as error:
-            refused.append(SetupError(f"{place.uri}: {error}"))
+            refusals.append(SetupError(f"{place.uri}: {error}"))
             continue
         finally:
             link.close()
         if place.serial in (0, identity.serial):
-            fitting[identity.serial] = one, identity
-    if len(fitting) > 1:
-        raise SetupError(f"{place.uri}: several are plugged in; add serial= one of {', '.join(map(str, fitting))}")
-    if not fitting:
-        if refused:
-            raise refused[0]
+            matches[identity.serial] = one, identity
+    if len(matches) > 1:
+        raise SetupError(f"{place.uri}: several are plugged in; add serial= one of {', '.join(map(str, matches))}")
+    if not matches:
+        if refusals:
+            raise refusals[0]
         which = f"LabJack U6 {place.serial}" if place.serial else "LabJack U6"
         raise LinkLost(f"{place.uri}: no {which} is plugged in; check its USB cable")
-    ((one, identity),) = fitting.values()
+    ((one, identity),) = matches.values()
     return UsbLink(one, _ENDPOINTS, place.uri), identity
 
 

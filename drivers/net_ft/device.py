@@ -83,11 +83,11 @@ class _SettingsWatch:
         while not self._over.is_set():
             self._look.clear()
             try:
-                answered = self.is_the_same()
+                same = self.is_the_same()
             except Exception as fault:  # noqa: BLE001 - units that are watched no more must not look confirmed
                 self.fault = fault
                 return
-            self._look.wait(_EVERY if answered else _AGAIN)
+            self._look.wait(_EVERY if same else _AGAIN)
 
 
 def _units(info: TransducerInfo) -> str:
@@ -241,17 +241,17 @@ class NetFtTransducer(ThreadedTransducer):
         """Turn pending datagrams into accounted readings. The lock is held."""
         if not self._pending and not (end and self._held_back):
             return
-        arrived = self._held_back
+        datagrams = self._held_back
         while self._pending:
-            arrived.append(self._pending.popleft())
-        decoded = decode([datagram for datagram, _ in arrived])
-        self._wrong_length += decoded.malformed
-        origin: list[int] = decoded.origin.tolist()
-        received_ns = [arrived[i][1] for i in origin]
-        records = decoded.records
+            datagrams.append(self._pending.popleft())
+        batch = decode([datagram for datagram, _ in datagrams])
+        self._wrong_length += batch.malformed
+        origin: list[int] = batch.origin.tolist()
+        received_ns = [datagrams[i][1] for i in origin]
+        records = batch.records
         numbers, counters = records["number"].astype(np.uint32), records["counter"].astype(np.uint32)
         verdict = self._account.take(numbers, counters, received_ns, end=end)
-        self._held_back = [arrived[origin[-1]]] if verdict.undecided else []
+        self._held_back = [datagrams[origin[-1]]] if verdict.undecided else []
         if not len(verdict.positions):
             return
         if self._zero is None:

@@ -47,7 +47,7 @@ def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> Stream
     place = _where(address)
     conversation = _ControllerConversation(binary=place.binary)
     with at(address):
-        link, baud = _answering(place, deadline)
+        link, baud = _find_controller(place, deadline)
         with contextlib.closing(link):
             reply = banner(deadline.bound(link))
             rate = measured_rate(link, conversation, clock, _MEASURED, deadline)
@@ -59,21 +59,21 @@ def identify_serial_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing no setting (a stream nobody reads is ended)."""
     place = _where(address)
     with at(address):
-        link, baud = _answering(place, deadline)
+        link, baud = _find_controller(place, deadline)
     link.close()
     return _info(place, baud, "", math.nan)
 
 
-def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
+def _find_controller(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
     """Return an open line on which a controller answers, and its baud rate."""
-    tried: list[int] = []
+    bauds: list[int] = []
     for baud in place.bauds:
         if deadline.remaining <= 0.0:
             break
-        tried.append(baud)
+        bauds.append(baud)
         link = SerialLink(place.port, baud)
         try:
-            if prompted(deadline.bound(link), tries=2):
+            if has_prompt(deadline.bound(link), tries=2):
                 return link, baud
         except LinkLost:
             if deadline.remaining > 0.0:
@@ -83,7 +83,7 @@ def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
             link.close()
             raise
         link.close()
-    rates = ", ".join(map(str, tried))
+    rates = ", ".join(map(str, bauds))
     raise LinkLost(f"no controller answers (tried {rates} baud); check its power, the cable and the baud rate")
 
 
@@ -152,7 +152,7 @@ class _ControllerConversation:
 
     def begin(self, link: Link) -> bytes:
         """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""
-        if not prompted(link):
+        if not has_prompt(link):
             raise LinkLost("the controller gives no prompt; check its power, the cable and the baud rate")
         output = wire.BINARY_OUTPUT if self.binary else wire.ASCII_OUTPUT
         for command in (output, *wire.SETTINGS):
@@ -167,7 +167,7 @@ class _ControllerConversation:
                 f"the controller answers, but not with a record of six axes in {form} output; "
                 "check that a transducer is connected to it, and try the other format"
             )
-        return self._streaming(link)
+        return self._start_stream(link)
 
     def end(self, link: Link) -> None:
         """Let the stream end: any carriage return does it."""
@@ -180,7 +180,7 @@ class _ControllerConversation:
                 break
             response = data or response
 
-    def _streaming(self, link: Link) -> bytes:
+    def _start_stream(self, link: Link) -> bytes:
         """Ask for the stream, and return what follows the echo of the request."""
         link.send(wire.STREAM + wire.RETURN)
         response = b""
@@ -194,7 +194,7 @@ class _ControllerConversation:
         raise LinkLost("the controller does not begin to stream; switch it off and on")
 
 
-def prompted(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
+def has_prompt(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
     """Tell whether a controller answers with its prompt; a stream it was sending ends by this."""
     return any(_reply(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
 

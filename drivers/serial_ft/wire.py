@@ -125,12 +125,12 @@ class BinaryDecoder:
                 continue
             self._doubt = max(self._doubt - 1, 0)
             self._last = values
-            broken = -(-self._skipped // BINARY_SIZE)
-            self.malformed += broken
+            loss = -(-self._skipped // BINARY_SIZE)
+            self.malformed += loss
             self._skipped = 0
             records.append(tuple(values.tolist()))
             status.append(int(record["error"][0]))
-            damaged.append(broken)
+            damaged.append(loss)
             self._at += BINARY_SIZE
         del self._buffer[: self._at]
         return Records.of(records, status, damaged)
@@ -182,8 +182,8 @@ def _best_shift(gains: list[float]) -> int:
         return gains[at] + value[at + BINARY_SIZE] < after[at] - _BREAK
 
     if not breaks(0):
-        torn = next((at for at in range(BINARY_SIZE, size, BINARY_SIZE) if breaks(at)), size)
-        doubtful = torn == BINARY_SIZE or (torn < size and gains[0] < _gain(_AWAY))
+        end = next((at for at in range(BINARY_SIZE, size, BINARY_SIZE) if breaks(at)), size)
+        doubtful = end == BINARY_SIZE or (end < size and gains[0] < _gain(_AWAY))
         return BINARY_SIZE if doubtful else 0
     shift = 1
     while shift < BINARY_SIZE and gains[shift] + value[shift + BINARY_SIZE] < after[shift - 1]:

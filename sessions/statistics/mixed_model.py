@@ -320,8 +320,8 @@ def spreads(
     if x is not None:
         along = np.array(x, np.float64)[usable]
         lines = np.hstack([who, who * (along - along.mean())[:, None]])
-    shared = np.array(common, np.float64).reshape(len(common), len(y))[:, usable].T
-    design = np.hstack([lines, shared])
+    covariates = np.array(common, np.float64).reshape(len(common), len(y))[:, usable].T
+    design = np.hstack([lines, covariates])
     scale = np.abs(design).max(axis=0)
     if not scale.all():
         return None

@@ -115,9 +115,9 @@ def trial_paths(
         if path.receptor == RECEPTORS[0]:
             kind = replace(steady, kinematics=path.kinematics)
             scenes[path] = scenes_of(_analysis_of_path(analyses, path, usual), recording.plan, kind)
-    wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
+    targets = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
     predictions = [row.prediction for row in prediction.trials if row.prediction is not None]
-    answers = _solve_scenes(tuple(wanted), predictions, quantity, progress)
+    answers = _solve_scenes(tuple(targets), predictions, quantity, progress)
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
 
     def value(trial: int, path: Path) -> float | None:
@@ -167,15 +167,15 @@ def _solve_scenes(
     Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
     friction, which is solved; where that fails they are solved themselves.
     """
-    ordered = sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf))
-    alike = by_key((_kind(scene), scene) for scene in ordered)
+    by_friction = sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf))
+    alike = by_key((_kind(scene), scene) for scene in by_friction)
     first = {kind: group[0] for kind, group in alike.items()}
-    solved = {kind: one for one in predictions if (kind := _kind(one.scene)) in first}
-    new = [kind for kind in first if kind not in solved]
+    solutions = {kind: one for one in predictions if (kind := _kind(one.scene)) in first}
+    new = [kind for kind in first if kind not in solutions]
     answers = settled_predictions([first[kind] for kind in new], part_of(progress, 0.0, 0.5))
-    solved |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
+    solutions |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
     pairs: dict[Scene, Pair | None] = {}
-    for kind, slide in zip(solved, slides(list(solved.values()), part_of(progress, 0.5, 0.7)), strict=True):
+    for kind, slide in zip(solutions, slides(list(solutions.values()), part_of(progress, 0.5, 0.7)), strict=True):
         pairs |= _near(slide, alike[kind], quantity)
     rest = [scene for scene in scenes if scene not in pairs]
     answers = [answer for answer in settled_predictions(rest, part_of(progress, 0.7, 0.9)) if answer is not None]
@@ -237,8 +237,8 @@ def path_findings(
 
 
 def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: bool, within: bool) -> PathFinding:
-    predicted = [(trial, value) for trial in trials if (value := trial.values[number]) is not None]
-    points = [(trial, value, trial.score) for trial, value in predicted if trial.score is not None]
+    with_value = [(trial, value) for trial in trials if (value := trial.values[number]) is not None]
+    points = [(trial, value, trial.score) for trial, value in with_value if trial.score is not None]
     pairs = [(trial.subject, value, score) for trial, value, score in points]
     values = surface_means([(trial.subject, trial.index, value) for trial, value, _ in points]) or {}
     scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
@@ -247,8 +247,8 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
     return PathFinding(
         path=path,
         usual=usual,
-        surfaces=len({trial.index for trial, _ in predicted}),
-        trials=len(predicted),
+        surfaces=len({trial.index for trial, _ in with_value}),
+        trials=len(with_value),
         r=pearson(list(values.values()), list(scores.values())),
         within=None if inner is None else inner.r,
         low=low,

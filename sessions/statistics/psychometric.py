@@ -132,8 +132,8 @@ class _Task:
         # Root of what the adjusted log likelihood falls by at an end.
         self.drop = math.sqrt(free / 2.0 * math.log1p(float(special.fdtri(1, free, CONFIDENCE)) / free))
         self.best, self.likelihood = self._search()
-        scattered = np.append(self.best[:_SCATTER], _SOME_SCATTER)
-        tops = [self._at({}, start, _PRECISE, adjusted=True) for start in (self.best, scattered)]
+        with_scatter = np.append(self.best[:_SCATTER], _SOME_SCATTER)
+        tops = [self._at({}, start, _PRECISE, adjusted=True) for start in (self.best, with_scatter)]
         self.top, self.adjusted = max(tops, key=lambda one: one[1])
 
     @property

@@ -307,14 +307,14 @@ def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, Inte
     if len(whole) < LEAST_CASES or len(indices) < 2:
         return {}
     cells = np.array([[np.mean(cell) for cell in row] for row in whole])
-    answered = _AnswerTable(
+    table = _AnswerTable(
         cells - cells.mean(axis=1, keepdims=True),
         np.array([[float(len(cell)) for cell in row] for row in whole]),
         np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in whole]),
     )
     people = np.arange(len(whole))
-    here = answered.values(people[None])[0]
-    without = answered.values(np.array([np.delete(people, n) for n in people]))
+    here = table.values(people[None])[0]
+    without = table.values(np.array([np.delete(people, n) for n in people]))
     if not np.isfinite([here, *without]).all():
         return {}
     return dict(zip(indices, _estimates(here, without), strict=True))

@@ -233,9 +233,9 @@ def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] 
     design = np.hstack([whose, which])
     if np.linalg.matrix_rank(design) < len(subjects) + len(indices) - 1:
         return None
-    fitted = np.linalg.lstsq(design, values, rcond=None)[0]
-    level = float(fitted[: len(subjects)].mean())
-    return {index: level + float(effect) for index, effect in zip(indices, fitted[len(subjects) :], strict=True)}
+    coefficients = np.linalg.lstsq(design, values, rcond=None)[0]
+    level = float(coefficients[: len(subjects)].mean())
+    return {index: level + float(effect) for index, effect in zip(indices, coefficients[len(subjects) :], strict=True)}
 
 
 def grades_of(records: Iterable[TrialRecord]) -> dict[str, str]:

@@ -38,11 +38,11 @@ class SystematicDraws:
         off = draw.standard_normal((repeats, 2))
         if presses:
             off /= np.sqrt(draw.chisquare(presses - 1, (repeats, 2)) / (presses - 1))
-        leaning: Array = np.radians(np.array(lean) + np.array(lean_error) * off)
+        lean_draws: Array = np.radians(np.array(lean) + np.array(lean_error) * off)
         if presses:
-            leaning -= into_drag
-        self._of_normal: Array = into_drag + leaning
-        self._of_drag: Array = into_normal - leaning
+            lean_draws -= into_drag
+        self._of_normal: Array = into_drag + lean_draws
+        self._of_drag: Array = into_normal - lean_draws
 
     def shares(self, along: Array) -> tuple[Array, Array]:
         """Return a and b (repeats,) [-] for a drag that points along a unit vector (2,)."""
@@ -176,8 +176,8 @@ class _Repeats:
         self._step = float(np.median(np.diff(curve.time)))
         accuracy = (settings.gain_error, settings.cross_talk)
         lean = settings.tilt, settings.tilt_error
-        self._shared = SystematicDraws(n, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
-        self._gain_t, self._gain_n = self._shared.gain_t, self._shared.gain_n
+        self._systematic = SystematicDraws(n, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
+        self._gain_t, self._gain_n = self._systematic.gain_t, self._systematic.gain_n
         self._noise_t, self._noise_n = curve.noise
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
         drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
@@ -194,10 +194,10 @@ class _Repeats:
             if curve.crests is None:
                 at, top = int(np.nanargmax(curve.tangential)), self._top(curve.tangential, self._noise_t)
             else:
-                missed = curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
+                above_crest = curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
                 at = int(np.nanargmax(curve.crests))
-                top = self._top(curve.crests, curve.crest_noise, filtered=False) + missed
-            of_normal, _ = self._shared.shares(drag_direction(curve.force[at : at + 1]))
+                top = self._top(curve.crests, curve.crest_noise, filtered=False) + above_crest
+            of_normal, _ = self._systematic.shares(drag_direction(curve.force[at : at + 1]))
             shift = self._zero_t + top + of_normal * curve.normal[at]
             peak = stroke.tau_max * area * self._gain_t + shift
             numbers["tau_max"] = peak / (area * self._gain_n**stroke.area_exponent)
@@ -209,7 +209,7 @@ class _Repeats:
         numbers |= self._window()
         if stroke.peak_normal is not None:
             top, at = self._top(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
-            _, of_drag = self._shared.shares(drag_direction(curve.force[at : at + 1]))
+            _, of_drag = self._systematic.shares(drag_direction(curve.force[at : at + 1]))
             shift = self._zero_n + of_drag * curve.tangential[at]
             numbers["peak_normal"] = stroke.peak_normal * self._gain_n + shift + top
         return numbers | self._instants(numbers.get("speed")) | self._onset()
@@ -235,7 +235,7 @@ class _Repeats:
         from_zero = (self._zero_t - value * self._zero_n) / normal
         along = drag_direction(self._curve.force[at : at + 1])
         scatter = noise * self._draw.standard_normal(len(self._gain_t))
-        return self._shared.ratio(value, along) + from_zero + scatter
+        return self._systematic.ratio(value, along) + from_zero + scatter
 
     def _window(self) -> dict[str, Array]:
         """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
@@ -261,21 +261,21 @@ class _Repeats:
         lightness = float(blocks[:, 1].mean())
         mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further
         along = drag_direction(curve.force[inside])
-        of_normal, of_drag = self._shared.shares(along)
+        of_normal, of_drag = self._systematic.shares(along)
         from_zero = (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
-        numbers = {"mu_dynamic": self._shared.ratio(mu, along) + from_zero}
+        numbers = {"mu_dynamic": self._systematic.ratio(mu, along) + from_zero}
         if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
             # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
             # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
             other = own @ blocks[:, 5:7] / total[:, None]
             other -= other.mean(axis=0)
-            pressing, dragging = self._stroke.normal_force, self._stroke.tangential_force
-            shared_n, shared_t = of_drag * dragging + self._zero_n, of_normal * pressing + self._zero_t
-            numbers["normal_force"] = (pressing + other[:, 0]) * self._gain_n + shared_n
-            numbers["tangential_force"] = (dragging + other[:, 1]) * self._gain_t + shared_t
+            normal, tangential = self._stroke.normal_force, self._stroke.tangential_force
+            shared_n, shared_t = of_drag * tangential + self._zero_n, of_normal * normal + self._zero_t
+            numbers["normal_force"] = (normal + other[:, 0]) * self._gain_n + shared_n
+            numbers["tangential_force"] = (tangential + other[:, 1]) * self._gain_t + shared_t
         way = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
         if self._stroke.speed is not None and np.isfinite(blocks[:, 3:5]).all():
-            way = self._slopes(sample, weight) * self._shared.gain_torque[:, None]
+            way = self._slopes(sample, weight) * self._systematic.gain_torque[:, None]
             numbers["speed"] = np.hypot(way[:, 0], way[:, 1]) / (self._gain_n + of_drag * self._stroke.mu_dynamic)
         if self._stroke.heading is not None:
             numbers["heading"] = self._headings(way, self._stroke.heading)
@@ -342,6 +342,6 @@ class _Repeats:
     def _slopes(self, sample: Array, weight: Array) -> Array:
         """Return the slope of position on time (repeats, 2) [mm/s] over the blocks drawn."""
         total = weight.sum(axis=1)[:, None]
-        time, moved = sample[:, :, 2], sample[:, :, 3:5]
+        time, place = sample[:, :, 2], sample[:, :, 3:5]
         t = time - (time * weight).sum(axis=1)[:, None] / total
-        return ((t * weight)[:, :, None] * moved).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]
+        return ((t * weight)[:, :, None] * place).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]

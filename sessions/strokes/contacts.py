@@ -62,7 +62,7 @@ class ContactDetector:
         self._noise_exit: float | None = None  # first reading since the force was last within the noise
         self._above: float | None = None  # first reading of the present run above the onset threshold
         self._below: float | None = None  # first reading of the present run below the lift threshold
-        self._pulling: float | None = None  # first reading of the present run far below zero
+        self._pull_start: float | None = None  # first reading of the present run far below zero
         self._has_zero = False  # zero and noise are known
         self._level = self._noise_band = self._threshold = self._lift = 0.0
         if baseline is not None:
@@ -109,9 +109,9 @@ class ContactDetector:
 
     def _notice_pull(self, t: float, above: float) -> None:
         """Forget a zero that was taken in contact."""
-        self._pulling = _since(self._pulling, t, on=above < -self._threshold)
-        if self._pulling is not None and t - self._pulling >= self._settings.baseline / 2:
-            self._pulling, self._has_zero = None, False
+        self._pull_start = _since(self._pull_start, t, on=above < -self._threshold)
+        if self._pull_start is not None and t - self._pull_start >= self._settings.baseline / 2:
+            self._pull_start, self._has_zero = None, False
             self._start_gathering()
 
     def _start_gathering(self) -> None:
@@ -126,7 +126,7 @@ class ContactDetector:
             self._bins.append(self._bin)
             self._bin, self._bin_start = [], t
             if len(self._bins) == self._bins.maxlen:
-                stretch = [reading for finished in list(self._bins)[:-1] for reading in finished]
+                stretch = [reading for part in list(self._bins)[:-1] for reading in part]
                 if is_quiet(stretch, self._settings):
                     self._take(Baseline(fmean(stretch), _spread(stretch)))
         self._bin.append(force)
@@ -209,11 +209,11 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     """
     inside = slice(contact.start, contact.stop)
     force = np.maximum(_bridge_gaps(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
-    padded = np.concatenate([[0.0], force, [0.0]])
-    places, prominences = peaks(padded)
-    standing = places[prominences >= (1.0 - settings.contact.valley) * padded[places]] - 1
-    standing = standing[force[standing] >= settings.contact.light_share * force.max(initial=0.0)]
-    between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(standing)]
+    with_ends = np.concatenate([[0.0], force, [0.0]])
+    places, prominences = peaks(with_ends)
+    tops = places[prominences >= (1.0 - settings.contact.valley) * with_ends[places]] - 1
+    tops = tops[force[tops] >= settings.contact.light_share * force.max(initial=0.0)]
+    between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(tops)]
     # Peaks of exactly the same height stand out of everything but one another.
     deep = settings.contact.valley
     valleys = [contact.start + at for a, b, at in between if force[at] < deep * min(force[a], force[b])]
@@ -239,13 +239,13 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
     """Return the stroke between two borders; where a border is a valley it is cut back to a share of its peak."""
     valleys = tuple(border for border in (start, stop) if border not in (contact.start, contact.stop))
     force = np.nan_to_num(normal[start:stop])
-    pressed = np.flatnonzero(force >= settings.contact.valley * force.max())
+    high = np.flatnonzero(force >= settings.contact.valley * force.max())
     onset, lift = contact.onset, contact.lift
     if start != contact.start:
-        start += int(pressed[0])
+        start += int(high[0])
         onset = float(time[start])
     if stop != contact.stop:
-        stop -= len(force) - 1 - int(pressed[-1])
+        stop -= len(force) - 1 - int(high[-1])
         lift = float(time[stop])
     return Contact(start, stop, onset, lift, valleys)
 
@@ -297,24 +297,24 @@ def split_at_reversals(
 
 def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_DragRun]:
     """Return the ways of the drag in a wrench (n, 6); those that are too short or too weak are left out."""
-    cut, normal = settings.contact, -wrench[:, 2]
+    rule, normal = settings.contact, -wrench[:, 2]
     floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
     at = np.flatnonzero(normal >= floor)
     if len(at) < 2:
         return []
-    block_number = np.floor((time[at] - time[at[0]]) / cut.turn_block)
+    block_number = np.floor((time[at] - time[at[0]]) / rule.turn_block)
     firsts = np.flatnonzero(np.diff(block_number, prepend=-1.0))
     counts = np.diff(np.append(firsts, len(at)))
-    force, pressed = (np.add.reduceat(column[at], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
+    force, load = (np.add.reduceat(column[at], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
     if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag gives no number
         return []
-    least = cut.turn_share * float(np.median(drag / pressed)) * pressed
-    strong = np.flatnonzero((drag >= least) & (drag > cut.turn_unsure * unsure))
+    least = rule.turn_share * float(np.median(drag / load)) * load
+    strong = np.flatnonzero((drag >= least) & (drag > rule.turn_unsure * unsure))
     lasts = at[np.append(firsts[1:], len(at)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
-        if runs and float(force[:, runs[-1][-cut.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
+        if runs and float(force[:, runs[-1][-rule.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
             runs[-1].append(block)
         else:
             runs.append([block])
@@ -322,11 +322,11 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
     every_run = [_DragRun(*two, force[:, run].sum(axis=1), len(run)) for two, run in zip(ends, runs, strict=True)]
     greatest = max((way.drag for way in every_run), default=0.0)
     longest = max((float(time[way.last] - time[way.first]) for way in every_run), default=0.0)
-    shortest = max(cut.shortest_stroke - cut.turn_block, cut.turn_shortest * longest)
+    shortest = max(rule.shortest_stroke - rule.turn_block, rule.turn_shortest * longest)
     ways: list[_DragRun] = []
     dropped = False  # since the last way
     for way in every_run:
-        short = bool(time[way.last] - time[way.first] < shortest or way.drag < cut.light_share * greatest)
+        short = bool(time[way.last] - time[way.first] < shortest or way.drag < rule.light_share * greatest)
         if not short and ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
             ways[-1] = _DragRun(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)
         elif not short:

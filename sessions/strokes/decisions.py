@@ -169,8 +169,8 @@ class Decisions:
     @property
     def in_force(self) -> tuple[Decision, ...]:
         """Return the decisions that act, by number: not undone (undoing can be undone too), nor set anew since."""
-        acting = {decision.place: decision for decision in self.standing if decision.undoes is None}
-        return tuple(sorted(acting.values(), key=lambda decision: decision.number))
+        latest = {decision.place: decision for decision in self.standing if decision.undoes is None}
+        return tuple(sorted(latest.values(), key=lambda decision: decision.number))
 
     @property
     def standing(self) -> tuple[Decision, ...]:
@@ -228,9 +228,9 @@ def parse(content: bytes) -> Decisions:
             lines.append(decision)
     if rest:
         problems.append(f"the last line of {DECISIONS} is torn and left out: it was never acknowledged, or was cut off")
-    missing = sorted({*range(1, max((line.number for line in lines), default=0))} - {line.number for line in lines})
-    if missing and not problems:
-        problems.append(f"{DECISIONS} lacks decision {', '.join(map(str, missing))}: lines were removed")
+    gaps = sorted({*range(1, max((line.number for line in lines), default=0))} - {line.number for line in lines})
+    if gaps and not problems:
+        problems.append(f"{DECISIONS} lacks decision {', '.join(map(str, gaps))}: lines were removed")
     return Decisions(tuple(lines), tuple(problems))
 
 
@@ -244,15 +244,15 @@ def append(recording: "Recording", decision: Decision) -> Decision:
         content = bytes_of(path)
         torn = bool(content) and not content.endswith(b"\n")
         number = max(parse(content).with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
-        recorded = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
+        entry = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
         # A line is compact JSON whose last name, crc32, is that of the JSON text without it.
-        text = compact_json({**recording.mark, **recorded.to_dict()})
-        ending = "\n" if torn else ""  # a torn line stays, as a line of its own
+        text = compact_json({**recording.mark, **entry.to_dict()})
+        newline = "\n" if torn else ""  # a torn line stays, as a line of its own
         with path.open("ab") as file:
-            file.write(f'{ending}{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode())
+            file.write(f'{newline}{text[:-1]},"crc32":{text_crc(text)}}}\n'.encode())
             file.flush()
             os.fsync(file.fileno())
-    return recorded
+    return entry
 
 
 def _decision(line: bytes) -> Decision | str | None:
@@ -279,10 +279,10 @@ def _check(decision: Decision, before: Decisions) -> None:
         if decision.undoes not in {line.number for line in before.standing}:
             raise DecisionError(f"decision {decision.undoes} is not in force: there is nothing to undo")
         return
-    allowed = OF_STROKE if decision.stroke is not None else OF_SESSION if decision.trial is None else OF_TRIAL
-    if decision.what not in allowed:
-        raise DecisionError(f"nobody decides {decision.what!r} of {decision.of}: give one of {', '.join(allowed)}")
-    kind = allowed[decision.what]
+    kinds = OF_STROKE if decision.stroke is not None else OF_SESSION if decision.trial is None else OF_TRIAL
+    if decision.what not in kinds:
+        raise DecisionError(f"nobody decides {decision.what!r} of {decision.of}: give one of {', '.join(kinds)}")
+    kind = kinds[decision.what]
     if not _fits(decision.new, kind.form):
         raise DecisionError(f"{decision.what} of {decision.of} cannot be {decision.new!r}: {kind.sentence}")
 

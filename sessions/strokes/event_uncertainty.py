@@ -33,8 +33,8 @@ def onset_draws(
     at = int(np.searchsorted(time, onset))
     if at == 0 or len(time) < at + fewest or force[at - 1] > onset_threshold(noise, detector):
         return None
-    climbing = force[at:] < 2.0 * max(detector.leave_noise * noise, float(force[at]))
-    part = slice(at - 1, at + max(fewest, int(np.argmin(climbing)) + 1))
+    rise = force[at:] < 2.0 * max(detector.leave_noise * noise, float(force[at]))
+    part = slice(at - 1, at + max(fewest, int(np.argmin(rise)) + 1))
     step = float(np.median(np.diff(time[part])))
     # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
     bend, slope, _ = np.polyfit(time[part] - (onset - step / 2.0), force[part], 2).tolist()

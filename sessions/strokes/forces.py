@@ -29,16 +29,16 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     gain = bent * bent / whole
     back, further = 2.0 * (bent * bent - 1.0) / whole, (1.0 - np.sqrt(2.0) * bent + bent * bent) / whole
     sections = np.array([[gain, 2.0 * gain, gain, 1.0, back, further]])
-    compiled = _compiled_filter()
-    if compiled is None:
+    kernel = _compiled_filter()
+    if kernel is None:
         from scipy import signal
 
         return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
     first, last = 2.0 * values[:1] - values[padding:0:-1], 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
     rows = np.ascontiguousarray(np.concatenate([first, values, last]).T)  # (k, n + 2 padding), filtered in place
-    settled = np.array([1.0 - gain, gain - further])  # what the filter holds of a value that never changed
+    state = np.array([1.0 - gain, gain - further])  # what the filter holds of a value that never changed
     for _ in range(2):
-        compiled(sections, rows, (rows[:, :1] * settled)[:, None, :])
+        kernel(sections, rows, (rows[:, :1] * state)[:, None, :])
         rows = np.ascontiguousarray(rows[:, ::-1])
     return rows.T[padding : len(rows[0]) - padding]
 
@@ -163,14 +163,14 @@ def centre_of_pressure(wrench: Array, height: float) -> Array:
     array([[4., 3.]])
     """
     normal = -wrench[:, 2]
-    pressing = np.where(normal > 0.0, normal, np.nan)
-    x = (wrench[:, 4] - height * wrench[:, 0]) / pressing
-    y = -(wrench[:, 3] + height * wrench[:, 1]) / pressing
+    load = np.where(normal > 0.0, normal, np.nan)
+    x = (wrench[:, 4] - height * wrench[:, 0]) / load
+    y = -(wrench[:, 3] + height * wrench[:, 1]) / load
     return np.column_stack([x, y])
 
 
 def friction_ratio(wrench: Array, floor: float) -> Array:
     """Return T/N (n,) [-] of a zeroed wrench (n, 6) in the face frame; nan where N is below `floor` [N]."""
     normal = -wrench[:, 2]
-    pressing = np.where(normal >= floor, normal, np.nan)
-    return np.hypot(wrench[:, 0], wrench[:, 1]) / pressing
+    load = np.where(normal >= floor, normal, np.nan)
+    return np.hypot(wrench[:, 0], wrench[:, 1]) / load

@@ -13,15 +13,15 @@ from sessions.strokes.settings import SignalSettings
 
 def spikes(raw: Array, settings: SignalSettings) -> Mask:
     """Mark the wild readings of each axis (n, k): beyond all neighbours by far more than these differ themselves."""
-    marked = np.zeros(raw.shape, np.bool_)
+    marks = np.zeros(raw.shape, np.bool_)
     for axis in range(raw.shape[1]):
         column = raw[:, axis]
         steps = np.abs(np.diff(column))
-        moving = steps[steps > 0.0]
-        if not len(moving):
+        changes = steps[steps > 0.0]
+        if not len(changes):
             continue
         noise = NORMAL_STEP * float(np.median(steps))
-        floor = max(settings.wild_noise * noise, settings.wild_coarse * float(moving.min()))
+        floor = max(settings.wild_noise * noise, settings.wild_coarse * float(changes.min()))
         spikes_found = [
             (at, w)
             for w in range(1, settings.wild_widest + 1)
@@ -31,9 +31,9 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
         for at, width in spikes_found:
             alike[at : at + width] = True
         for at, width in spikes_found:
-            if not marked[at : at + width, axis].any() and _stands_out(column, alike, at, width, settings):
-                marked[at : at + width, axis] = True
-    return marked
+            if not marks[at : at + width, axis].any() and _stands_out(column, alike, at, width, settings):
+                marks[at : at + width, axis] = True
+    return marks
 
 
 def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> Indices:
@@ -73,49 +73,50 @@ class ConstantRun:
     value: float  # raw
 
 
-def constant_runs(time: Array, raw: Array, ignored: Mask, settings: SignalSettings) -> tuple[ConstantRun, ...]:
+def constant_runs(time: Array, raw: Array, skip: Mask, settings: SignalSettings) -> tuple[ConstantRun, ...]:
     """Return the runs of one value on single axes of raw (n, k) at `time` (n,) [s].
 
     A run counts where it is long against the runs that its axis shows elsewhere, so that coarse steps are no fault.
-    Readings `ignored` (n,) are no axis' greatest or least value.
+    Readings to `skip` (n,) are no axis' greatest or least value.
     """
-    return tuple(run for axis in range(raw.shape[1]) for run in _of_axis(axis, time, raw, ignored, settings))
+    return tuple(run for axis in range(raw.shape[1]) for run in _of_axis(axis, time, raw, skip, settings))
 
 
 def at_the_same_value(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
     """Mark the readings (n,) of frozen runs; or, `clipped`, all those at a value at which an axis was clipped."""
-    marked = np.zeros(len(raw), np.bool_)
+    marks = np.zeros(len(raw), np.bool_)
     for one in runs:
         if one.clipped != clipped:
             continue
         if clipped:
-            marked |= raw[:, one.axis] == one.value
+            marks |= raw[:, one.axis] == one.value
         else:
-            marked[one.first + 1 : one.last + 1] = True
-    return marked
+            marks[one.first + 1 : one.last + 1] = True
+    return marks
 
 
-def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: SignalSettings) -> list[ConstantRun]:
+def _of_axis(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalSettings) -> list[ConstantRun]:
     column = raw[:, axis]
     firsts = np.flatnonzero(np.concatenate([[True], np.diff(column) != 0.0]))
     lasts = np.concatenate([firsts[1:], [len(column)]]) - 1
     lengths = lasts - firsts + 1
-    lasting = time[lasts] - time[firsts]
+    durations = time[lasts] - time[firsts]
     # Times are sums of ticks, so a run as long as the limit may seem a little shorter.
-    candidates = np.flatnonzero((lengths >= settings.flat_readings) & (lasting > settings.flat_top - 1e-9))
+    candidates = np.flatnonzero((lengths >= settings.flat_readings) & (durations > settings.flat_top - 1e-9))
     if not len(candidates) or len(firsts) == 1:
         return []
-    sound = column[~ignored]
+    sound = column[~skip]
     ends = (float(sound.min()), float(sound.max())) if len(sound) else ()
     constant: list[ConstantRun] = []
     for value in np.unique(column[firsts[candidates]]).tolist():
         runs = candidates[column[firsts[candidates]] == value]
-        moving = np.array([_others_move(axis, time, raw, (int(firsts[at]), int(lasts[at])), settings) for at in runs])
-        if lasting[runs[moving]].sum() <= lasting[runs].sum() / 2.0:  # what the axis reads where nothing presses
+        spans = [(int(firsts[at]), int(lasts[at])) for at in runs]
+        live = np.array([_others_move(axis, time, raw, span, settings) for span in spans])
+        if durations[runs[live]].sum() <= durations[runs].sum() / 2.0:  # what the axis reads where nothing presses
             continue
-        for at in runs[moving].tolist():
+        for at in runs[live].tolist():
             clipped = value in ends
-            frozen = lengths[at] > settings.frozen_readings and lasting[at] >= settings.frozen_shortest
+            frozen = lengths[at] > settings.frozen_readings and durations[at] >= settings.frozen_shortest
             elsewhere = lengths[~np.isin(column[firsts], ends)] if clipped else lengths[2 * lengths < lengths[at]]
             long = lengths[at] > settings.long_run * (_usual(elsewhere) - 1.0)
             if (clipped or frozen) and long and _jumps(column, int(firsts[at]), int(lasts[at]), settings):
@@ -127,8 +128,8 @@ def _usual(lengths: Indices) -> float:
     """Return the length of run that nine tenths of all readings do not exceed; without readings none is unusual."""
     if not len(lengths):
         return np.inf
-    ordered = np.sort(lengths)
-    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.9 * ordered.sum())])
+    ascending = np.sort(lengths)
+    return float(ascending[np.searchsorted(np.cumsum(ascending), 0.9 * ascending.sum())])
 
 
 def _jumps(column: Array, first: int, last: int, settings: SignalSettings) -> bool:
@@ -146,8 +147,8 @@ def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], setti
     alive = (np.diff(other_axes[first : last + 1], axis=0) != 0.0).any(axis=1)
     if alive.mean() < 0.5:
         return False
-    lacking = max(0.0, settings.flat_around - (time[last] - time[first])) / 2.0
-    window = other_axes[(time >= time[first] - lacking) & (time <= time[last] + lacking)]
+    margin = max(0.0, settings.flat_around - (time[last] - time[first])) / 2.0
+    window = other_axes[(time >= time[first] - margin) & (time <= time[last] + margin)]
     steps = np.abs(np.diff(window, axis=0))
     noise = NORMAL_STEP * np.median(steps, axis=0)
     least = np.array([float(each[each > 0.0].min(initial=np.inf)) for each in steps.T])
@@ -182,8 +183,8 @@ def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
     """
     steps = np.abs(np.diff(raw, axis=0))
     changes = [column[column > 0.0] for column in steps.T]
-    moving = [each for each in changes if len(each)]
-    if not moving or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in moving):
+    non_empty = [each for each in changes if len(each)]
+    if not non_empty or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in non_empty):
         return np.zeros(0, np.bool_)
     usual = np.array([float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
     return np.asarray((steps > settings.coarse_jump * usual).any(axis=1), np.bool_)

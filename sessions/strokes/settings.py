@@ -240,9 +240,9 @@ class AnalysisSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return every setting by its group, and for one release each also under its name alone, as it was before."""
-        grouped = asdict(self)
-        alone = (grouped[group] for group in _GROUPS)
-        return {name: value for group in alone for name, value in group.items()} | grouped
+        groups = asdict(self)
+        alone = (groups[group] for group in _GROUPS)
+        return {name: value for group in alone for name, value in group.items()} | groups
 
 
 _GROUPS = ("signal", "filter", "zero", "contact", "steady", "slide", "ratio", "press")
@@ -309,11 +309,11 @@ class BootstrapSettings:
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
             f"{self.block:g} s, widened for correlation between blocks, seed {self.seed}): sensor noise, zero and its "
             f"drift, calibration ({self.calibration}; cross-talk {100 * self.cross_talk:g} % of each other force), "
-            f"tilt of the face ({self.leaning}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
+            f"tilt of the face ({self.lean_sentence}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
 
     @property
-    def leaning(self) -> str:
+    def lean_sentence(self) -> str:
         """The tilt of the face that is not levelled, and its standard uncertainty, for people."""
         x, y = (f"{a:.2g} ± {error:.2g}°" for a, error in zip(self.tilt, self.tilt_error, strict=True))
         return f"{x} to +x and {y} to +y, {self.tilt_origin}"

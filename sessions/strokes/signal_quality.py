@@ -50,32 +50,32 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     beyond = invalid.saturated_readings(block, info)
     wild_axes = invalid.spikes(block.raw, settings.signal) & ~beyond[:, None]
     wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
-    repeated = invalid.repeated_readings(block, settings.signal)
+    repeats = invalid.repeated_readings(block, settings.signal)
     stuck = invalid.constant_runs(block.time, block.raw, wild | beyond, settings.signal)
-    frozen = repeated | invalid.at_the_same_value(block.raw, stuck, clipped=False)
+    frozen = repeats | invalid.at_the_same_value(block.raw, stuck, clipped=False)
     saturated = beyond | invalid.at_the_same_value(block.raw, stuck, clipped=True)
-    stalled = np.concatenate([[False], steps <= 0.0])
-    good = ~(frozen | saturated | wild | stalled)
+    stalls = np.concatenate([[False], steps <= 0.0])
+    good = ~(frozen | saturated | wild | stalls)
     long = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
     # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
     another = bool(long.mean() > settings.signal.uneven)
     widest = float(np.percentile(forward, 98)) if another else step
-    broken = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
-    neighbours = steps[~broken]
+    breaks = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
+    neighbours = steps[~breaks]
     spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
     even = bool(not another and spread <= settings.signal.uneven * step)
-    stretches = segments(good, broken)
+    stretches = segments(good, breaks)
     dead = tuple(
         name
         for name, column in zip(AXES, block.raw[good].T, strict=True)
         if len(column) > settings.signal.frozen_readings and np.ptp(column) == 0.0
     )
-    missing = np.diff(block.sequence) - 1
-    lost = int(missing[missing > 0].sum())
+    gaps = np.diff(block.sequence) - 1
+    losses = int(gaps[gaps > 0].sum())
     flaws = (
-        *_flaws_of_readings(block, lost, repeated, frozen, beyond, info.status, settings.signal.frozen_refused),
+        *_flaws_of_readings(block, losses, repeats, frozen, beyond, info.status, settings.signal.frozen_refused),
         *_flaws_of_axes(stuck, wild_axes, dead, block.time),
-        *_flaws_of_time(step, even, int(stalled.sum())),
+        *_flaws_of_time(step, even, int(stalls.sum())),
     )
     return SignalQuality(
         1.0 / step if step > 0 else np.nan,
@@ -89,36 +89,36 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     )
 
 
-def segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
+def segments(good: Mask, breaks: Mask) -> tuple[slice, ...]:
     """Return the stretches of good readings (n,) within which `broken` (n - 1,) marks no step."""
-    joined = good[1:] & good[:-1] & ~broken
-    starts = np.flatnonzero(good & ~np.concatenate([[False], joined]))
-    stops = np.flatnonzero(good & ~np.concatenate([joined, [False]])) + 1
+    joints = good[1:] & good[:-1] & ~breaks
+    starts = np.flatnonzero(good & ~np.concatenate([[False], joints]))
+    stops = np.flatnonzero(good & ~np.concatenate([joints, [False]])) + 1
     return tuple(slice(start, stop) for start, stop in zip(starts.tolist(), stops.tolist(), strict=True))
 
 
 def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:
     hole = slice(before.stop, after.start)
     marks = ((frozen, FlawName.FROZEN), (saturated, FlawName.SATURATED), (wild, FlawName.WILD))
-    cause = next((name for marked, name in marks if marked[hole].any()), FlawName.LOST_READINGS)
+    cause = next((name for mask, name in marks if mask[hole].any()), FlawName.LOST_READINGS)
     return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
 
 
 def _flaws_of_readings(
-    block: ReadingBlock, lost: int, repeated: Mask, frozen: Mask, saturated: Mask, table: StatusTable, refusal: float
+    block: ReadingBlock, losses: int, repeats: Mask, frozen: Mask, saturated: Mask, table: StatusTable, refusal: float
 ) -> Iterator[Flaw]:
     """Yield what is wrong with readings (n,) as a whole; from a share of frozen ones on all are refused."""
-    if lost:
-        share = 100 * lost / (lost + len(block))
+    if losses:
+        share = 100 * losses / (losses + len(block))
         sentence = (
-            f"{lost} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
+            f"{losses} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
         )
         yield Flaw(FlawName.LOST_READINGS, sentence, "note")
     refused = float(frozen.mean()) >= refusal
-    if repeated.any():
+    if repeats.any():
         sentence = (
-            f"{100 * float(repeated.mean()):.0f} % of the readings repeat the six numbers before them, first at "
-            f"{block.time[repeated][0]:.2f} s: the sensor was frozen"
+            f"{100 * float(repeats.mean()):.0f} % of the readings repeat the six numbers before them, first at "
+            f"{block.time[repeats][0]:.2f} s: the sensor was frozen"
         )
         rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
         yield Flaw(FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful")
@@ -150,20 +150,20 @@ def _flaws_of_axes(
     """Yield which axes stuck, by the first run that shows it, had wild readings (n, 6), or never moved."""
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
         runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
-        lasting = sum(float(time[one.last] - time[one.first]) for one in runs)
+        duration = sum(float(time[one.last] - time[one.first]) for one in runs)
         what = (
             "never goes beyond it: clipped. These readings are left out, and peaks that they may hide are not given."
             if clipped
             else "moves before or after: frozen there. These readings are left out."
         )
         sentence = (
-            f"{AXES[axis]} keeps one value bit for bit while other axes move, for {significant(lasting, 2)} s "
+            f"{AXES[axis]} keeps one value bit for bit while other axes move, for {significant(duration, 2)} s "
             f"in all, first at {time[runs[0].first]:.2f} s, and {what}"
         )
         yield Flaw(FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful")
     if wild.any():
         at = wild.any(axis=1)
-        axes = ", ".join(name for name, marked in zip(AXES, wild.T, strict=True) if marked.any())
+        axes = ", ".join(name for name, mask in zip(AXES, wild.T, strict=True) if mask.any())
         stand = "reading stands" if at.sum() == 1 else "readings stand"
         sentence = (
             f"{at.sum()} {stand} far beyond everything around on {axes}, first at {time[at][0]:.3f} s: spikes, which "
@@ -176,12 +176,12 @@ def _flaws_of_axes(
         yield Flaw(FlawName.DEAD, f"{', '.join(dead)} never changed: {cost}.", "refused" if force else "doubtful")
 
 
-def _flaws_of_time(step: float, even: bool, stalled: int) -> Iterator[Flaw]:
+def _flaws_of_time(step: float, even: bool, stall_count: int) -> Iterator[Flaw]:
     if not step > 0.0:
         yield Flaw(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")
         return
-    if stalled:
-        sentence = f"At {stalled} readings the device's time did not advance; they are left out."
+    if stall_count:
+        sentence = f"At {stall_count} readings the device's time did not advance; they are left out."
         yield Flaw(FlawName.IRREGULAR_TIME, sentence, "doubtful")
     if not even:
         sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."

@@ -59,13 +59,13 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Ind
     mean = (total[last] - total[first]) / n
     variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
     scatter = np.where(n < _QUARTERS * rule.steady_readings, np.sqrt(_QUARTERS * variance / n), 0.0)
-    allowed = rule.steady_trend * mean + 2.0 * scatter
+    tolerance = rule.steady_trend * mean + 2.0 * scatter
     steady = np.sqrt(variance) < rule.steady_spread * mean
     for quarter in range(_QUARTERS):
         a = first + (last - first) * quarter // _QUARTERS
         b = first + (last - first) * (quarter + 1) // _QUARTERS
         here = (total[b] - total[a]) / np.maximum(count[b] - count[a], 1.0)
-        steady &= np.abs(here - mean) <= allowed
+        steady &= np.abs(here - mean) <= tolerance
     return first, last, variance, steady
 
 

@@ -41,20 +41,20 @@ class QuietWindows:
 
     def before(self, instant: float, longest: float) -> Zero | None:
         """Return the zero of the last quiet windows that end by `instant` [s], over at most `longest` [s]."""
-        ended = self.bounds[self.time[self.bounds[:, 1] - 1] < instant]
-        return self._over(ended[::-1], longest) if len(ended) else None
+        earlier = self.bounds[self.time[self.bounds[:, 1] - 1] < instant]
+        return self._over(earlier[::-1], longest) if len(earlier) else None
 
     def after(self, instant: float, longest: float) -> Zero | None:
         """Return the zero of the first quiet windows that start after `instant` [s], over at most `longest` [s]."""
-        started = self.bounds[self.time[self.bounds[:, 0]] > instant]
-        return self._over(started, longest) if len(started) else None
+        later = self.bounds[self.time[self.bounds[:, 0]] > instant]
+        return self._over(later, longest) if len(later) else None
 
     def _over(self, windows: Indices, longest: float) -> Zero:
         start, stop = windows[0]
         for first, last in windows[1:]:
             low, high = min(start, first), max(stop, last)
-            touching = first <= stop and last >= start
-            if not touching or self.time[high - 1] - self.time[low] > longest:
+            overlap = first <= stop and last >= start
+            if not overlap or self.time[high - 1] - self.time[low] > longest:
                 break
             start, stop = low, high
         stretch = self.wrench[start:stop]
@@ -74,9 +74,9 @@ def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSet
     floor = max(settings.detector.quiet_floor, settings.zero.quiet_share * float(high - low))
     quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
     # A finger that slides with a steady force moves the centre of pressure, and with it the torques alone.
-    turned, shaking = _spread(wrench[:, 3:5], starts, length)
+    turn, shake = _spread(wrench[:, 3:5], starts, length)
     still = settings.zero.quiet_moves * float(high - low)
-    quiet &= (turned <= np.maximum(settings.detector.quiet_noise * shaking, still)).all(axis=1)
+    quiet &= (turn <= np.maximum(settings.detector.quiet_noise * shake, still)).all(axis=1)
     level = np.lib.stride_tricks.sliding_window_view(-wrench[:, 2], length)[starts].mean(axis=1)
     threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
     unloaded = level - low <= max(settings.zero.unloaded_share * (high - low), threshold)
@@ -261,8 +261,8 @@ def _speed(time: Array, position: Array, span: Span) -> Array:
     speed = np.full(len(time), np.nan)
     limits = span.settings
     smoother = Filter(limits.filter.speed_cut_off, limits.filter.shortest_segment)
-    broken = ~(np.diff(time) < limits.signal.missing_step / span.rate)
-    for part in segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), broken):
+    breaks = ~(np.diff(time) < limits.signal.missing_step / span.rate)
+    for part in segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), breaks):
         path = position[part]
         if len(path) < 3:
             continue
@@ -295,11 +295,11 @@ def curve_of(span: Span, contact: Contact, zero: StrokeZero, missed: float | Non
     last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + around.curve_after))
     track = track_of(span, Contact(first, last, None, None), zero)
     force = track.wrench[:, :2]
-    dragging, unfiltered = unfiltered_forces(span, slice(first, last), zero)
+    drag, unfiltered = unfiltered_forces(span, slice(first, last), zero)
     columns = (track.time, track.normal, unfiltered, track.tangential, force, track.ratio, track.position, track.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
     curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)
     if missed is None:
         return curve
     crest_noise = float(np.sqrt((zero.noise[:2] ** 2).mean()))
-    return replace(curve, crests=dragging, crest_noise=crest_noise, crest_missed=missed)
+    return replace(curve, crests=drag, crest_noise=crest_noise, crest_missed=missed)

@@ -207,8 +207,8 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
     return StickSlip(float((len(drops) - 1) / (time[drops[-1]] - time[drops[0]])), climb)
 
 
-def _beginnings(marked: Mask) -> NDArray[np.intp]:
-    return np.flatnonzero(marked & ~np.concatenate([[False], marked[:-1]]))
+def _beginnings(mask: Mask) -> NDArray[np.intp]:
+    return np.flatnonzero(mask & ~np.concatenate([[False], mask[:-1]]))
 
 
 def power_of_normal_force(normal: Array, ratio: Array, length: int, settings: AnalysisSettings) -> float:

@@ -222,23 +222,23 @@ class AreaLaw:
     exponent: float = 0.0
     force: float = PLANNED_AT  # [N]
 
-    def area(self, normal: Array, planned: float) -> Array:
-        """Return the contact area (n,) [mm2] under a normal force (n,) [N], > 0; `planned` [mm2].
+    def area(self, normal: Array, planned_area: float) -> Array:
+        """Return the contact area (n,) [mm2] under a normal force (n,) [N], > 0; `planned_area` [mm2].
 
         >>> import numpy as np
         >>> AreaLaw("power", 0.5, 1.0).area(np.array([1.0, 4.0]), 100.0)
         array([100., 200.])
         """
-        return planned * (normal / self.force) ** self.exponent
+        return planned_area * (normal / self.force) ** self.exponent
 
     @property
     def sentence(self) -> str:
         """The law, for people, with what was assumed."""
         if self.law == "fixed":
             return "fixed, whatever the normal force"
-        assumed = ", assumed" if self.force == PLANNED_AT else ", set"
+        origin = ", assumed" if self.force == PLANNED_AT else ", set"
         why = "Hertz, sphere on plane: Johnson 1985, section 4.2; assumed of a finger" if self.law == "hertz" else "set"
-        return f"grows as N^{self.exponent:.3g} ({why}), and is the planned one at {self.force:g} N{assumed}"
+        return f"grows as N^{self.exponent:.3g} ({why}), and is the planned one at {self.force:g} N{origin}"
 
 
 FIXED = AreaLaw()

@@ -116,8 +116,8 @@ def _judge_ends(findings: Findings, contact: Contact, track: Track) -> None:
         )
         findings.flaw(FlawName.TURNED, sentence, "note")
     peak = float(np.nanmax(track.normal, initial=0.0))
-    pressed = np.flatnonzero(track.normal >= track.settings.ratio.force_floor_share * peak)
-    crept = float(track.time[pressed[0]]) - contact.onset if contact.onset is not None and len(pressed) else 0.0
+    in_contact = np.flatnonzero(track.normal >= track.settings.ratio.force_floor_share * peak)
+    crept = float(track.time[in_contact[0]]) - contact.onset if contact.onset is not None and len(in_contact) else 0.0
     if crept > track.settings.contact.slow_onset:
         sentence = (
             f"The force crept for {crept:.2f} s from leaving its zero to a fifth of its peak: the onset marks where it "
@@ -160,11 +160,11 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact) -> None:
         findings.flaw(FlawName.WILD, sentence, "doubtful")
 
 
-def _judge_loads(findings: Findings, track: Track, planned: float) -> None:
+def _judge_loads(findings: Findings, track: Track, planned_area: float) -> None:
     """Give the greatest forces, and say where they are implausible."""
     peak, settings = float(np.nanmax(track.normal, initial=0.0)), track.settings
     greatest = float(np.nanmax(track.tangential, initial=0.0))
-    traction, area = _greatest_traction(track, track.tangential, planned)
+    traction, area = _greatest_traction(track, track.tangential, planned_area)
     findings.numbers |= {"peak_normal": peak, "peak_tangential": greatest, "tau_max": traction, "contact_area": area}
     findings.numbers["mu_max"] = _greatest_ratio(track, track.floor)
     if peak < settings.ratio.force_floor:
@@ -173,13 +173,13 @@ def _judge_loads(findings: Findings, track: Track, planned: float) -> None:
         )
         findings.flaw(FlawName.TOO_LITTLE_FORCE, sentence, "refused", (*COEFFICIENTS, *SPEED, *DIRECTION))
     if peak > settings.contact.greatest_force:
-        reached = f"The normal force reaches {significant(peak, 3)} N"
-        sentence = f"{reached}, more than a finger presses: check the units of the forces."
+        head = f"The normal force reaches {significant(peak, 3)} N"
+        sentence = f"{head}, more than a finger presses: check the units of the forces."
         findings.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
     half = settings.ratio.light_half * peak
     light = (track.ratio > 1.0) & (track.normal < half)
-    pressed = track.ratio[track.normal >= half]
-    if light.any() and np.isfinite(pressed).any() and np.nanmedian(pressed) < 1.0:
+    ratios = track.ratio[track.normal >= half]
+    if light.any() and np.isfinite(ratios).any() and np.nanmedian(ratios) < 1.0:
         sentence = (
             f"T/N exceeds 1 while N is below half its peak ({significant(peak, 3)} N), and not above: drift or a side "
             "load makes the ratio there; its maximum is that above half the peak."
@@ -188,16 +188,16 @@ def _judge_loads(findings: Findings, track: Track, planned: float) -> None:
         findings.numbers["mu_max"] = _greatest_ratio(track, half)
 
 
-def _greatest_traction(track: Track, tangential: Array, planned: float) -> tuple[float | None, float | None]:
+def _greatest_traction(track: Track, tangential: Array, planned_area: float) -> tuple[float | None, float | None]:
     """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where an area that grows has no N."""
     law = track.settings.area
     if law.law == "fixed":
-        return float(np.nanmax(tangential, initial=0.0)) / planned, planned
-    pressed = np.flatnonzero(track.normal >= track.floor)
-    if not len(pressed):
+        return float(np.nanmax(tangential, initial=0.0)) / planned_area, planned_area
+    in_contact = np.flatnonzero(track.normal >= track.floor)
+    if not len(in_contact):
         return None, None
-    areas = law.area(track.normal[pressed], planned)
-    tractions = tangential[pressed] / areas
+    areas = law.area(track.normal[in_contact], planned_area)
+    tractions = tangential[in_contact] / areas
     top = int(np.argmax(tractions))
     return float(tractions[top]), float(areas[top])
 
@@ -214,8 +214,8 @@ def _greatest_ratio(track: Track, floor: float) -> float | None:
     normal = np.where(track.normal >= floor, track.normal, np.nan)
     box = np.ones(length) / length
     means = np.convolve(track.tangential, box, "valid") / np.convolve(normal, box, "valid")
-    lasting = track.time[length - 1 :] - track.time[: len(track.time) - length + 1]
-    means = means[np.isfinite(means) & (lasting < settings.zero.quiet_gap * length / track.rate)]
+    durations = track.time[length - 1 :] - track.time[: len(track.time) - length + 1]
+    means = means[np.isfinite(means) & (durations < settings.zero.quiet_gap * length / track.rate)]
     return float(means.max()) if len(means) else None
 
 
@@ -239,18 +239,18 @@ def _friction(findings: Findings, track: Track, window: slice) -> None:
 
 
 def _stick_slip(
-    findings: Findings, span: Span, contact: Contact, track: Track, window: slice, zero: StrokeZero, planned: float
+    findings: Findings, span: Span, contact: Contact, track: Track, window: slice, zero: StrokeZero, planned_area: float
 ) -> float | None:
     """Tell tau_max by the unfiltered force where the contact sticks and slips; return how far it may be missed [N]."""
-    dragging, normal = unfiltered_forces(span, slice(contact.start, contact.stop), zero)
-    ratio = np.where(normal >= track.floor, dragging / np.maximum(normal, track.floor), np.nan)
-    level, pressing = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
-    slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, pressing), track.settings)
+    drag, normal = unfiltered_forces(span, slice(contact.start, contact.stop), zero)
+    ratio = np.where(normal >= track.floor, drag / np.maximum(normal, track.floor), np.nan)
+    level, load = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
+    slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, load), track.settings)
     if slips is None:
         return None
-    missed = slips.missed * pressing
-    filtered, unfiltered = findings.numbers["peak_tangential"], float(np.nanmax(dragging))
-    traction, area = _greatest_traction(track, dragging, planned)
+    missed = slips.missed * load
+    filtered, unfiltered = findings.numbers["peak_tangential"], float(np.nanmax(drag))
+    traction, area = _greatest_traction(track, drag, planned_area)
     findings.numbers |= {"tau_max": traction, "contact_area": area, "peak_tangential": unfiltered}
     above = 100 * (unfiltered / filtered - 1.0)
     sentence = (
@@ -264,16 +264,16 @@ def _stick_slip(
 
 def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> None:
     """Say how far a zero that moves may have changed mu, and withhold the numbers where that is too much."""
-    sideways, pressing = zero.unsure
+    sideways, upright = zero.unsure
     tangential = findings.numbers.get("tangential_force", findings.numbers["peak_tangential"])
     normal = findings.numbers.get("normal_force", findings.numbers["peak_normal"])
-    share = sideways / tangential + pressing / normal if tangential > 0.0 and normal > 0.0 else float("inf")
+    share = sideways / tangential + upright / normal if tangential > 0.0 and normal > 0.0 else float("inf")
     if share <= limits.drift_doubted:
         return
     refused = share > limits.drift_refused
     sentence = (
         f"With nothing pressing, the forces around this stroke lie {significant(sideways, 2)} N sideways and "
-        f"{significant(pressing, 2)} N along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
+        f"{significant(upright, 2)} N along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
         f"{', so no force, friction or speed is given' if refused else ''}."
     )
     findings.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
@@ -354,8 +354,8 @@ def _judge_way(findings: Findings, track: Track, window: slice) -> None:
     A finger that rests has hardly a drag, and its noise points anywhere.
     """
     limits, greatest = track.settings.slide, np.nanmax(track.tangential, initial=0.0)
-    dragging = np.isfinite(track.ratio) & (track.tangential >= limits.drag_share * greatest)
-    way = track.wrench[:, :2] / np.where(dragging, track.tangential, np.nan)[:, None]
+    in_drag = np.isfinite(track.ratio) & (track.tangential >= limits.drag_share * greatest)
+    way = track.wrench[:, :2] / np.where(in_drag, track.tangential, np.nan)[:, None]
     inside = float(np.linalg.norm(mean_vector(way[window])))
     overall = float(np.linalg.norm(mean_vector(way)))
     if inside < limits.one_way:

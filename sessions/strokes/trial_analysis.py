@@ -239,9 +239,9 @@ def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: Tri
     """Yield a flaw where there is no stroke, or more than the trial asks for."""
     if not strokes:
         yield Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused")
-    if trial is None or len(strokes) <= (allowed := context.plan.stroke_limit(trial)):
+    if trial is None or len(strokes) <= (limit := context.plan.stroke_limit(trial)):
         return
-    task = "one" if allowed == 1 else f"up to {allowed}"
+    task = "one" if limit == 1 else f"up to {limit}"
     model = next((stroke.number for stroke in strokes_for_model(strokes, trial, context.decisions)), None)
     gets = "none, as was decided" if model is None else "the first" if model == 1 else f"the one numbered {model}"
     turned = any(FlawName.TURNED in stroke.flaws for stroke in strokes)
@@ -265,11 +265,11 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
     peak = float(np.nanmax(track.normal, initial=0.0))
     if peak < settings.ratio.force_floor:
         return None
-    pressed = np.flatnonzero(track.normal >= limits.press_held * peak)
-    hold = slice(int(pressed[0]), int(pressed[-1]) + 1)
-    lasted = float(track.time[hold.stop - 1] - track.time[hold.start])
+    high = np.flatnonzero(track.normal >= limits.press_held * peak)
+    hold = slice(int(high[0]), int(high[-1]) + 1)
+    duration = float(track.time[hold.stop - 1] - track.time[hold.start])
     distance = displacement(track.position[hold])
-    if lasted < limits.press_shortest or not distance <= limits.press_moves:
+    if duration < limits.press_shortest or not distance <= limits.press_moves:
         return None
     values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
     blocks = block_means(values, track.rate, settings)

@@ -123,7 +123,7 @@ def line(scheme, options, data):
     hostile, port = Hostile(), PseudoTerminal("ttyHostile")
 
     def talk():
-        port.heard(0.002)
+        port.receive(0.002)
         port.say(data() if callable(data) else data)
 
     hostile.serve(talk)

@@ -90,7 +90,7 @@ def test_a_computer_busy_while_it_sends_has_sent_all_the_same(terminal, monkeypa
     monkeypatch.setattr(serial.serialposix, "os", SimpleNamespace(**{**vars(os), "write": write_late}))
     link.send(b"asked")
     monkeypatch.undo()
-    assert terminal.heard(1.0) == b"asked"
+    assert terminal.receive(1.0) == b"asked"
     link.close()
 
 
@@ -117,7 +117,7 @@ def test_every_byte_goes_through_unchanged_both_ways(terminal):
     link.send(all_bytes)
     terminal_bytes = b""
     while len(terminal_bytes) < 256:
-        terminal_bytes += terminal.heard(1.0)
+        terminal_bytes += terminal.receive(1.0)
     terminal.say(all_bytes)
     link_bytes = b""
     while len(link_bytes) < 256:
@@ -191,7 +191,7 @@ def test_what_a_simulated_device_sent_before_its_port_was_opened_is_lost_as_on_a
     terminal.say(b"new")
     heard = b""
     while not heard.endswith(b"new"):
-        terminal.heard(0.01)
+        terminal.receive(0.01)
         heard += link.receive(0.1) or b""
     assert heard == b"new"
     link.close()

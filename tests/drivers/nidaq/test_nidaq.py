@@ -24,7 +24,7 @@ def library():
     stand_in.install()
     yield stand_in
     stand_in.remove()
-    assert stand_in.open == 0, "an acquisition was left open"
+    assert stand_in.open_tasks == 0, "an acquisition was left open"
     assert set(threading.enumerate()) <= before, "a thread was left running"
 
 
@@ -62,7 +62,7 @@ def test_its_readings_are_the_simulated_wrench_at_the_rate_read_back(library, ad
     assert block.sequence.tolist() == list(range(1, len(block) + 1))
     np.testing.assert_allclose(np.diff(block.time), 1.0 / 1000.5, rtol=1e-9)
     wrench = transducer.info.calibration.wrench(block.raw, np.zeros(6))
-    np.testing.assert_allclose(wrench, library.bench.wrench(library.begun[-1] + block.time), atol=1e-9)
+    np.testing.assert_allclose(wrench, library.bench.wrench(library.starts[-1] + block.time), atol=1e-9)
     assert transducer.health.lost == transducer.health.saturated == 0
 
 
