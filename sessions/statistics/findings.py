@@ -283,7 +283,7 @@ def _estimates(one: DescriptorFindings) -> dict[str, tuple[float, float, float]]
     if not isinstance(one.on_friction, str):
         terms += one.on_friction.terms
         if (differ := one.on_friction.spreads) is not None:
-            spreads = {LEVELS: differ.level, SLOPES: differ.slope, NOISE: differ.residual}
+            spreads = {LEVELS: differ.level, SLOPES: differ.slope, NOISE: differ.left}
     if one.repeated is not None and one.repeated.people is not None:
         terms.append(Term(WITHIN, one.repeated.r, *one.repeated.people, math.nan))
         terms += () if isinstance(one.on_response, str) else one.on_response.terms[1:2]

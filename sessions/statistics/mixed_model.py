@@ -204,7 +204,7 @@ class Spreads:
 
     level: Spread  # of the subjects' levels, at the mean of the covariate [unit of y]
     slope: Spread | None  # of their slopes on the covariate [unit of y over unit of x]; None without one
-    residual: Spread  # of y about each subject's own line: the noise of single trials
+    left: Spread  # of y about each subject's own line: the noise of single trials
     subjects: int
     dof: int  # of what is left
 

@@ -169,7 +169,7 @@ def sed_hits():
             hits[f"mixed model on SED: {name}"].append(term.low <= true_value <= term.high)
         spreads = finding.on_response.spreads
         hits["mixed model on SED: spread of levels"].append(spreads.level.low <= LEVEL <= spreads.level.high)
-        hits["mixed model on SED: noise"].append(spreads.residual.low <= NOISE <= spreads.residual.high)
+        hits["mixed model on SED: noise"].append(spreads.left.low <= NOISE <= spreads.left.high)
     return hits
 
 

@@ -316,7 +316,7 @@ def test_in_a_balanced_design_the_spreads_are_those_of_the_analysis_of_variance(
     y = rng.normal(0, 4, (10, 5)) + rng.normal(0, 6, (10, 1))
     components = spreads([str(k) for k in range(10) for _ in range(5)], y.ravel().tolist(), [])
     within = ((y - y.mean(axis=1, keepdims=True)) ** 2).sum() / 40
-    assert components.residual.sd**2 == pytest.approx(within)
+    assert components.left.sd**2 == pytest.approx(within)
     assert components.level.sd**2 == pytest.approx(y.mean(axis=1).var(ddof=1) - within / 5)
     assert components.slope is None
     assert spreads(["a", "a", "b", "b"], [1.0, 2.0, 3.0, 4.0], []) is None

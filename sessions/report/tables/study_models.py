@@ -96,7 +96,7 @@ def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
     of = model.spreads
     if of is not None:
         slopes = ("spread of subjects' slopes", units[first], of.slope)
-        for name, unit, s in ((LEVELS, "points", of.level), slopes, (NOISE, "points", of.residual)):
+        for name, unit, s in ((LEVELS, "points", of.level), slopes, (NOISE, "points", of.left)):
             if s is not None:
                 yield row(name, unit, s.sd, s)
 
