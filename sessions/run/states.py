@@ -78,9 +78,10 @@ class Place:
     def answers(self) -> tuple[tuple[Stimulus, bool], ...]:
         """Return what was compared with the standard of this block, and whether it was chosen, where a take counts."""
         trials = self.plan.trials
+        block = trials[self.index].block
         stimuli: list[tuple[Stimulus, bool]] = []
         for n, (trial, progress) in enumerate(zip(trials, self.progress, strict=True)):
-            if trial.block == self.trial.block and progress.kept and progress.choice is not None:
+            if trial.block == block and progress.kept and progress.choice is not None:
                 comparison = trials[n - 1] if trial.standard else trial
                 stimuli.append((comparison.stimulus, (progress.choice == "second") == (comparison is trial)))
         return tuple(stimuli)

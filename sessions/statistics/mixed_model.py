@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy import linalg, optimize, special
+from scipy import optimize, special
+from scipy.linalg import lapack
 
 from drivers.arrays import Array
 from sessions.statistics.correlations import CONFIDENCE, t_quantile
@@ -52,23 +53,21 @@ class _Likelihood:
 
     def reduce(self, at: Array) -> tuple[Array, Array, float]:
         """Return L (c, c), `sums` weighted by the inverse covariance, and the log of the covariance's determinant."""
-        factor = np.tensordot(at, self.patterns, 1)
+        factor = np.einsum("m,mij->ij", at, self.patterns)
         c = len(factor)
-        root = linalg.cholesky(np.eye(c) + factor.T @ self.sums[:c, :c] @ factor, lower=True)
-        half = linalg.solve_triangular(root, factor.T @ self.sums[:c], lower=True)
-        return factor, self.sums - half.T @ half, 2.0 * float(np.log(np.diag(root)).sum())
+        half, log_det = _eliminate(np.eye(c) + factor.T @ self.sums[:c, :c] @ factor, factor.T @ self.sums[:c])
+        return factor, self.sums - half.T @ half, log_det
 
     def deviance(self, at: Array) -> tuple[float, Array]:
         """Return -2 log likelihood, and its gradient."""
         factor, cross_products, value = self.reduce(at)
         c = len(factor)
-        root = linalg.cholesky(cross_products[c:-1, c:-1], lower=True)
-        half = linalg.solve_triangular(root, cross_products[c:-1], lower=True)
+        half, log_det = _eliminate(cross_products[c:-1, c:-1], cross_products[c:-1])
         cross_products = cross_products - half.T @ half  # by what the fixed effects leave
         rest = float(cross_products[-1, -1])
         by = cross_products[:c, :c] - self.dof / rest * np.outer(cross_products[:c, -1], cross_products[:c, -1])
         if self.reml:
-            value += 2.0 * float(np.log(np.diag(root)).sum())
+            value += log_det
         else:
             by += half[:, :c].T @ half[:, :c]
         value += self.dof * (1.0 + math.log(2.0 * math.pi * rest / self.dof))
@@ -143,6 +142,18 @@ def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int
         singular=bool(np.abs(np.diag(factor)).min() < _SINGULAR),
         exact=bool(np.abs(at).max() >= _WIDEST),
     )
+
+
+def _eliminate(matrix: Array, rows: Array) -> tuple[Array, float]:
+    """Return R^-1 `rows` with `matrix` = R R', and the log of its determinant.
+
+    LAPACK is called without SciPy's checks, which take most of the time of small matrices.
+    """
+    root, failed = lapack.dpotrf(matrix, lower=True)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    half, _ = lapack.dtrtrs(root, rows, lower=True)
+    return half, 2.0 * float(np.log(root.diagonal()).sum())
 
 
 def _levels(groups: Sequence[str] | Sequence[int] | Array) -> Array:
