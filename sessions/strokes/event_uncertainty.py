@@ -92,9 +92,10 @@ def break_away_draws(
         free = max(blocks - 2.0 - bends, 1.0)
         scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(free, len(part)))[:, None]
         factors = scale * draw.standard_normal((len(part), len(edges)))
-        numbers = series.free_numbers(fit, bends=bends)
-        moves = np.linalg.pinv(fit.slopes(t)[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
-        by_blocks = np.add.reduceat(moves * (y - fit.at(t)), edges)
+        slopes, residual = fit.slopes(t), y - fit.at(t)
+        numbers = series.free_numbers(fit, slopes, residual, bends=bends)
+        moves = np.linalg.pinv(slopes[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
+        by_blocks = np.add.reduceat(moves * residual, edges)
         zero_t, zero_n = (each[part] for each in zero)
         draws.append(fit.meets + factors @ by_blocks + zero_t * (moves @ (1.0 / n)) - zero_n * (moves @ (y / n)))
     return np.concatenate(draws)

@@ -101,29 +101,30 @@ class ClimbReadings:
 
     def refine(self, climb: Climb, *, bends: bool = False) -> Climb:
         """Return the climb near a first one that leaves least of the readings (Levenberg 1944, Marquardt 1963)."""
-        least, damping = self.mean_square(climb), 1e-3
+        slopes, residual, damping = climb.slopes(self.time), self.ratio - climb.at(self.time), 1e-3
         for _ in range(self.settings.climb_steps):
-            free = self.free_numbers(climb, bends=bends)
-            slopes = climb.slopes(self.time)[:, free]
-            normal, right = slopes.T @ slopes, slopes.T @ (self.ratio - climb.at(self.time))
+            free = self.free_numbers(climb, slopes, residual, bends=bends)
+            columns = slopes[:, free]
+            normal, right = columns.T @ columns, columns.T @ residual
             numbers = np.array(climb)
             numbers[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
             new = self._feasible_climb(numbers)
-            misfit = self.mean_square(new)
-            if misfit < least:
-                gain, climb, least, damping = least - misfit, new, misfit, damping / 10.0
-                if gain < self.settings.climb_still * misfit:
+            new_residual = self.ratio - new.at(self.time)
+            gain = float(residual @ residual - new_residual @ new_residual)
+            if gain > 0.0:
+                climb, slopes, residual, damping = new, new.slopes(self.time), new_residual, damping / 10.0
+                if gain < self.settings.climb_still * float(residual @ residual):
                     break
             elif (damping := damping * 10.0) > 1e9:
                 break
         return climb
 
-    def free_numbers(self, climb: Climb, *, bends: bool) -> list[int]:
-        """Return the positions of the numbers of a climb that the readings can move.
+    def free_numbers(self, climb: Climb, slopes: Array, residual: Array, *, bends: bool) -> list[int]:
+        """Return the positions of the numbers of a climb that the readings can move, by what it leaves of them (n,).
 
         A climb that begins with the first reading can only begin later.
         """
-        later = float(climb.slopes(self.time)[:, 0] @ (self.ratio - climb.at(self.time))) > 0.0
+        later = float(slopes[:, 0] @ residual) > 0.0
         free = [1, 4, 5]
         free += [0] if climb.begins > self.time[0] or later else []
         free += [2] if bends else []
