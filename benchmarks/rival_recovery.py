@@ -18,7 +18,7 @@ from solver.quantities import NAMES
 from solver.scene.published import STICKINESS
 
 TRUE_QUANTITIES = ("mu", "tau_max", "sed", "shear_along_skin", "stretch_along_skin", "pressure")
-DECIDED = 0.95  # Akaike weight, as a posterior probability under equal priors
+DECISIVE_WEIGHT = 0.95  # Akaike weight, as a posterior probability under equal priors
 EFFECTS = AssumedEffects(25.0 * 12.0**0.5, noise=4.0, level_sd=3.0, slope_sd=0.0)  # 25 points a standard deviation
 POOL = 60  # simulated people whose strokes are predicted once; each study draws from them
 SPEEDS = (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5)  # [mm/s]
@@ -53,7 +53,7 @@ STUDIES = (Study("10 × 5", 10, PAPER), Study("20 × 12", 20, WIDE), Study("24 �
 def row(study: Study, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
     """Return a row of the table: how often the quantity, a twin of it, and a wrong one is preferred or decided."""
     first = preferred_rivals(weights)
-    sure = [name for name, one in zip(first, weights, strict=True) if one[name] >= DECIDED]
+    sure = [name for name, one in zip(first, weights, strict=True) if one[name] >= DECISIVE_WEIGHT]
     wrong = [name for name in first if name not in alike]
     most = f"`{max(sorted(set(wrong)), key=wrong.count)}`" if wrong else "–"
     counts = [

@@ -116,11 +116,11 @@ def score_reports(trial: int, score: float) -> tuple[m.Report, ...]:
 TARED = m.Tared((0.008, -0.007, -0.061, 1.2, -0.4, 0.02), (0.0041,) * 3 + (0.052,) * 3, (0.0,) * 6, 7000, 1.0)
 OPEN = (m.Device(INFO, FRAME), health(), TARED)
 SIMULATED = "SIMULATED transducer and hand"
-BEGUN = (m.SessionBegun(FOLDER, PLAN, "simulated hand", SIMULATED, 0, 1.0), steps.AskBegin(), status(1))
+BEGINNING = (m.SessionBegun(FOLDER, PLAN, "simulated hand", SIMULATED, 0, 1.0), steps.AskBegin(), status(1))
 ENDED = m.SessionEnded(FOLDER, SessionEnd("every trial is done", "finished", True, 900_000, Health()), False)
-GONE = "the transducer does not answer; check its power and the cable"
-LOST = SessionEnd(GONE, "device", False, 90_000, Health(lost=12))
-CUT = m.SessionEnded(FOLDER, LOST, True)
+CABLE_FAULT = "the transducer does not answer; check its power and the cable"
+LINK_LOSS = SessionEnd(CABLE_FAULT, "device", False, 90_000, Health(lost=12))
+CUT_SHORT = m.SessionEnded(FOLDER, LINK_LOSS, True)
 
 
 SCALES = (1.0, 1.5, 2.0)
@@ -210,7 +210,7 @@ class _Places:
         self.window.act("primary")
         self.picture("02-refused")
         self.window.page.seed.clear()
-        self.play(*BEGUN, until=3.5)
+        self.play(*BEGINNING, until=3.5)
         self.picture("03-begin")
         self.play(steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(trial), until=3.6)
         self.picture("04-mount")
@@ -247,7 +247,7 @@ class _Places:
         self.window.keys.toggle()
         self.picture("14-keys")
         self.window.keys.toggle()
-        self.play(CUT, until=9.9)
+        self.play(CUT_SHORT, until=9.9)
         self.picture("15-cut-short")
         self.play(ENDED, m.Sealing(FOLDER), m.Sealed(FOLDER), until=9.9)
         self.picture("16-ended")

@@ -20,7 +20,7 @@ SHOWN_COUNTERS = tr_noop(
 )
 
 _FIELDS = tr_noop(("serial", "calibration", "rate", "tare", "drift"))
-SPOKEN = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the zero")}  # where a caption does not say
+SPOKEN_NAMES = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the zero")}  # captions at length
 
 
 class BenchPanel(Panel):
@@ -62,7 +62,7 @@ class BenchPanel(Panel):
         regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
         say(self._name, view.name)
         for name, widget in self._fields.items():
-            say(widget, getattr(view, name), tr(SPOKEN.get(name, name)))
+            say(widget, getattr(view, name), tr(SPOKEN_NAMES.get(name, name)))
         for name, text in view.life:
             say(self._life[name], text, tr(name))
         for name, text in view.counters:
@@ -87,7 +87,7 @@ class BenchPanel(Panel):
         view = self._view
         if view is not None and view.connect is not None:
             self._send(view.connect)
-        elif uri := self._chosen_uri():
+        elif uri := self._selected_uri():
             self._send(Connect(uri))
             self._show_begin()
 
@@ -96,13 +96,13 @@ class BenchPanel(Panel):
             self.connect_choice()
         self.window().setFocus()
 
-    def _chosen_uri(self) -> str:
+    def _selected_uri(self) -> str:
         text = self._choice.currentText().strip()
         at = self._choice.findText(text)
         return text if at < 0 else str(self._choice.itemData(at))
 
     def _show_devices(self, view: BenchView) -> None:
-        typed = self._chosen_uri()
+        typed = self._selected_uri()
         self._choice.clear()
         for uri, words in view.devices:
             self._choice.addItem(words, uri)

@@ -108,8 +108,8 @@ class Bridge(QObject):
     def send(self, message: Message) -> None:
         """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
         self._fold(message)
-        if isinstance(message, REQUESTS) and (self.state.gone is None or isinstance(message, BEGINNING)):
-            if self.state.gone is not None:  # another recorder takes its place
+        if isinstance(message, REQUESTS) and (self.state.exit_reason is None or isinstance(message, BEGINNING)):
+            if self.state.exit_reason is not None:  # another recorder takes its place
                 self._client.close()
                 self._client = self._start()
                 self._fold(m.Gone(True, ""))
@@ -143,7 +143,7 @@ class Bridge(QObject):
     def report_drawing_failure(self, error: Exception) -> None:
         """Say that a picture could not be drawn; nothing else is touched by it."""
         sentence = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
-        if self.state.drawing != sentence:
+        if self.state.drawing_error != sentence:
             self._fold(DrawingFailed(sentence))
 
     def _take(self, report: Report) -> None:

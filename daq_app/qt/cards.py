@@ -66,7 +66,7 @@ class CutShort(Panel):
         self._items: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
-        self._sessions.currentTextChanged.connect(self._show_chosen)
+        self._sessions.currentTextChanged.connect(self._show_choice)
         self._words = label("", wrap=True)  # whole, however narrow the list is
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
         heading = label(tr("▲ Sessions that were cut short"), wrap=True)
@@ -95,7 +95,7 @@ class CutShort(Panel):
         self._sessions.setVisible(len(sessions) > 1)
         self.setVisible(bool(sessions))
 
-    def _show_chosen(self, words: str) -> None:
+    def _show_choice(self, words: str) -> None:
         say(self._words, words)
 
     def _resume(self) -> None:

@@ -30,8 +30,8 @@ class CoursePanel(Panel):
         super().__init__(tr("course of the session"))
         self._send = send
         self._view: CourseView | None = None
-        self._asking = ""
-        self._asked_for = ""  # the question that stands over the line
+        self._act = ""
+        self._question_words = ""  # the question that stands over the line
         self.plan = row_list(tr("plan: trials done, in hand and coming"))
         self.buttons = {act: button("", tr(_WORDS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
@@ -76,8 +76,8 @@ class CoursePanel(Panel):
         if entry.sends is not None:
             self._send(entry.sends)
             return
-        self._asking = what
-        self._asked_for = entry.question
+        self._act = what
+        self._question_words = entry.question
         say(self._question, entry.question)
         self.line.setAccessibleName(entry.question)
         self.line.clear()
@@ -93,15 +93,15 @@ class CoursePanel(Panel):
     def _keep(self) -> None:
         text = self.line.text().strip()
         if not text:
-            say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._asked_for))
+            say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._question_words))
             return
-        question = "" if self._view is None else self._view.buttons[self._asking].question
-        if question and question != self._asked_for:  # it would discard another trial than was meant
-            self._asked_for = question
+        question = "" if self._view is None else self._view.buttons[self._act].question
+        if question and question != self._question_words:  # it would discard another trial than was meant
+            self._question_words = question
             say(self._question, tr("The session has gone on meanwhile. {question}", question=question))
             return
         self.leave()
-        self._send(MESSAGES[self._asking](text))
+        self._send(MESSAGES[self._act](text))
 
     def _entry_row(self) -> QWidget:
         page, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)

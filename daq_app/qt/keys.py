@@ -200,7 +200,7 @@ class Keyboard(QObject):
     def _pressed_twice(self, event: QKeyEvent) -> bool:
         """Say whether a key is the second press of the one that gave the answer, as the system counts presses."""
         soon = self._since_answer.isValid() and self._since_answer.elapsed() < QApplication.doubleClickInterval()
-        return soon and event.key() == self._subject.given_with
+        return soon and event.key() == self._subject.answer_key
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
         if new is not None and new.window() is self._window and is_text_field(old) and self.focused_field() is None:

@@ -90,7 +90,7 @@ class LiveBar(QWidget):
             text = quantity(float(finite.mean()) if len(finite) else None, *form)
             if text != self.values[channel].text():
                 say(self.values[channel], text)
-                self.values[channel].setAccessibleName(spoken(channel, text))
+                self.values[channel].setAccessibleName(speech(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -139,7 +139,7 @@ class LiveBar(QWidget):
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            value.setAccessibleName(spoken(channel, "–"))
+            value.setAccessibleName(speech(channel, "–"))
             caption = label(short_name(channel), "quiet")
             if channel in _COLOURS:
                 caption.setStyleSheet(f"border-bottom: 3px solid {_COLOURS[channel]};")
@@ -149,10 +149,10 @@ class LiveBar(QWidget):
         return hbox(*spread[1:], len(PICTURE), spacing=GRID)
 
 
-def spoken(channel: str, text: str) -> str:
+def speech(channel: str, text: str) -> str:
     """Return what a screen reader says of a number.
 
-    >>> spoken("N", "1.20 N"), spoken("mu", "–")
+    >>> speech("N", "1.20 N"), speech("mu", "–")
     ('Normal force 1.20 N', 'Friction coefficient no number')
     """
     return f"{tr(_NAMES[channel])} {tr('no number') if text == '–' else text}"
@@ -205,9 +205,9 @@ class LivePanel(Panel):
             self._show_tab()
 
     def _show_tab(self) -> None:
-        opened = bool(self.drawer.open)
-        self.tab.setText("▸\nD" if opened else "◂\nD")
-        word = tr("close") if opened else tr("open")
+        is_open = bool(self.drawer.open)
+        self.tab.setText("▸\nD" if is_open else "◂\nD")
+        word = tr("close") if is_open else tr("open")
         self.tab.setAccessibleName(tr("{word} the drawer: six axes, sample and finger", word=word))
         self.tab.setToolTip(self.tab.accessibleName())
         self._show_acts()

@@ -18,7 +18,7 @@ _ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
 _MARGIN = 4  # [pixels]
 TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 
-_SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
+_VIEW_BOX = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
 _PART = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = (
@@ -182,7 +182,7 @@ class FingerView(QWidget):
             self._paint_row(painter, QRectF(0, top + room - row, self.width(), row))
 
     def _paint_finger(self, painter: QPainter, box: QRectF) -> None:
-        t, view = theme_of(self), View.fit(_SHOWN, box.left(), box.top(), box.width(), box.height())
+        t, view = theme_of(self), View.fit(_VIEW_BOX, box.left(), box.top(), box.width(), box.height())
         if view.per_mm < 1.0:
             return
         painter.save()

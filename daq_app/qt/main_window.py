@@ -254,7 +254,7 @@ class MainWindow(QMainWindow):
             self._left.setCurrentIndex(page)
             self._fit()
             (self.page.subject if page == 0 else self).setFocus()
-            self.subject.given_with = None  # an answer of another session
+            self.subject.answer_key = None  # an answer of another session
             if page == 1:
                 self.side.begin()
             else:

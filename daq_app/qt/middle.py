@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QScrollArea, QWidget
 
 from daq_app.qt.bridge import Bridge
-from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, spoken
+from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, speech
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.parts import (
     Panel,
@@ -118,7 +118,7 @@ class InspectedTrial(QWidget):
         self.details.setVisible(bool(trial.details))
         for name, text in trial.cells:
             say(self.cells[name], text)
-            self.cells[name].setAccessibleName(spoken(name, text))
+            self.cells[name].setAccessibleName(speech(name, text))
         for plot in self._plots:
             plot.setVisible(trial.stroke is not None and trial.stroke.curve is not None)
         if trial.stroke is not None and trial.stroke.curve is not None:

@@ -55,8 +55,8 @@ class ModelColumn(QWidget):
         self._state: AnalystState | None = None
         self._film: m.FingerHistory | None = None
         self._name = ""  # of the finger's pictures, after their kind
-        self._drawing = ("", -1)  # picture that was asked for, and version of the report
-        self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
+        self._picture_request = ("", -1)  # picture that was asked for, and version of the report
+        self._history_request: tuple[m.Key, int] | None = None  # of a trial without an answer, and version
         self._at: int | None = None  # of the film; None: the settled state
         self.finger = FingerCanvas(tokens)
         self.other = FingerCanvas(tokens, self.finger.sight)  # of the session that is compared
@@ -130,7 +130,7 @@ class ModelColumn(QWidget):
             names = (name_and_errors(state.report), name_and_errors(other.report))
             self.comparison.show_rows(compare_reports(state.report, other.report), names)
             if before is None or before.other is not other:
-                self._drawing = ("", -1)
+                self._picture_request = ("", -1)
                 self.together.setChecked(True)
                 self._paint()
                 self.tabs.setCurrentIndex(_COMPARISON)
@@ -154,8 +154,8 @@ class ModelColumn(QWidget):
             view.show_picture(name, title, picture.png)
             return
         view.show_picture("", tr("Drawing: {words}", words=words), b"")
-        if self._drawing != (name, state.version):
-            self._drawing = (name, state.version)
+        if self._picture_request != (name, state.version):
+            self._picture_request = (name, state.version)
             self._ask(m.Draw(name))
 
     def _paint(self) -> None:
@@ -221,8 +221,8 @@ class ModelColumn(QWidget):
         prediction = None if row is None else row.prediction
         if row is None or prediction is None or prediction.sed is not None or not was_tried(prediction):
             return
-        if (row.key, version) != self._followed:
-            self._followed = row.key, version
+        if (row.key, version) != self._history_request:
+            self._history_request = row.key, version
             self._ask(m.ShowHistory(row.key))
 
     def _save(self, name: str, path: str) -> None:

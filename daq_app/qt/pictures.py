@@ -27,7 +27,7 @@ _KINDS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
 COMPARISON_NAME = "compared"  # its name
 _DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
-_SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
+_STEP_MS = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
 _LOOK = 0.02  # between two looks at a film that is being written [s]
 _COLOURS = 256  # of a frame of a GIF: all that the format has
 FILM_SUFFIXES = (".gif", ".mp4")
@@ -208,7 +208,7 @@ def _write_film(path: Path, frames: list[Image.Image]) -> None:
         write_whole(path, _mp4(frames))
         return
     content = io.BytesIO()
-    frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], duration=_SHOWN, loop=0)
+    frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], duration=_STEP_MS, loop=0)
     write_whole(path, content.getvalue())
 
 
@@ -219,7 +219,7 @@ def _mp4(frames: list[Image.Image]) -> bytes:
     except ImportError as error:
         raise ImportError(tr(NO_MP4)) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / _SHOWN:g}", "-i", "-"]
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / _STEP_MS:g}", "-i", "-"]
     codec = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
     pixels = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
     with TemporaryDirectory() as folder:  # the place of an MP4's parts is known at its end: no pipe takes it

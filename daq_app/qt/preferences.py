@@ -39,7 +39,7 @@ def theme() -> str:
     return name if name in THEMES else "system"
 
 
-def chosen_scale() -> float:
+def preferred_scale() -> float:
     """Return how much larger than usual type is to be [-]: as it was chosen, or as the system asks for."""
     try:
         scale = float(str(settings().value(SCALE)))
@@ -48,7 +48,7 @@ def chosen_scale() -> float:
     return scale if scale in SCALES else font_scale()
 
 
-type_scale = cache(chosen_scale)  # of the type of this run: a choice holds from the next start on
+type_scale = cache(preferred_scale)  # of the type of this run: a choice holds from the next start on
 
 
 def font_scale() -> float:

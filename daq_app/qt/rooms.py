@@ -114,7 +114,7 @@ class Menus:
         themes = {name: name for name in preferences.THEMES}
         self._choices(view.addMenu(tr("Theme")), preferences.THEME, themes, preferences.theme())
         sizes = {f"{100 * scale:.0f} %": scale for scale in preferences.SCALES}
-        self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.chosen_scale())
+        self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.preferred_scale())
         codes = {name_of(code): code for code in languages(EXPERIMENTER)}
         menu, language = view.addMenu(tr("Language")), preferences.language()
         self.languages = self._choices(menu, preferences.LANGUAGE, codes, language)
@@ -128,12 +128,12 @@ class Menus:
         docs.setEnabled(DOCS.exists())
         help_menu.addAction(tr("About daq-app"), lambda: about_box(window).show())
 
-    def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
+    def show_state(self, *, in_hand: bool, over: bool, session_open: bool) -> None:
         for action in self.course:
             action.setEnabled(in_hand and not over)
         self.pilot.setEnabled(not in_hand)
         for action in (self.report, self.export):
-            action.setEnabled(opened)
+            action.setEnabled(session_open)
 
     def _add(self, menu: QMenu, name: str, words: str) -> QAction:
         """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
@@ -338,7 +338,7 @@ class Rooms(QStackedWidget):
             remember_session(Path(session.folder))
         in_hand = self._bridge.view.course is not None
         self._rail.show_room(self.room, in_hand=in_hand, over=self.over)
-        self._menus.show_state(in_hand=in_hand, over=self.over, opened=self.analyst is not None)
+        self._menus.show_state(in_hand=in_hand, over=self.over, session_open=self.analyst is not None)
 
     def _enter_review(self) -> ReviewRoom:
         if self.count() == 1:

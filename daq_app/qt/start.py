@@ -65,9 +65,9 @@ def window(arguments: list[str]) -> int:
     def analyst(application: "QApplication") -> "AnalystWindow":
         from daq_app.qt.analyst_window import AnalystWindow
         from daq_app.qt.preferences import remember_session, resize_to_hint
-        from daq_app.qt.tokens import chosen_tokens
+        from daq_app.qt.tokens import preferred_tokens
 
-        tokens = chosen_tokens()
+        tokens = preferred_tokens()
         _dress(application, tokens)
         remember_session(folder)
         window = AnalystWindow(folder, tokens)
@@ -118,16 +118,16 @@ def open_window(
     recorder.send(Connect(SIMULATED_BENCH))
     from daq_app.qt.bridge import Bridge
     from daq_app.qt.main_window import MainWindow
-    from daq_app.qt.tokens import chosen_tokens
+    from daq_app.qt.tokens import preferred_tokens
 
     application.setQuitOnLastWindowClosed(False)
-    _dress(application, theme or chosen_tokens())
+    _dress(application, theme or preferred_tokens())
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, tablet)
 
     def follow_theme() -> None:
-        _dress(application, chosen_tokens())
+        _dress(application, preferred_tokens())
 
     window.theme_chosen.connect(follow_theme)
     if theme is None:
@@ -170,16 +170,16 @@ def _show_window(build: "Callable[[QApplication], QWidget]") -> int:
     except NoTabletServer as error:
         return _fail(str(error))
     window.show()
-    stopped: list[int] = []
+    codes: list[int] = []
 
     def stop(*_: object) -> None:
         """Close the window as its button does: it asks first where a session is being recorded."""
-        stopped.append(STOPPED)
+        codes.append(STOPPED)
         QTimer.singleShot(0, window.close)
 
     signal.signal(signal.SIGINT, stop)
     code = application.exec()
-    return stopped[0] if stopped else code
+    return codes[0] if codes else code
 
 
 def _speak(application: "QApplication") -> None:

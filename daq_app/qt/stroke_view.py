@@ -88,8 +88,8 @@ class EdgeHandle(QPushButton):
         state = placed.decision or (tr("as found") if placed.present else tr("not found; where it could be"))
         words = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
         self.setToolTip(words)
-        spoken = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
-        self.setAccessibleName(f"{spoken} {at} s, {state}{tr(', Enter records') if self._away else ''}")
+        speech = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
+        self.setAccessibleName(f"{speech} {at} s, {state}{tr(', Enter records') if self._away else ''}")
 
 
 class StrokeView(QWidget):

@@ -38,7 +38,7 @@ class SubjectWindow(QWidget):
         self.setAccessibleName("subject's window")
         self._view: SubjectView | None = None
         self._answered: SubjectView | None = None  # until the recorder has the answer, views still ask for it
-        self.given_with: int | None = None  # key by which the last answer was given; None: by a click or a touch
+        self.answer_key: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
         self._language = ENGLISH
         self._title, self._text = label(role="title", wrap=True), label(wrap=True)
@@ -54,7 +54,7 @@ class SubjectWindow(QWidget):
         self.next.setMinimumSize(px(180), px(64))
         self.ruler = RulerCheck()
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
-        self.ruler.finished.connect(self._ruler_done)
+        self.ruler.finished.connect(self._end_ruler_check)
         self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
         for way in (self.line, self.number, self.choice):
@@ -228,7 +228,7 @@ class SubjectWindow(QWidget):
         if self.scoring:
             self._way.setFocus()
 
-    def _ruler_done(self) -> None:
+    def _end_ruler_check(self) -> None:
         self._screen_changed()
         self._turn()
 
@@ -245,7 +245,7 @@ class SubjectWindow(QWidget):
     def _give(self, key: int | None = None) -> None:
         if not self.scoring or not self._way.answered:
             return
-        self.given_with = key
+        self.answer_key = key
         answer_event = self._way.answer_event(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
         self._view, self._answered = None, self._view

@@ -72,9 +72,9 @@ class TextTable(CopyableTable):
         self._texts: tuple[tuple[str, ...], ...] = ()
         self._cells = QStandardItemModel(0, len(head), self)
         self._cells.setHorizontalHeaderLabels(list(head))
-        self._sorted = _ByNumber(self)
-        self._sorted.setSourceModel(self._cells)
-        self.setModel(self._sorted)
+        self._sorter = _ByNumber(self)
+        self._sorter.setSourceModel(self._cells)
+        self.setModel(self._sorter)
         self.horizontalHeader().setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # as the session has them
         self.setSortingEnabled(True)
         self.selectionModel().currentRowChanged.connect(self._went)
@@ -88,18 +88,18 @@ class TextTable(CopyableTable):
                 for cells in lines:
                     self._cells.appendRow([_item(*cell) for cell in zip(cells, right, strict=True)])
                 self.resizeColumnsToContents()
-        now = self._sorted.mapToSource(self.currentIndex())
+        now = self._sorter.mapToSource(self.currentIndex())
         if 0 <= at < len(lines) and at != now.row():
             with QSignalBlocker(self):
                 self.go_to(at, max(now.column(), 0))
 
     def go_to(self, line: int, column: int = 0) -> None:
         """Stand at a cell of a line, which is numbered as before any sorting."""
-        self.setCurrentIndex(self._sorted.mapFromSource(self._cells.index(line, column)))
+        self.setCurrentIndex(self._sorter.mapFromSource(self._cells.index(line, column)))
 
     def _went(self, now: QModelIndex, _before: QModelIndex) -> None:
         if now.isValid():
-            self.row_chosen.emit(self._sorted.mapToSource(now).row())
+            self.row_chosen.emit(self._sorter.mapToSource(now).row())
 
 
 def _is_of_numbers(column: Sequence[str]) -> bool:

@@ -50,7 +50,7 @@ DARK = Tokens(
 )  # fmt: skip
 
 
-def chosen_tokens() -> Tokens:
+def preferred_tokens() -> Tokens:
     """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
     if (name := theme()) != "system":
         return DARK if name == "dark" else LIGHT

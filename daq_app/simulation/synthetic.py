@@ -294,7 +294,7 @@ class SyntheticPeople(SimulatedPeople):
 Load = tuple[float, float, float, int, float]  # mu [-], tau_max [MPa], depth [mm], direction, speed [mm/s]
 SedsAt = Callable[[Sequence[Load]], Sequence[float | None]]
 
-DRAWN = 2000  # people
+SAMPLE_SIZE = 2000  # people
 _FIRST = 1_000_000  # seed: nobody of a study's
 _FINGERS = np.linspace(-4.0, 4.0, 9)  # solved: friction of the finger, in its standard deviations between people
 
@@ -340,10 +340,10 @@ def _seds_of_fingers(
     loads = [
         (s.mu * m, s.tau_max * m, block.indentation, s.direction, s.speed) for m in times.tolist() for s in surfaces
     ]
-    known_seds = [sed for sed in seds(loads) if sed is not None]
-    if len(known_seds) < len(loads):
+    answers = [sed for sed in seds(loads) if sed is not None]
+    if len(answers) < len(loads):
         return None
-    table = 1e3 * np.array(known_seds).reshape(len(times), len(surfaces))
+    table = 1e3 * np.array(answers).reshape(len(times), len(surfaces))
     if not moisture:
         return lambda _: table[0].tolist()
     spline = CubicSpline(np.log(times), table)
@@ -355,7 +355,7 @@ def _relation(
 ) -> PopulationRelation:
     products = np.zeros((4, 4))  # of SED, place, index before, and score, each without the person's own mean
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
-    for seed in range(_FIRST, _FIRST + DRAWN):
+    for seed in range(_FIRST, _FIRST + SAMPLE_SIZE):
         person, order = SimulatedSubject(seed, people), [int(one) for one in draw.permutation(len(surfaces))]
         perceived = [person.perceived_surface(surface) for surface in surfaces]
         own = seds(perceived[0].mu / surfaces[0].mu)
@@ -368,7 +368,7 @@ def _relation(
         )
         rows -= rows.mean(axis=0)
         products += rows.T @ rows
-    noise = people.judgement_noise**2 * DRAWN * (len(surfaces) - 1)
+    noise = people.judgement_noise**2 * SAMPLE_SIZE * (len(surfaces) - 1)
     r = products[0, 3] / math.sqrt(products[0, 0] * (products[3, 3] + noise))
     slope = np.linalg.solve(products[:3, :3], products[:3, 3])[0]
     return PopulationRelation(float(r), float(slope))

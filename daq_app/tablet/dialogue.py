@@ -155,11 +155,11 @@ class Dialogue:
         session = self._session
         if session is None:
             return False
-        stored = any(of.answer is not None and _key(session, of.trial.number, of.takes) == key for of in session.trials)
-        if stored:
+        safe = any(of.answer is not None and _key(session, of.trial.number, of.takes) == key for of in session.trials)
+        if safe:
             self._open_keys.discard(key)
             self._send(Stored(key))
-        return stored
+        return safe
 
 
 def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | None) -> AnswerEvent:

@@ -28,7 +28,7 @@ _FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
 ARRAYS = ("sequence", "time", "received_ns", "wrench", "status")  # of live readings
-_KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
+_LONGEST_TAKE = 90.0  # readings of a take that are kept to be looked at, at most [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class LiveFeed:
         time, values = with_gaps(live.time, self._channels(live, frame), gaps)
         self._sequence = int(live.sequence[-1])
         self._take.append(live)
-        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > _KEPT:
+        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > _LONGEST_TAKE:
             self._take.popleft()
         self.trace.add(time, values)
 

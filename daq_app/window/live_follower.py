@@ -29,8 +29,9 @@ from solver.response.stepper import LivePicture, Stepper, stepper
 TOUCH = 0.05  # less normal force is no touch [N]
 _FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
 LEAST_MU = 0.05  # before any was measured [-]
-_KEPT = 60.0  # predictions that are kept for the difference to the full solve [s]
-SEEN, SEEN_EVERY = 100, 0.1  # states that are kept for a stroke whose full solve fails, and the time between them [s]
+_HISTORY = 60.0  # predictions that are kept for the difference to the full solve [s]
+OBSERVATIONS = 100  # states that a stroke keeps, for a full solve that fails
+OBSERVATION_EVERY = 0.1  # the time between them [s]
 DEFAULT_DEPTH = 2.0  # for which the mesh is made where no plan tells one [mm]
 DEFAULT_AREA = 100.0  # of contact, for the traction bound, likewise [mm2]
 
@@ -103,7 +104,7 @@ class Follower:
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
         self._seds: deque[tuple[float, float]] = deque()
-        self._observations: deque[_Observation] = deque(maxlen=SEEN)
+        self._observations: deque[_Observation] = deque(maxlen=OBSERVATIONS)
 
     def follows(self, use: Use) -> bool:
         """Say whether it follows just this finger already."""
@@ -120,11 +121,11 @@ class Follower:
         sed = np.array([value for value, _ in steps])
         instead = np.array([len(self._models) > 1 and not reached for _, reached in steps])
         self._seds += zip(forces.time.tolist(), sed.tolist(), strict=True)
-        while self._seds and self._seds[0][0] < forces.time[-1] - _KEPT:
+        while self._seds and self._seds[0][0] < forces.time[-1] - _HISTORY:
             self._seds.popleft()
         model = self._models[1 if self._reached and len(self._models) > 1 else 0]
         row, now, (picture, rest) = model.stepper.row(), float(forces.time[-1]), model.picture_and_rest()
-        if sed[-1] > 0.0 and (not self._observations or abs(now - self._observations[-1].time) >= SEEN_EVERY):
+        if sed[-1] > 0.0 and (not self._observations or abs(now - self._observations[-1].time) >= OBSERVATION_EVERY):
             self._observations.append(_Observation(now, row, picture, rest, model.stepper.depth))
         return Provisional(
             forces.time, sed, row, picture, model.stepper.depth, self._mu,

@@ -23,7 +23,7 @@ from daq_app.wording import tr
 from sessions.plan.plan import Frame, SessionPlan
 
 Connection = Any  # one end of a pipe; its type is another one on each system
-_WAITING = 2.0  # forces older than so long are dropped, where the model does not keep up [s]
+_OLDEST = 2.0  # forces older than so long are dropped, where the model does not keep up [s]
 
 
 def run(connection: Connection) -> None:
@@ -116,7 +116,7 @@ class LiveModel:
         if self._unsent and self._unsent[-1].stream != forces.stream:
             self._unsent.clear()
         self._unsent.append(forces)
-        while len(self._unsent) > 1 and forces.time[-1] - self._unsent[0].time[0] > _WAITING:
+        while len(self._unsent) > 1 and forces.time[-1] - self._unsent[0].time[0] > _OLDEST:
             self._unsent.pop(0)
 
     def settle(self, request: Settle) -> None:

@@ -24,7 +24,7 @@ from sessions.toml_file import SettingsError
 
 SIGNED_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
-_SHOWN = 20  # sessions that were cut short, at most
+_LONGEST_LIST = 20  # sessions that were cut short, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +265,7 @@ def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
         for place in (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")):
             places[place] = place.stat().st_mtime
     for place in sorted(places, key=lambda place: -places[place]):
-        if len(unfinished) == _SHOWN:
+        if len(unfinished) == _LONGEST_LIST:
             break
         try:
             if is_sealed(place.parent) or is_in_use(place):

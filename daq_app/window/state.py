@@ -175,9 +175,9 @@ class AppState:
     last_report: float | None = None  # when the recorder was last heard [s]
     bench: BenchState = field(default_factory=BenchState)
     session: SessionState | None = None
-    failed: m.Failed | None = None  # the last request that could not be met
-    gone: str | None = None  # why the recorder's process is not there any more
-    drawing: str | None = None  # what could not be drawn
+    failure: m.Failed | None = None  # the last request that could not be met
+    exit_reason: str | None = None  # why the recorder's process is not there any more
+    drawing_error: str | None = None  # what could not be drawn
     language: str = ENGLISH  # that the next session's subject reads, as it is chosen
 
 
@@ -195,21 +195,21 @@ def fold(state: AppState, message: Message) -> AppState:
 def _fold_window(state: AppState, message: Message) -> AppState:
     match message:
         case m.SessionBegun():
-            return replace(state, session=begin_session(message, state.now), failed=None)
+            return replace(state, session=begin_session(message, state.now), failure=None)
         case m.StartSession() | m.ResumeSession():
-            return replace(state, failed=None)
+            return replace(state, failure=None)
         case NewSession() if state.session is not None and state.session.over:
             return replace(state, session=None)
         case m.Failed():
-            return replace(state, failed=message)
+            return replace(state, failure=message)
         case m.Gone(requested, sentence):
-            return replace(state, gone=None if requested else sentence)
+            return replace(state, exit_reason=None if requested else sentence)
         case Tick(now):
             return replace(state, now=now)
         case Dismissed():
-            return replace(state, failed=None, drawing=None)
+            return replace(state, failure=None, drawing_error=None)
         case DrawingFailed(sentence):
-            return replace(state, drawing=sentence)
+            return replace(state, drawing_error=sentence)
         case LanguageChosen(language):
             return replace(state, language=language)
         case _:

@@ -17,7 +17,7 @@ from drivers.transducer import TransducerInfo
 
 HEALTH_NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 _UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
-COUNTED = tuple(name for name in COUNT_WORDS if name not in ("received", "off_rate"))  # the rate has its own sentence
+COUNTERS = tuple(name for name in COUNT_WORDS if name not in ("received", "off_rate"))  # the rate has its own sentence
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
@@ -113,7 +113,7 @@ def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> B
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
         silent=bench.link != "open" or _is_silent(bench) or unheard > SILENT,
-        counters=(*((COUNT_WORDS[name], f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
+        counters=(*((COUNT_WORDS[name], f"{counts[name]}") for name in ("received", *COUNTERS)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
         drift=_drift(bench),
@@ -164,7 +164,7 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
 def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
     """Return what was counted of the stream, in words."""
     counts = asdict(bench.health)
-    troubles = [f"{counts[name]} {tr(COUNT_WORDS[name])}" for name in COUNTED if counts[name]]
+    troubles = [f"{counts[name]} {tr(COUNT_WORDS[name])}" for name in COUNTERS if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
     if troubles := [*troubles, *bench.health.flagged, *rate]:
         return "look", ", ".join(troubles)
@@ -309,7 +309,7 @@ def _lamp(state: AppState) -> Lamp:
         return Lamp("off", tr("starting {running}", running=running), tr("not saved yet"))
     age = state.now - session.saved_at
     words = tr("saved {age:.1f} s ago", age=age)
-    if age > UNSAVED or state.gone is not None:
+    if age > UNSAVED or state.exit_reason is not None:
         return Lamp("wrong", tr("NOT RECORDING {running}", running=running), words)
     return Lamp("on", tr("recording {running}", running=running), words)
 
@@ -321,14 +321,14 @@ def _banner(state: AppState) -> Banner | None:
     if session is not None and (words := _cut_short(state, session)):
         again = m.ResumeSession(session.folder) if session.resumable else None
         return Banner("wrong", words, tr("Resume session") if again else "", again)
-    if state.gone is not None and session is not None and session.sealing == "cut short":
+    if state.exit_reason is not None and session is not None and session.sealing == "cut short":
         words = tr(
             "The recorder has ended while it sealed. Everything is kept: 'daq-app resume --end {folder}' seals it.",
             folder=session.folder,
         )
         return Banner("wrong", words)
-    if state.gone is not None:
-        return Banner("wrong", sentence(state.gone))
+    if state.exit_reason is not None:
+        return Banner("wrong", sentence(state.exit_reason))
     if words := _no_readings(bench, running=running):
         return Banner("wrong", words)
     if running and (age := _unheard(state)) > SILENT:
@@ -337,10 +337,10 @@ def _banner(state: AppState) -> Banner | None:
         axes = ", ".join(tr(axis) for axis in over)
         words = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
         return Banner("wrong", words, tr("Acknowledge"), m.AcknowledgeOverloads())
-    if state.failed is not None:
-        return Banner("look", sentence(state.failed.sentence), tr("Dismiss"), Dismissed())
-    if state.drawing is not None:
-        words = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing)
+    if state.failure is not None:
+        return Banner("look", sentence(state.failure.sentence), tr("Dismiss"), Dismissed())
+    if state.drawing_error is not None:
+        words = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing_error)
         return Banner("look", words, tr("Dismiss"), Dismissed())
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
@@ -364,8 +364,9 @@ def _cut_short(state: AppState, session: SessionState) -> str:
     end, bench, rest = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
     if session.phase == "resuming":
         return ""
-    if session.resumable and state.failed is not None and state.failed.request == "ResumeSession":
-        return tr("The session was not taken up again: {why}. {kept}", why=state.failed.sentence.rstrip("."), kept=rest)
+    if session.resumable and state.failure is not None and state.failure.request == "ResumeSession":
+        why = state.failure.sentence.rstrip(".")
+        return tr("The session was not taken up again: {why}. {kept}", why=why, kept=rest)
     if session.fault is not None:
         return tr("The recording has stopped: {why}. {kept}", why=session.fault.rstrip("."), kept=rest)
     if end is None or end.cause in ("finished", "aborted", "stopped"):

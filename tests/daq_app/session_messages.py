@@ -21,8 +21,8 @@ CALIBRATION = Calibration(
 INFO = TransducerInfo("net-ft://192.168.1.1", "net-ft", "Net F/T", "FT1", False, 7000.0, 7000.0, CALIBRATION)
 PLAN = plan(protocol("sensotact-friction"), "P07", 7)
 FIRST, SECOND = PLAN.trials[:2]
-KNOWN = {"steady": (2.0, 3.5), "mu_dynamic": 0.44, "mu_dynamic_interval": (0.438, 0.444), "speed": 21.0}
-STROKE = Stroke(**dict.fromkeys(f.name for f in fields(Stroke) if f.default is f.default_factory is MISSING) | KNOWN)
+VALUES = {"steady": (2.0, 3.5), "mu_dynamic": 0.44, "mu_dynamic_interval": (0.438, 0.444), "speed": 21.0}
+STROKE = Stroke(**dict.fromkeys(f.name for f in fields(Stroke) if f.default is f.default_factory is MISSING) | VALUES)
 GOOD = Quality((), STROKE, fell=0.08)
 FLAW = Remark("refused", "no steady window", "", "")
 BAD = Quality((FLAW,), replace(STROKE, steady=None, mu_dynamic=None), fell=0.08)
@@ -51,14 +51,14 @@ def status(safe_ns, state="mounting"):
     return Status(state, 1, 10, 100, 0, 2.0, Acknowledged(100, 3, safe_ns))
 
 
-BEGUN = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0), steps.AskBegin())
-MOUNT = (*BEGUN, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
+BEGINNING = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0), steps.AskBegin())
+MOUNT = (*BEGINNING, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
 TARE = (*MOUNT, steps.StartTake(1, 1), steps.MeasureZero())
 READY = (*TARE, steps.AskStroke(FIRST))
 TOUCH = (*READY, log("contact_onset", 1, time=1.5, noticed=1.51))
 SCORE = (*TOUCH, log("finger_lifted", 1, time=3.6, noticed=3.7), steps.AskScore(FIRST, ("low end", "high end")))
 PAUSED = (*MOUNT, log("pause", 1))
-CLOSING = (*BEGUN, steps.AskFinish())
+CLOSING = (*BEGINNING, steps.AskFinish())
 END = SessionEnd("every trial is done", "finished", True, 100, Health())
 LOST = SessionEnd("the cable was pulled", "device", False, 100, Health(lost=3))
 CODE = FIRST.stimulus.code

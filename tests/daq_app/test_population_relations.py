@@ -15,7 +15,7 @@ GAIN, NOISE, RISE = 0.75, 4.0, 2.0  # of a score per index, points, kPa per unit
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    monkeypatch.setattr(synthetic, "DRAWN", 400)
+    monkeypatch.setattr(synthetic, "SAMPLE_SIZE", 400)
 
 
 def straight(loads):

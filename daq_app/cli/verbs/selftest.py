@@ -119,7 +119,7 @@ class _WatchedRecorder:
         self.recorder = Recorder.start(_PACE)
         self.events: list[LoggedEvent] = []
         self.safe = 0  # readings acknowledged
-        self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
+        self.newest_ns = 0  # when the newest reading shown was received [ns, session clock]
         self._over = False
         self._queue: list[m.Report] = []
 
@@ -156,7 +156,7 @@ class _WatchedRecorder:
                     case Status(safe=safe):
                         self.safe = max(self.safe, safe.readings)
                     case m.Live(received_ns=received_ns) if len(received_ns) and not self._over:
-                        self.shown_ns = int(received_ns[-1])
+                        self.newest_ns = int(received_ns[-1])
                     case m.SessionEnded():
                         self._over = True  # what is shown from now on is not recorded
                     case _:
@@ -183,7 +183,7 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
         _check_recording(recording, witness, trial)
         block = recording.last_block()
         if len(block):
-            most_lost = max(most_lost, (witness.shown_ns - int(block.received_ns[-1])) * 1e-9)
+            most_lost = max(most_lost, (witness.newest_ns - int(block.received_ns[-1])) * 1e-9)
         readings, events = readings + witness.safe, events + len(witness.events)
         copies.append(room / f"copy-{number}")
         shutil.copytree(folder, copies[-1])

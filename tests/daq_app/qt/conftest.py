@@ -55,7 +55,7 @@ class Driver:
     def until(self, condition, what="it"):
         end = time.monotonic() + PATIENCE
         while not condition():
-            assert time.monotonic() < end, f"{what} did not come: {self.state.failed}, {self.view.banner}"
+            assert time.monotonic() < end, f"{what} did not come: {self.state.failure}, {self.view.banner}"
             self.application.processEvents()
             time.sleep(0.002)
 

@@ -250,5 +250,5 @@ def test_an_address_that_is_being_typed_stays_when_other_devices_are_found(drive
     panel._choice.setEditText("net-ft://10.0.0.9")
     panel._show_devices(replace(view, uri=""))
     assert panel._choice.currentText() == "net-ft://10.0.0.9"
-    assert panel._chosen_uri() == "net-ft://10.0.0.9"
+    assert panel._selected_uri() == "net-ft://10.0.0.9"
     panel._show_devices(view)

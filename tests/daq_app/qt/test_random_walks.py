@@ -137,7 +137,7 @@ class Walk:
     def fault(self):
         bridge = self.window.bridge
         what = self.random.choice(("killed", "unplugged", "plugged", "wrong address"))
-        if what == "killed" and self.driver.state.gone is None:
+        if what == "killed" and self.driver.state.exit_reason is None:
             with suppress(ProcessLookupError):  # killed a moment ago, and the window has not heard of it
                 os.kill(bridge._client.pid, signal.SIGKILL)
         elif what == "unplugged":
@@ -177,8 +177,8 @@ class Walk:
         to_do = window.to_do
         if not to_do.sentence.isVisible() or not to_do.sentence.text().strip():
             return "no sentence says what to do"
-        if self.driver.state.drawing is not None:
-            return f"an error in the window: {self.driver.state.drawing}"
+        if self.driver.state.drawing_error is not None:
+            return f"an error in the window: {self.driver.state.drawing_error}"
         if to_do.primary.isVisible() and to_do.primary.isEnabled():
             return ""
         session = self.driver.session

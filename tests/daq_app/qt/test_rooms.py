@@ -47,9 +47,9 @@ def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
         assert plot.grab().toImage().pixelColor(1, 1).name() == tokens.DARK.surface  # what is painted by hand follows
         driver.application.processEvents()
         assert page._picture.toImage().pixelColor(2, 2).name() == tokens.DARK.ground
-        assert tokens.chosen_tokens() == tokens.DARK
+        assert tokens.preferred_tokens() == tokens.DARK
         actions["150 %"].trigger()
-        assert preferences.chosen_scale() == 1.5
+        assert preferences.preferred_scale() == 1.5
         assert preferences.type_scale() == 1.0  # until the next start: no part of a window is larger than the rest
         assert "next start" in window.notice._words.text()
     finally:

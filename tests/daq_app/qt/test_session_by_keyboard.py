@@ -58,8 +58,8 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
     assert [position for _, position in answers[0]["positions"]] == [50.0]
     assert [position for _, position in answers[1]["positions"]] == [50.0, 51.0, 52.0, 53.0]
     assert all(data["input_device"] == "keyboard" for data in answers)
-    assert driver.state.failed is None
-    assert driver.state.drawing is None
+    assert driver.state.failure is None
+    assert driver.state.drawing_error is None
     qualities = [trial.quality for trial in driver.session.trials]
     assert all(quality is not None and quality.stroke.mu_dynamic is not None for quality in qualities)
     QTest.keyClick(window, SPACE)

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from session_messages import BEGUN, FIRST, PLAN, SCORE, after, log
+from session_messages import BEGINNING, FIRST, PLAN, SCORE, after, log
 
 from daq_app.tablet.dialogue import Act, Dialogue, Page, Stored, decode, event_of
 from daq_app.window.subject import subject_view
@@ -72,7 +72,7 @@ def test_an_answer_waits_on_the_tablet_while_no_session_runs():
     tablet.dialogue.show(subject_view(None), None, str, mirrored=False)
     assert tablet.give(key) is None
     assert not [message for message in tablet.messages if isinstance(message, Stored)]
-    tablet.show(*BEGUN)
+    tablet.show(*BEGINNING)
     assert isinstance(tablet.give(key), steps.Note)
 
 

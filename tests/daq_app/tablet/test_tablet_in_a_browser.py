@@ -166,7 +166,7 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     window.bridge.send(NewSession())
 
 
-READ = [
+TEXTS = [
     ("1,000", "en", None),
     ("1.000", "en", 1),
     ("1,000", "de", 1),
@@ -203,7 +203,7 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     browser.until("asked()", "the question")
     assert not browser.is_visible("next")
     if protocol == "magnitude-estimation":
-        for text, language, number in READ:
+        for text, language, number in TEXTS:
             browser.value(f"page.view.language = '{language}', document.getElementById('number').value = '{text}'")
             assert browser.value("number()") == number, (text, language)
         browser.value("page.view.language = 'en', document.getElementById('number').value = '1,000', draw()")

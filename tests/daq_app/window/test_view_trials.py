@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from session_messages import (
     BAD,
-    BEGUN,
+    BEGINNING,
     FIRST,
     FLAW,
     GOOD,
@@ -29,7 +29,7 @@ from sessions.plan.plan import Visibility
 from sessions.run import steps
 
 STROKE = stroke_at(np.arange(3.0))
-KEPT = (log("scored", 1, score=40.0), log("take_kept", 1), steps.AskMount(SECOND))
+TAKE_KEPT = (log("scored", 1, score=40.0), log("take_kept", 1), steps.AskMount(SECOND))
 
 
 def kinds(*messages):
@@ -37,18 +37,18 @@ def kinds(*messages):
 
 
 def test_each_trial_is_one_tile_with_a_state_of_its_own():
-    assert kinds(*BEGUN) == ["coming"] * 3
+    assert kinds(*BEGINNING) == ["coming"] * 3
     assert kinds(*SCORE) == ["current", "coming", "coming"]
-    assert kinds(*SCORE, Judged(1, 1, GOOD), *KEPT) == ["done", "current", "coming"]
-    assert kinds(*SCORE, Judged(1, 1, BAD), *KEPT) == ["flawed", "current", "coming"]
+    assert kinds(*SCORE, Judged(1, 1, GOOD), *TAKE_KEPT) == ["done", "current", "coming"]
+    assert kinds(*SCORE, Judged(1, 1, BAD), *TAKE_KEPT) == ["flawed", "current", "coming"]
     assert kinds(*SCORE, log("skip", 1, reason="torn"), steps.AskMount(SECOND)) == ["skipped", "current", "coming"]
-    again = (*SCORE, log("take_discarded", 1, reason="a slip"), steps.StartTake(1, 2), Judged(1, 2, GOOD), *KEPT)
+    again = (*SCORE, log("take_discarded", 1, reason="a slip"), steps.StartTake(1, 2), Judged(1, 2, GOOD), *TAKE_KEPT)
     assert kinds(*again) == ["redone", "current", "coming"]
 
 
 def test_no_two_states_share_a_shape_or_words():
     assert len({mark for mark, _ in TILES.values()}) == len(TILES)
-    view = tiles(after(*SCORE, Judged(1, 1, GOOD), *KEPT).session)
+    view = tiles(after(*SCORE, Judged(1, 1, GOOD), *TAKE_KEPT).session)
     assert [tile.words for tile in view[:3]] == [
         f"trial 1, {FIRST.stimulus.code}: done",
         f"trial 2, {SECOND.stimulus.code}: in hand",
@@ -58,7 +58,7 @@ def test_no_two_states_share_a_shape_or_words():
 
 def test_an_inspected_trial_says_its_verdict_its_means_and_its_score():
     quality = replace(GOOD, stroke=STROKE)
-    view = inspection(after(*SCORE, Judged(1, 1, quality), *KEPT).session, 1)
+    view = inspection(after(*SCORE, Judged(1, 1, quality), *TAKE_KEPT).session, 1)
     assert view.heading == f"Trial 1, {FIRST.stimulus.code}: done, score 40"
     assert view.verdict == "Good"
     assert view.cells == (("N", "1.23 N"), ("T", "0.50 N"), ("mu", "0.41"), ("speed", "21 mm/s"))
@@ -78,7 +78,7 @@ def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
     [
         (SCORE, 2, "Its stroke is still to come."),
         ((*SCORE, log("skip", 1, reason="torn")), 1, "It was left out: no stroke of it counts."),
-        ((*SCORE, *KEPT), 1, "Its stroke was recorded, and this window has not looked at it"),
+        ((*SCORE, *TAKE_KEPT), 1, "Its stroke was recorded, and this window has not looked at it"),
     ],
 )
 def test_a_trial_without_a_stroke_says_why(messages, number, why):
@@ -92,7 +92,7 @@ def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
     blind = replace(PLAN, shown=Visibility(experimenter=()))
     beginning = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
     quality = Judged(1, 1, replace(GOOD, stroke=STROKE))
-    view = inspection(after(BEGUN[0], beginning, *TARE[2:], quality, *KEPT).session, 1)
+    view = inspection(after(BEGINNING[0], beginning, *TARE[2:], quality, *TAKE_KEPT).session, 1)
     assert view.verdict == "Forces are not shown in this protocol."
     assert view.stroke is None
     assert "score" not in view.heading
@@ -104,7 +104,7 @@ def test_a_take_that_was_discarded_keeps_its_reason():
 
 
 def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset():
-    first_take = (*SCORE, Judged(1, 1, replace(GOOD, stroke=STROKE)), *KEPT)
+    first_take = (*SCORE, Judged(1, 1, replace(GOOD, stroke=STROKE)), *TAKE_KEPT)
     again = (
         log("redo", 2, reason="mistaken"),
         log("take_discarded", 1, take=1, reason="mistaken"),

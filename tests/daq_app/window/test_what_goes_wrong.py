@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from session_messages import (
     BAD,
-    BEGUN,
+    BEGINNING,
     CLOSING,
     END,
     GOOD,
@@ -30,16 +30,16 @@ from daq_app.window.view import derive_view
 from sessions.plan.protocols import plan, protocol
 from sessions.run import steps
 
-GONE = m.Gone(False, "the recorder has ended unexpectedly (signal 9)")
+NO_RECORDER = m.Gone(False, "the recorder has ended unexpectedly (signal 9)")
 RESUME = m.ResumeSession("recordings/P07")
 PAIRS = plan(protocol("paired-comparison"), "P07", 7, forces=False)
 
 # ---- the recorder ends
 
 
-@pytest.mark.parametrize("messages", [BEGUN, MOUNT, TARE, READY, TOUCH, SCORE, PAUSED, CLOSING])
+@pytest.mark.parametrize("messages", [BEGINNING, MOUNT, TARE, READY, TOUCH, SCORE, PAUSED, CLOSING])
 def test_a_recorder_that_ends_in_any_phase_leaves_a_session_that_one_key_resumes(messages):
-    view = derive_view(after(*messages, GONE))
+    view = derive_view(after(*messages, NO_RECORDER))
     assert view.course.primary.sends == RESUME
     assert view.banner.sends == RESUME
     assert "signal 9" in view.banner.sentence
@@ -48,30 +48,31 @@ def test_a_recorder_that_ends_in_any_phase_leaves_a_session_that_one_key_resumes
 
 @pytest.mark.parametrize("late", [steps.Scored(40.0), steps.Note("a door"), m.AcknowledgeOverloads(), m.Gone(True, "")])
 def test_nothing_that_is_done_after_the_recorder_has_ended_takes_the_way_to_resume_away(late):
-    view = derive_view(after(*SCORE, GONE, late))
+    view = derive_view(after(*SCORE, NO_RECORDER, late))
     assert view.course.primary.sends == RESUME
     assert view.banner.sends == RESUME
 
 
-@pytest.mark.parametrize("cut", [GONE, m.Failed("StartSession", "no room: free some", "RecordingError")])
+@pytest.mark.parametrize("cut", [NO_RECORDER, m.Failed("StartSession", "no room: free some", "RecordingError")])
 def test_a_session_whose_sealing_was_cut_short_is_not_said_to_be_being_sealed(cut):
     sealing = after(*CLOSING, m.SessionEnded("recordings/P07", END, False), m.Sealing("recordings/P07"))
     assert derive_view(sealing).lamp.words == "ended, being sealed"
     view = derive_view(after(*CLOSING, m.SessionEnded("recordings/P07", END, False), m.Sealing("recordings/P07"), cut))
     assert view.lamp.words == "ended, not sealed"
-    assert ("daq-app resume --end recordings/P07" if cut is GONE else "No room: free some") in view.banner.sentence
+    remedy = "daq-app resume --end recordings/P07" if cut is NO_RECORDER else "No room: free some"
+    assert remedy in view.banner.sentence
     assert view.banner.sends != RESUME
 
 
 def test_the_subject_is_asked_for_nothing_while_no_recorder_takes_the_answer():
     assert derive_view(after(*SCORE)).subject.asks
-    subject = derive_view(after(*SCORE, GONE)).subject
+    subject = derive_view(after(*SCORE, NO_RECORDER)).subject
     assert (subject.asks, subject.title) == (False, "Pause")
 
 
 def test_a_resumption_that_fails_says_why_and_can_be_tried_again():
     failure = m.Failed("ResumeSession", "nothing answers at 192.168.1.1", "LinkLost")
-    state = after(*SCORE, GONE, RESUME, m.Gone(True, ""))  # as the next recorder starts
+    state = after(*SCORE, NO_RECORDER, RESUME, m.Gone(True, ""))  # as the next recorder starts
     assert derive_view(state).banner is None
     view = derive_view(after(failure, state=state))
     assert "nothing answers at 192.168.1.1" in view.banner.sentence
@@ -80,7 +81,7 @@ def test_a_resumption_that_fails_says_why_and_can_be_tried_again():
 
 
 def test_the_transducer_went_with_the_recorder_and_can_be_connected_anew():
-    bench = derive_view(after(m.Device(INFO, None), GONE)).bench
+    bench = derive_view(after(m.Device(INFO, None), NO_RECORDER)).bench
     assert (bench.lamp, bench.name, bench.connect) == ("off", "no transducer", None)
 
 
@@ -138,7 +139,7 @@ def test_the_subject_reads_what_to_do_on_the_surface_only_when_it_is_time_to_do_
 
 # ---- which trial is done again
 
-KEPT = (*SCORE, log("scored", 1, score=38.2), log("take_kept", 1, take=1))
+TAKE_KEPT = (*SCORE, log("scored", 1, score=38.2), log("take_kept", 1, take=1))
 LAST = PLAN.trials[-1]
 
 
@@ -148,8 +149,8 @@ LAST = PLAN.trials[-1]
         (MOUNT, None),
         (TARE, PLAN.trials[0]),
         (SCORE, PLAN.trials[0]),
-        ((*KEPT, steps.AskMount(SECOND)), PLAN.trials[0]),
-        ((*KEPT, steps.AskMount(SECOND), steps.StartTake(2, 1), steps.MeasureZero()), SECOND),
+        ((*TAKE_KEPT, steps.AskMount(SECOND)), PLAN.trials[0]),
+        ((*TAKE_KEPT, steps.AskMount(SECOND), steps.StartTake(2, 1), steps.MeasureZero()), SECOND),
         ((*READY, log("take_discarded", 1, take=1, reason="a pause"), steps.AskMount(PLAN.trials[0])), None),
         (CLOSING, LAST),
     ],

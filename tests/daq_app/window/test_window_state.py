@@ -6,7 +6,7 @@ import pytest
 from msgspec import structs
 from session_messages import (
     BAD,
-    BEGUN,
+    BEGINNING,
     CLOSING,
     CODE,
     END,
@@ -46,7 +46,7 @@ def health_report(load, peak=None):
 @pytest.mark.parametrize(
     ("messages", "words", "label", "sends"),
     [
-        (BEGUN, "begin", "Begin", steps.Begin()),
+        (BEGINNING, "begin", "Begin", steps.Begin()),
         (MOUNT, f"Mount sample {CODE}", "Zero", steps.StimulusMounted(CODE)),
         (TARE, "Hands off", None, None),
         (READY, f"Subject strokes {CODE} once", None, None),
@@ -334,7 +334,7 @@ def test_a_simulated_bench_is_said_to_be_simulated_before_a_session_begins():
 # ---- the subject
 
 
-@pytest.mark.parametrize("messages", [BEGUN, MOUNT, TARE, READY, TOUCH, SCORE, PAUSED, CLOSING])
+@pytest.mark.parametrize("messages", [BEGINNING, MOUNT, TARE, READY, TOUCH, SCORE, PAUSED, CLOSING])
 def test_nothing_the_subject_sees_gives_the_stimulus_away(messages):
     text = repr(derive_view(after(*messages)).subject)
     for trial in PLAN.trials:
