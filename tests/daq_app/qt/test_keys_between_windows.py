@@ -191,7 +191,7 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
     recording = driver.abort()
     first = recording.trials[0]
     assert (first.outcome, first.score, first.take.number) == ("scored", 50.0, 1)
-    assert [take.discarded for take in first.other_takes] == ["the redo was undone"]
+    assert [take.discard_reason for take in first.other_takes] == ["the redo was undone"]
     replica = replay(recording, tmp_path / "replayed", None, lambda *_: None)
     assert not list(different_events(recording, replica))
 
