@@ -18,7 +18,10 @@ NOT_THIS = sorted({name for row in ROWS for name in re.findall(r"`(\w+)`", row[3
 ONLY_IN_SOLVER = {"evidence", "folding"}  # of models, and of skin
 HELD_NODES = {"held"}  # of a mesh: driven nodes, as scripts name them
 # A value that has a kind is not called by what happened to it.
-PARTICIPLES = {"asked", "beside", "both", "felt", "found", "given", "held", "made", "others", "planted", "told"}
+PARTICIPLES = {
+    "asked", "beside", "both", "felt", "found", "given", "held", "made", "others", "planted", "said",
+    "saved", "seen", "spoken", "stated", "taken", "told", "wanted", "written",
+}  # fmt: skip
 # Modules that read what can run, and calls that run what was read.
 RUNS = frozenset({"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"})
 CALLS = frozenset({"eval", "exec", "compile", "__import__", "read_pickle"})
