@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) -> str:
-    """Measure one rate [Hz] for so many real seconds, with a read every `every` seconds."""
+    """Measure one rate [Hz] for so many real seconds, asking `every` so many seconds."""
     factor = max(1.0, rate / TOP)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
@@ -125,7 +125,7 @@ def serve(rate: int, factor: float, pipe: Connection) -> None:
 
 
 def send(rate: int, seconds: float, pipe: Connection) -> None:
-    """Act as a box: stream so many seconds of records, `rate` a second, which were packed before."""
+    """Be a box that is asked to stream and sends so many seconds of records, `rate` a second, packed before."""
     count = round(rate * seconds)
     records = np.zeros(count, RECORD)
     records["number"] = records["counter"] = np.arange(1, count + 1)
@@ -146,7 +146,7 @@ def send(rate: int, seconds: float, pipe: Connection) -> None:
 
 
 def draw(rate: int, pipe: Connection) -> None:
-    """Act as the window's process: draw ten seconds of six axes at each hand-over, and send the number of frames."""
+    """Be the window's process: draw the last ten seconds of six axes at each hand-over; at the end tell how often."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     from PySide6.QtWidgets import QApplication
 

@@ -145,7 +145,7 @@ def measure_process(uri: str, rate: int, seconds: int, room: Path) -> None:
 
 
 def listen(recorder: Recorder, seconds: int) -> None:
-    """Receive the live readings of a session, and print their rate and their age."""
+    """Take what a session shows, and print how old and how much it is."""
     ages: list[float] = []
     lags: list[float] = []
     readings = left_out = 0

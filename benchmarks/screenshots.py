@@ -42,7 +42,7 @@ class PlayedRecorder:
     pid = 0
 
     def __init__(self) -> None:
-        """Start with an empty queue of reports."""
+        """Start with nothing to say."""
         self.sent: list[object] = []
         self._queue: list[m.Report] = []
         self._bench = Bench(3)
@@ -51,7 +51,7 @@ class PlayedRecorder:
         self._peak = np.zeros(7)
 
     def play(self, *reports: m.Report) -> None:
-        """Queue these reports for the next poll."""
+        """Say these at the next poll."""
         self._queue += reports
         self._health = next((one for one in reports if isinstance(one, m.HealthReport)), self._health)
 
@@ -81,7 +81,7 @@ class PlayedRecorder:
         self.sent.append(request)
 
     def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  nothing is waited for
-        """Return the queued reports."""
+        """Return what is to be said."""
         reports, self._queue = tuple(self._queue), []
         return reports
 
@@ -109,7 +109,7 @@ def status(safe_ns: int) -> Status:
 
 
 def score_reports(trial: int, score: float) -> tuple[m.Report, ...]:
-    """Return the reports of a score."""
+    """Return what is said when a trial is scored."""
     return (log_line("scored", trial, score=score), log_line("take_kept", trial, take=1))
 
 
@@ -299,7 +299,7 @@ class _Places:
         shutil.rmtree(folder.parent)
 
     def play(self, *reports, until: float) -> None:  # noqa: ANN002
-        """Play reports, then readings up to an instant."""
+        """Have reports said, then readings up to an instant."""
         self.recorder.play(*reports)
         self.recorder.readings(until)
         self.wait(lambda: not any(isinstance(report, m.Live) for report in self.recorder._queue))

@@ -26,7 +26,7 @@ def page() -> str:
 
 
 def _rows(series: tuple[Surface, ...]) -> list[dict[str, float]]:
-    """Return the SED [kPa] of each surface with its error, in both directions and at both kinematics."""
+    """Return for each surface its SED [kPa] with error, slid the other way too, and at finite strain."""
     scenes = [replace(scene(one), solve=Solve(tolerance=0.005, evidence="quick")) for one in series]
     other = {"+x": "-x", "-x": "+x"}
     back = [replace(one, loading=replace(one.loading, slide=other[one.loading.slide])) for one in scenes]

@@ -35,9 +35,9 @@ class RateWatch:
         self._last = 0.0  # arrival
 
     def take(self, count: int, received_ns: int) -> bool:
-        """Take how far the device has counted by something that arrived; tell whether its rate is found to be another.
+        """Take the device's count at an arrival; say whether its rate has changed.
 
-        `count` rises with what was lost on the way, where that is known.
+        `count` includes records that are known to be lost.
         """
         now = received_ns * 1e-9
         if self._best is None or now - self._last > self._silence:
@@ -59,7 +59,7 @@ class RateWatch:
         self._best = None
 
     def _rate_changed(self) -> bool:
-        """Compare two stretches, one after the other, with the rate believed."""
+        """Say whether two successive stretches agree on another rate, and take that one."""
         for windows, most in (_COARSE, _FINE):
             if len(self._points) <= 2 * windows:
                 continue

@@ -63,12 +63,12 @@ class UdpLink:
 
 
 @contextlib.contextmanager
-def _name_failures(where: str, missing: str, advice: str, deadline: Deadline) -> Generator[None]:
+def _name_failures(where: str, absence: str, advice: str, deadline: Deadline) -> Generator[None]:
     """Raise LinkLost for a failure of the network inside, which says where, what is missing and what to do."""
     try:
         yield
     except TimeoutError:
-        raise LinkLost(f"{where} gave {missing} within {deadline.spent:.2g} s; {advice}") from None
+        raise LinkLost(f"{where} gave {absence} within {deadline.spent:.2g} s; {advice}") from None
     except OSError as error:
         raise LinkLost(f"nothing answers at {where}: {_reason(error)}; {advice}") from None
 

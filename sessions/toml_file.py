@@ -91,7 +91,8 @@ def tables_in(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        comma = f"; in {typed[1]} write the fraction behind a point" if (typed := _COMMA.search(text)) else ""
+        number = _COMMA.search(text)
+        comma = f"; in {number[1]} write the fraction behind a point" if number else ""
         raise SettingsError(f"{where}: this is not TOML: {error}{comma}") from error
     except RecursionError as error:
         raise SettingsError(f"{where}: lists or tables are nested too deep; write it with fewer brackets") from error
@@ -109,13 +110,13 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
     for key, (value, form) in places.items():
         if isinstance(value, float) and not math.isfinite(value):
             raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
-        nested = _member_with_places(form)
-        if isinstance(value, Mapping) and isinstance(nested, inspect.DataclassType | inspect.StructType):
-            allowed = [field.encode_name for field in nested.fields]
+        member = _member_with_places(form)
+        if isinstance(value, Mapping) and isinstance(member, inspect.DataclassType | inspect.StructType):
+            keys = [field.encode_name for field in member.fields]
             for name in cast("Mapping[str, Any]", value):
-                if name not in allowed:
+                if name not in keys:
                     full = _join_key(key, name)
-                    raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(allowed)}")
+                    raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(keys)}")
     try:
         return msgspec.convert(table, cls)
     except msgspec.ValidationError as error:
@@ -155,21 +156,21 @@ def _inside(form: inspect.Type | None, part: str | int) -> inspect.Type | None:
 
 def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, inspect.Type | None]]) -> tuple[str, str]:
     """Return the key that msgspec refuses, as a TOML file would write it, and a sentence about it."""
-    message, _, located = str(error).partition(" - at `$")
-    path = located.strip(".`").removesuffix("[...]")
+    message, _, place = str(error).partition(" - at `$")
+    path = place.strip(".`").removesuffix("[...]")
     cause = error.__cause__
     if cause is None:
         value, form = places[path]
-        if missing := re.match(r"Object missing required field `(.*?)`", message):
-            return path, f"{_join_key(path, missing[1])} is missing; it must be {_in_words(_inside(form, missing[1]))}"
+        if absence := re.match(r"Object missing required field `(.*?)`", message):
+            return path, f"{_join_key(path, absence[1])} is missing; it must be {_in_words(_inside(form, absence[1]))}"
         return path, f"{path} = {toml_value(value)} is not allowed: it must be {_in_words(form)}"
     # A dataclass that checks itself names the key, in full or from itself on.
     key = str(getattr(cause, "key", ""))
     if not key:
         return path, f"{path or 'this'}: {cause}"
     full = key if not path or key == path or key.startswith((f"{path}.", f"{path}[")) else f"{path}.{key}"
-    allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
-    return full, f"{full} = {toml_value(getattr(cause, 'value', None))} is not allowed: {allowed}"
+    advice = str(getattr(cause, "allowed", cause)).rstrip(".")
+    return full, f"{full} = {toml_value(getattr(cause, 'value', None))} is not allowed: {advice}"
 
 
 def _join_key(key: str, name: str) -> str:
@@ -294,8 +295,8 @@ def _line_of(text: str, key: str) -> int | None:
                 here += f"[{tables[here]}]"
             if key == here or key.startswith((f"{here}.", f"{here}[")):
                 best = number  # where nothing better comes: a key that is missing is missed in its table
-        elif assigned := re.match(r"\s*([\w.\-]+)\s*=", line):
-            full = f"{here}.{assigned.group(1)}" if here else assigned.group(1)
+        elif assignment := re.match(r"\s*([\w.\-]+)\s*=", line):
+            full = f"{here}.{assignment.group(1)}" if here else assignment.group(1)
             if key == full or key.startswith((f"{full}.", f"{full}[")):
                 return number
     return best

@@ -285,7 +285,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 
 
 def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
-    """Return the page as HTML without scripts or links to a network; `figures` replaces the figures of `results`."""
+    """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, by_name = plates(results) if figures is None else figures, tables(results)
     there = [section for section in SECTIONS if any(part in figures or part in by_name for part in section[2])]
     return template("accuracy.html.jinja", "daq_app.accuracy_page").render(

@@ -45,7 +45,7 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
 
 
 def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
-    """Return the range of the colours, common to all trials of a session and of the session beside it."""
+    """Return where the colours of all trials of a session, and of one compared with it, begin and end."""
     finger_maps = [] if state is None else [state.fingers]
     if state is not None and state.other is not None:
         finger_maps.append(state.other.fingers)
@@ -59,12 +59,12 @@ def visible_film(state: AnalystState) -> m.FingerHistory | None:
 
 
 def was_tried(prediction: PredictionFinding) -> bool:
-    """Say whether the solver tried a trial: its friction, indentation and direction are known."""
+    """Say whether a trial was given to the solver: all that it needs is known."""
     return None not in (prediction.mu, prediction.tau_max, prediction.indentation, prediction.direction)
 
 
 def finger_words(state: AnalystState | None) -> str:
-    """Describe the settled finger, or say why there is none."""
+    """Return what is said of the settled finger, or why there is none."""
     row = None if state is None else selected_row(state)
     if state is None or row is None:
         return ""

@@ -194,7 +194,7 @@ FIELD_CHOICES = (
 
 
 def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
-    """Return the range of the colours of frames: few nodes lie beyond it; a signed field has 0 in its middle."""
+    """Return where the colours of frames begin and end: few nodes lie beyond; nought is the middle of signed ones."""
     tops = [0.0]
     for frame in frames:
         values = np.abs(field.of(frame))

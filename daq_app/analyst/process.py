@@ -89,7 +89,7 @@ class Analyst:
         self._child: Child | None = self._begin()
 
     def poll(self) -> tuple[m.Reply, ...]:
-        """Return the messages since the last call."""
+        """Return what came since the last call."""
         messages: list[m.Reply] = []
         while self._child is not None:
             try:

@@ -48,7 +48,7 @@ def words_of(row: Row) -> str:
 
 
 def marks_of(row: Row) -> str:
-    """Explain the marks of a line, for a tooltip and for screen readers."""
+    """Return what the marks of a line mean, for who hovers and for screen readers."""
     stroke, failed = row.stroke, row.prediction is not None and row.prediction.sed is None
     flaws = tr("! has flaws: ") + _flaws(stroke) if stroke is not None and stroke.flaws else ""
     decision = tr("✎ somebody decided something about it") if stroke is not None and stroke.decided else ""
@@ -142,7 +142,7 @@ def _effect(report: Report | None) -> str:
 
 
 def condition(report: Report | None, prediction: PredictionFinding) -> str:
-    """Return the condition of a SED: the prescribed depth and the kinematics.
+    """Return under which condition a SED holds: the depth that was prescribed, and the strain.
 
     The window shows another number while a session runs: that at the measured force.
     """
@@ -204,7 +204,7 @@ def points(state: AnalystState) -> tuple[Point, ...]:
 
 
 def progress_words(step: Step | None) -> str:
-    """Describe the present step of the work, and the time that remains.
+    """Return what is being done, and how long it will still take.
 
     >>> progress_words(Step(0.5, "predicting", 3.2))
     'predicting  50 %, about 4 s left'
@@ -259,7 +259,7 @@ class Link:
 
 
 def lineage(state: AnalystState) -> tuple[Link, ...]:
-    """Return the links from the selected trial's SED, or its friction without one, down to its readings."""
+    """Return the way from the chosen trial's SED, or its friction where it has none, to its readings."""
     row = selected_row(state)
     if row is None:
         return ()

@@ -214,7 +214,7 @@ class Row:
 
 
 def fold(state: AnalystState, message: Message) -> AnalystState:
-    """Return the state after a message; each value stays until a message replaces it."""
+    """Return the state after a message; what was known stays until it is known anew."""
     match message:
         case ReportReady():
             return _on_report(state, message)
@@ -310,7 +310,7 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
 
 
 def _at_the_same_row(before: AnalystState, after: AnalystState) -> AnalystState:
-    """Return the state `after` with the selected row of `before`, wherever that row stands now."""
+    """Return the state after with the row that was chosen before, wherever it stands now."""
     row, keys = selected_row(before), [row.key for row in rows(after)]
     if row is not None and row.key in keys:
         return replace(after, row=keys.index(row.key))

@@ -168,7 +168,7 @@ def _undone(decisions: Decisions) -> list[Decision]:
 
 
 def effective_decision(decisions: Decisions, line: Decision) -> Decision:
-    """Return the decision that a line undoes or redoes, through any number of earlier undos and redos."""
+    """Return the decision that a line undoes or redoes, however often it was undone and redone before."""
     by_number = {one.number: one for one in decisions.lines}
     while line.undoes is not None:
         line = by_number[line.undoes]

@@ -49,7 +49,7 @@ class Work:
     """A session, opened and analysed; the model's answers follow when `go_on` is called."""
 
     def __init__(self, folder: Path, say: Say, urgent: Urgent = lambda: False) -> None:
-        """Open and analyse the session in `folder`; `say` takes the results."""
+        """Open and analyse it, and say what is found."""
         self._say, self._urgent = say, urgent
         say(m.Step(0.0, tr("opening")))
         self._recording = _open_recording(folder)
@@ -75,7 +75,7 @@ class Work:
         self._say(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
 
     def do(self, request: m.Ask) -> None:
-        """Carry out a request, and say its result. Raises Cancelled and the errors that `sentence_of` explains."""
+        """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
         match request:
             case m.Choose(row):
                 self._row = row
@@ -192,7 +192,7 @@ class Work:
         return panel, b"" if panel is None else pixels[panel.name]
 
     def _note(self, name: str) -> str:
-        """Return the note under a picture in a file: the condition and the errors of its SEDs."""
+        """Return what a picture that is written says under it: the condition and the errors of its SEDs."""
         what, _, of = name.partition(" ")
         if what in ("finger", "contact"):
             stroke, _, step = of.partition(" ")
@@ -324,7 +324,7 @@ def _open_recording(folder: Path) -> Recording:
 
 
 def _options(recording: Recording) -> PredictionOptions:
-    """Return the options of the stored prediction, or the usual ones, without intervals and variants."""
+    """Return the options of the kept prediction, or the usual ones; what nobody looks at here is not solved for."""
     options = stored_options(recording) or PredictionOptions()
     return replace(options, intervals=False, variants="none", variant_intervals=False)
 

@@ -49,11 +49,11 @@ def analyse_session(
     seed: int | None = None,
     gain_error: float | None = None,
 ) -> Analysis:
-    """Analyse a session, with tau_max by a law of the area, and store the analysis in the session's folder.
+    """Return the analysis of a session, with tau_max by a law of the area, and keep it in the session's folder.
 
-    `seed` is that of its intervals; `gain_error` is the relative uncertainty of each axis' gain [-]. Where a value is
-    left out, area and seed are those of the stored analysis, and the gain's error is the one that was set last. Raises
-    RecordingError where the stored analysis is damaged.
+    `seed` is that of its intervals; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
+    says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
+    somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
     before = _read_or_empty(recording, ANALYSIS)
     if gain_error is None:
@@ -196,7 +196,7 @@ def repeat(
 
 
 def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
-    """Return a sentence for each number that differs between a document and its repetition, and a likely cause."""
+    """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
     sentences = first_sentences(list(differences(document, json.loads(json.dumps(fresh)), name)))
     return [*sentences, why(name, document, software_versions())] if sentences else []
 
@@ -226,7 +226,7 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
 
 
 def settings_of(document: Mapping[str, Any]) -> AnalysisSettings:
-    """Return the settings of a stored analysis, or of the analysis under a stored prediction.
+    """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
 
     Only the area's law, the calibration's error and the intervals' seed can be asked for. Raises SettingsError.
     """

@@ -251,7 +251,7 @@ def visits(
     scheduler: str | None = None,
     workers: int | None = None,
 ) -> tuple[list[Visit], list[tuple[str, str]]]:
-    """Return the visits of sessions, and name and reason of each session without a result.
+    """Return what each session brings, and the name of and the reason for each that brings nothing.
 
     What is on the shelf is not computed again. Raises SchedulerError, RecordingError for a shelf that takes nothing.
     """
@@ -298,7 +298,7 @@ def visits(
 
 
 def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[tuple[str, str]]]:
-    """Return the key of each session, and name and reason of each session that cannot be read."""
+    """Return the key of each session, and the name of and the reason for each that cannot be read."""
     keys: dict[Path, str] = {}
     failures: list[tuple[str, str]] = []
     for folder in folders:

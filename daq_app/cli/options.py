@@ -23,7 +23,7 @@ def within(
 ) -> Callable[[str], float]:
     """Return the `type` of an option for argparse: a number that raises WrongValue where it is not allowed.
 
-    `words` replace the usual statement of the range. The typed number is `per` times the value.
+    `words` say what is allowed where the least and the greatest value do not. What is typed is `per` times the value.
     """
     ends = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
     usual = f"a whole number from {ends}" if kind is int else ends

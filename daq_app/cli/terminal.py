@@ -186,7 +186,7 @@ def open_device(recorder: Recorder, uri: str) -> m.Device:
                 if isinstance(report, m.Device):
                     return report
                 _raise_failure(report)
-            if interrupted.heard:
+            if interrupted.has_come:
                 recorder.send(m.Stop())
                 raise KeyboardInterrupt
 
@@ -219,8 +219,8 @@ class _Attendance:
             for report in self._recorder.poll(_LOOK):
                 if (outcome := self._take(report)) is not None:
                     return outcome
-            if self._interrupted.heard:
-                self._interrupted.heard = False
+            if self._interrupted.has_come:
+                self._interrupted.has_come = False
                 if self._end is not None:
                     self._console.note("the recorder goes on sealing the session by itself")
                     return Outcome(self._folder, self._end, sealed=False)

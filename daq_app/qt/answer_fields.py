@@ -313,7 +313,7 @@ class ChoiceOfTwo(_Field):
 
 
 def newest_force(trace: LiveTrace) -> float:
-    """Return the mean normal force of the last moment [N]; 0 without readings."""
+    """Return the normal force of the last moment [N]; 0 where nothing is known."""
     newest = trace.newest
     if newest is None:
         return 0.0

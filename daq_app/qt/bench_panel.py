@@ -83,7 +83,7 @@ class BenchPanel(Panel):
         self.acknowledge.setEnabled(view.can_acknowledge)
 
     def connect_choice(self) -> None:
-        """Connect the selected or typed address, or disconnect the present transducer."""
+        """Connect what is chosen or typed, or disconnect what is connected."""
         view = self._view
         if view is not None and view.connect is not None:
             self._send(view.connect)

@@ -145,13 +145,13 @@ class ScreenFields(QWidget):
         vbox(language, self.thumbnail, self._ruler, self.camera, self._new_code, on=self, spacing=4)
 
     def show_line(self, scale: Millimetres, size: QSize) -> None:
-        """Say whether the length of the subject's line was checked, in a window of a `size`."""
+        """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
         self._size = size
         self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=scale.words)
         self.show_form()
 
     def show_tablet(self, words: str, problem: str, picture: bytes) -> None:
-        """Show how the tablet is reached, what keeps a session from beginning, and its address for a camera (PNG)."""
+        """Say how the tablet is reached; why no session can begin; its address for a camera (PNG, or empty)."""
         self._line_words, self.problem = words, problem
         pixmap = QPixmap()
         pixmap.loadFromData(picture)

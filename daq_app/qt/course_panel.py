@@ -70,7 +70,7 @@ class CoursePanel(Panel):
                 widget.setEnabled(entry.enabled)
 
     def ask(self, what: str) -> None:
-        """Ask for the reason of a redo or skip, or for a note; a redo with a stated reason is sent at once."""
+        """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
         if self._view is None or not (entry := self._view.buttons[what]).enabled:
             return
         if entry.sends is not None:

@@ -203,7 +203,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.sight.pointed.emit(self.view().place(at.x(), at.y()) if inside and at is not None else None)
 
     def _place(self) -> None:
-        """Show the chosen part of the finger, or all of it at the foot of the box."""
+        """Show the part that is looked at, or all of it at the foot of the box."""
         above, line = self._above(), QFontMetricsF(self._font).height()
         least = self._least * (1 if self.look.lost is None else 2)  # a marked place must differ from others
         self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two stand beside each other

@@ -78,7 +78,7 @@ class LiveBar(QWidget):
         self.setMinimumSize(1, QFontMetrics(font(TITLE)).height())
 
     def show_forces(self, visible: bool) -> None:
-        """Show the numbers, or hide them where the protocol keeps them from the experimenter."""
+        """Show the numbers, or keep them from the experimenter where the protocol does."""
         self._forces_shown = visible
         self._fit()
 
@@ -213,7 +213,7 @@ class LivePanel(Panel):
         self._show_acts()
 
     def show_forces(self, visible: bool) -> None:
-        """Show the readings, or hide them where the protocol keeps them from the experimenter."""
+        """Show readings, or nothing of them where the protocol keeps them from the experimenter."""
         if visible != self._forces_shown:
             self._forces_shown = visible
             self._pictures.setVisible(visible)
@@ -279,8 +279,8 @@ class LivePanel(Panel):
             if plot.isVisible():
                 plot.show_columns(columns, end, marks, clock)
 
-    def take_predictions(self) -> None:
-        """Add the predictions since the last call to their trace."""
+    def model_says(self) -> None:
+        """Take what the model said since the last call."""
         for prediction in self._model.poll():
             self._model_trace.add_prediction(prediction)
 
@@ -290,7 +290,7 @@ class LivePanel(Panel):
         return max(first.width() // 2, 100)
 
     def _draw_model(self, now: float, clock: float, *, still: bool, silent: bool) -> None:
-        """Draw the full solve of the last stroke, or without one the provisional state of this moment."""
+        """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
         if self._model_plot.isVisible() and (not still or self._model_trace.holds(now - self._seconds)):
             columns = self._model_trace.columns(now - self._seconds, np.nextafter(now, np.inf), self._columns())
             self._model_plot.show_columns(columns, now, (), clock)

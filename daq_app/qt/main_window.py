@@ -285,7 +285,7 @@ class MainWindow(QMainWindow):
     def _draw(self) -> None:
         session = self.bridge.state.session
         try:
-            self.live.take_predictions()
+            self.live.model_says()
             self.side.show_force()
             marks = () if session is None else session.marks
             self.live.draw(marks, self.bridge.state.now, silent=self.bridge.view.bench.silent)

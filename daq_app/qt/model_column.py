@@ -137,7 +137,7 @@ class ModelColumn(QWidget):
         self._show_picture()
 
     def _show_picture(self, *_: object) -> None:
-        """Show the picture of the tab, and request one that is not drawn yet."""
+        """Show the picture of the tab; what is not drawn is asked for only when it is looked at."""
         state, tab, which = self._state, self.tabs.currentIndex(), self.which.currentIndex()
         if state is None:
             return
@@ -217,7 +217,7 @@ class ModelColumn(QWidget):
             self.player.slider.setFocus()
 
     def _ask_where(self, row: Row | None, version: int) -> None:
-        """Request once the history of a trial without an answer."""
+        """Ask how far a solve without an answer came, once."""
         prediction = None if row is None else row.prediction
         if row is None or prediction is None or prediction.sed is not None or not was_tried(prediction):
             return

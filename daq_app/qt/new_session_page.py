@@ -168,7 +168,7 @@ class NewSessionPage(Panel):
             self.people_score.setChecked(True)
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
-        """Show the gaps of each card, and return the cards; the disk is read only after a change."""
+        """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
         source = self.form(), bench, self.screen_fields.words
         if anew or source != self._source:
             self._source = source
@@ -192,7 +192,7 @@ class NewSessionPage(Panel):
         self.cut_short.look_in(folder_of(self.form()))
 
     def _show_study(self) -> None:
-        """Show the enrolment of the subject; a study has its own protocol and its own orders."""
+        """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
         record, before = enrolment(self.form()), optional_phases(self.form())
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)

@@ -41,7 +41,7 @@ def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
 
 
 def sheer(colour: str, alpha: int) -> QColor:
-    """Return a colour with a transparency, from 0 for clear to 255 for opaque."""
+    """Return a colour that lets what is behind it through, from 0 all of it to 255 nothing."""
     shade = QColor(colour)
     shade.setAlpha(alpha)
     return shade
@@ -69,7 +69,7 @@ def draw_line(painter: QPainter, x: Array, y: Array) -> None:
 
 
 def lines(x: Array, y: Array) -> list[QPolygonF]:
-    """Return the line through points (n,) as polygons; it has a gap where a coordinate is nan."""
+    """Return the line through points (n,) in pieces: it is broken where a coordinate is nan."""
     points = np.empty((len(x), 2))
     points[:, 0], points[:, 1] = x, y
     finite = np.zeros(len(x) + 2, np.bool_)

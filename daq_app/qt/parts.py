@@ -74,7 +74,7 @@ class WrappedLabel(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_text(self, text: str) -> None:
-        """Show a text; an empty one takes no room."""
+        """Show a text; none of it takes no room."""
         display = text.replace("/", "/\u200b")  # where a line may end
         if display != self.text():
             self.setText(display)
@@ -345,7 +345,7 @@ class Drawer(QSplitter):
         self._place()
 
     def least_height(self) -> int:
-        """Return the least height of its visible parts [px]."""
+        """Return the height that those of its two parts need that are shown [px]."""
         layouts = [layout for part in (self._main, self._drawer) if not part.isHidden() and (layout := part.layout())]
         return max(layout.totalMinimumSize().height() for layout in layouts)
 

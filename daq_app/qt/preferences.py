@@ -160,7 +160,7 @@ def _key(screen: QScreen) -> str:
 
 
 def line_settings(scale: Millimetres) -> tuple[Setting, ...]:
-    """Return the settings of the answering line that a session stores: its length, and the pixels in a millimetre."""
+    """Return what a session keeps of the line that is answered on: its length, and how long a millimetre is."""
     origin = "measured" if scale.checked else "default"
     return (
         Setting("answer line length", LENGTH, "mm", origin),

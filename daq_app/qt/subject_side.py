@@ -51,7 +51,7 @@ class TabletScreen(QObject):
 
     @property
     def words(self) -> str:
-        """Return the state of the tablet, in words for the experimenter."""
+        """Return what is worth knowing of the tablet, for the experimenter."""
         if not self.server.connected:
             return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
         state = tr("checked") if self._pixels else tr("not checked")
@@ -84,7 +84,7 @@ class TabletScreen(QObject):
             self.server.send(Force(part))
 
     def line_settings(self) -> tuple[Setting, ...]:
-        """Return the settings of the answering line that a session stores."""
+        """Return what a session keeps of the line that is answered on."""
         scale = Millimetres(self._pixels or USUAL_DPI / 25.4, self._pixels is not None)
         return (Setting("subject's screen", "web", "", "set"), *line_settings(scale))
 
@@ -99,7 +99,7 @@ class TabletScreen(QObject):
                     self.answered.emit(event)
 
     def _session_time(self, sent: float, arrival: float, at: float) -> float:
-        """Convert an instant of the tablet's clock [ms] to the session's [s], by the arrival of its message."""
+        """Return the session's clock [s] at an instant of the tablet's [ms]: so long before the answer arrived."""
         return arrival + self.session_offset - max(sent - at, 0.0) * 1e-3
 
 

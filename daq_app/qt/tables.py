@@ -44,7 +44,7 @@ class CopyableTable(QTableView):
             super().keyPressEvent(event)
 
     def selected_text(self) -> str:
-        """Return the smallest rectangle of cells around the selection; cells outside the selection are empty."""
+        """Return the least rectangle of cells that holds the selection; empty where a cell in it is not selected."""
         cells = {(at.row(), at.column()): str(at.data()) for at in self.selectedIndexes()}
         if not cells:
             return ""

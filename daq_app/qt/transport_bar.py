@@ -22,7 +22,7 @@ class TransportBar(QWidget):
     ended = Signal()
 
     def __init__(self, what: str, *, tells_time: bool = True) -> None:
-        """Offer to play `what`, which comes later; without `tells_time` the place shows no time."""
+        """Offer to play `what`, which is not there yet; without `tells_time` the instants are no times of it."""
         super().__init__()
         self._what = what
         self._times: Sequence[float] = ()

@@ -144,7 +144,7 @@ class Bench:
         return Tap(self.connected.transducer, self._display, clock_offset_ns)
 
     def look(self) -> None:
-        """Take the latest readings, or look for a lost transducer. Raises NotNow when a tare is refused."""
+        """Take what was measured, or try to find a lost transducer again. Raises NotNow when a tare is refused."""
         time.sleep(GLANCE)
         if self.connected is None:
             self._look_for_it()

@@ -30,7 +30,7 @@ class Inbox:
         threading.Thread(target=self._read, name="requests", daemon=True).start()
 
     def take_requests(self) -> tuple[m.Request, ...]:
-        """Return the requests since the last call, in order."""
+        """Return what was asked for since the last call, in order."""
         return tuple(self._queue.popleft() for _ in range(len(self._queue)))
 
     def answer_stop(self) -> None:
@@ -88,7 +88,7 @@ class Outbox:
             self._reports.put(report)
 
     def flush(self, patience: float) -> None:
-        """Wait until the client has taken all reports, at most `patience` [s]."""
+        """Wait until everything was taken by the client, but not longer than `patience` [s]."""
         with self._reports.all_tasks_done:
             self._reports.all_tasks_done.wait_for(lambda: not self._reports.unfinished_tasks, patience)
 

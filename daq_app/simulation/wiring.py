@@ -171,7 +171,7 @@ class SimulatedPeople(SimulatedHand):
         self._due.append((self.clock.now_ns() + int(after * 1e9), event))
 
     def poll(self) -> tuple[steps.Event, ...]:
-        """Return the events that are due by now, each once, in the order of their entry."""
+        """Return what has come up by now, once, in the order it was put in."""
         now_ns = self.clock.now_ns()
         events = tuple(event for due, event in self._due if due <= now_ns)
         self._due = [(due, event) for due, event in self._due if due > now_ns]

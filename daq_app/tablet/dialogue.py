@@ -104,7 +104,7 @@ decode = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError f
 
 
 def encode(message: ToTablet) -> str:
-    """Return a message as JSON."""
+    """Return a message as it is sent."""
     return msgspec.json.encode(message).decode()
 
 

@@ -111,7 +111,7 @@ class Follower:
         return self._finger == _finger(use)
 
     def take(self, forces: Forces) -> Provisional:
-        """Return the prediction of the model for a batch of forces."""
+        """Return what the model says of a batch."""
         if forces.stream != self._stream:
             self._stream = forces.stream
             self._seds.clear()
@@ -133,7 +133,7 @@ class Follower:
         )  # fmt: skip
 
     def settled_solver(self, request: Settle) -> Callable[[], SettledSolve]:
-        """Return a function that solves a stroke in full, from the predictions until now; it may run beside `take`."""
+        """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
         first, last = request.steady
         values = np.array([sed for time, sed in self._seds if first <= time <= last])
         values = values[np.isfinite(values)]
@@ -168,7 +168,7 @@ class Follower:
 def _solve_settled(
     request: Settle, kinematics: Kinematics, provisional: float | None, last: _Observation | None
 ) -> SettledSolve:
-    """Solve a stroke in full. Where that fails, return the reason and `last`, the last state in its window."""
+    """Solve a stroke in full; where that fails, return why, with the last state that was followed in its window."""
     scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
     why, failed, prediction = tr("The stroke gives no friction."), False, None
     try:
@@ -191,7 +191,7 @@ def _solve_settled(
 
 
 def _greatest_effect(prediction: Prediction) -> str:
-    """Name the omitted effect that changes the SED most, with its size; "" without an estimate."""
+    """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
     sizes = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
     name = max(sizes, key=lambda one: sizes[one], default="")
     return name and f"{name} {percent(sizes[name])} of the SED"

@@ -150,7 +150,7 @@ class ModelWords:
 def model_words(
     provisional: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
 ) -> ModelWords:
-    """Describe the picture of the model; with a `silent` transducer nothing is measured now."""
+    """Return what is said of the picture that is shown; where the transducer is `silent`, nothing is measured now."""
     if problem:
         return ModelWords(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:

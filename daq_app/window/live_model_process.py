@@ -120,13 +120,13 @@ class LiveModel:
             self._unsent.pop(0)
 
     def settle(self, request: Settle) -> None:
-        """Request the full solve of a stroke, after the forces that were added until now."""
+        """Ask for the full solve of a stroke, once all that was added until now was followed."""
         if self._child is not None:
             self._requests += [join_forces(self._unsent), request] if self._unsent else [request]
             self._unsent = []
 
     def poll(self) -> tuple[Provisional, ...]:
-        """Take the messages of the model, and send the next request; return the new predictions."""
+        """Take what came, and send what waits; return the predictions that are new."""
         if self._child is None:
             return ()
         news: list[Provisional] = []

@@ -152,7 +152,7 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
 
 
 def with_gaps(time: Array, values: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return times (n,) and values (channels, n) with a nan before the places `at`, where readings are missing."""
+    """Return times (n,) and values (channels, n) with a nan before the places `at`: a line there is no reading."""
     if not len(at):
         return time, values
     times: Array = np.insert(time, at, time[at])

@@ -136,7 +136,7 @@ class Judge:
                 pass
 
     def look(self, feed: LiveFeed, state: AppState) -> None:
-        """Start the analysis of the take, once enough readings have come after the lift."""
+        """Have the take looked at once enough came after the lift."""
         newest, session, info = feed.trace.newest, state.session, state.bench.info
         if self._due is None or newest is None or newest < self._due:
             return

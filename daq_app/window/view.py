@@ -162,7 +162,7 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
 
 
 def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
-    """Return the lamp and the words of the losses in the stream."""
+    """Return what was counted of the stream, in words."""
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {tr(COUNT_WORDS[name])}" for name in COUNTERS if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
@@ -315,7 +315,7 @@ def _lamp(state: AppState) -> Lamp:
 
 
 def _banner(state: AppState) -> Banner | None:
-    """Return the banner of the worst problem; there is one at a time."""
+    """Return the worst that is to be said; one at a time."""
     session, bench = state.session, state.bench
     running = session is not None and not session.over
     if session is not None and (words := _cut_short(state, session)):

@@ -20,7 +20,7 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
-from sessions.exchange.csv_text import MISSING, columns, read_rows, rows, write_rows
+from sessions.exchange.csv_text import NOT_AVAILABLE, columns, read_rows, rows, write_rows
 from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
 from sessions.file_access import gzip_lines, json_object, read_within_limit, write_json
@@ -59,13 +59,13 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         (folder / SOURCE).mkdir(exist_ok=True)
         (folder / SOURCE / name).write_bytes(content)
     derivatives = folder / "derivatives" / PIPELINE
-    derived = derivatives / names.subject / "beh"
-    derived.mkdir(parents=True)
+    beh_folder = derivatives / names.subject / "beh"
+    beh_folder.mkdir(parents=True)
     write_json(derivatives / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
     (derivatives / "README.md").write_text(_readme(recording), encoding="utf-8")
     for name in DERIVED:
         if name in by_name:
-            _write_table(derived / f"{names.stem}_desc-{name}_beh", by_name[name], recording, task)
+            _write_table(beh_folder / f"{names.stem}_desc-{name}_beh", by_name[name], recording, task)
 
 
 def find(path: Path) -> Path | None:
@@ -84,7 +84,7 @@ def read(path: Path) -> ExportedSession:
     text = io.StringIO(read_within_limit(event_file).decode(), newline=None)
     header, *lines = (line.removesuffix("\n").split("\t") for line in text)
     rows_read = (
-        {name: "" if cell == MISSING else cell for name, cell in zip(header, line, strict=True)} for line in lines
+        {name: "" if cell == NOT_AVAILABLE else cell for name, cell in zip(header, line, strict=True)} for line in lines
     )
     events = tuple(logged_event(row, "trial_type") for row in rows_read)
     parts = sorted(event_file.parent.glob("*_physio.tsv.gz"), key=lambda part: float(_sidecar(part)["StartTime"]))
@@ -224,8 +224,8 @@ def _rows_with_gaps(
     for row in cells:
         if next_number is not None:
             for _ in range(row[0] - next_number):
-                yield (MISSING,) * (width - len(mark)) + mark
-        yield (row if finite else tuple(cell if math.isfinite(cell) else MISSING for cell in row)) + mark
+                yield (NOT_AVAILABLE,) * (width - len(mark)) + mark
+        yield (row if finite else tuple(cell if math.isfinite(cell) else NOT_AVAILABLE for cell in row)) + mark
         next_number = row[0] + 1
 
 
@@ -260,7 +260,8 @@ def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[s
     with stem.with_name(f"{stem.name}.tsv").open("w", encoding="utf-8", newline="") as file:
         for row in ([column.heading for column in columns_written], *Table("", "", columns_written).rows):
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
-            cells = (MISSING if cell is None or cell == "" else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
+            texts = ("" if cell is None else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
+            cells = (text or NOT_AVAILABLE for text in texts)
             file.write("\t".join(cells) + "\n")
     ours = [column for column in columns_written if column.heading not in _BIDS_COLUMNS]
     descriptions = {column.heading: _describe(column) for column in ours}

@@ -122,7 +122,7 @@ def mend_row(*cells: str) -> str:
 
 
 _PART = 16_384  # rows at once
-MISSING = "n/a"
+NOT_AVAILABLE = "n/a"
 RAW = tuple(f"raw_{axis}" for axis in range(1, 7))
 _EXACT = np.dtype(
     [("sequence", "i8"), ("counter", "i8"), ("status", "i8"), ("time", "f8"), ("received", "i8")]
@@ -163,7 +163,7 @@ def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Ite
     Rows without a sequence number, of readings that never arrived, are left out; n/a is a NaN. Raises ValueError.
     """
     places = [_place(name, names) for name in STORED]
-    present = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
+    present = (line.replace(NOT_AVAILABLE, "nan") for line in lines if not line.startswith(NOT_AVAILABLE))
     while part := list(islice(present, _PART)):
         # usecols picks the columns in the order given, whatever their order in the file.
         table: Any = np.atleast_1d(np.loadtxt(part, _EXACT, delimiter=delimiter, usecols=places, comments=None))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pynwb import NWBFile
 
 FILE = "session.nwb"
-_MISSING = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
+_INSTALL_ADVICE = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
 _WHOLE = (
     ("sequence", "n/a", "Record number given by the device; missing numbers are readings that never arrived."),
     ("counter", "ticks", "The device's own clock."),
@@ -48,7 +48,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         import pynwb
         from pynwb.file import Subject
     except ImportError as error:
-        raise ExportError(_MISSING) from error
+        raise ExportError(_INSTALL_ADVICE) from error
     recording = source.recording
     plan = recording.plan
     mark = f"{recording.simulated_sentence}. " if recording.simulated_sentence else ""
@@ -192,8 +192,8 @@ def _dynamic(table: Table, mark: str) -> object:
 
 def _utc(recording: Recording, instant_ns: int) -> datetime:
     """Return the date of an instant of the session clock; time of a SimulatedClock passes as the date's."""
-    created = datetime.fromisoformat(str(recording.provenance["created_utc"]))
+    creation = datetime.fromisoformat(str(recording.provenance["created_utc"]))
     clock = recording.provenance.get("clock")
     if clock is None:  # how the session clock goes with the date was not recorded: only when it began
-        return created
-    return created + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))
+        return creation
+    return creation + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))

@@ -74,8 +74,8 @@ class RelaxationFit:
         """Return a scene whose layers are as stiff at once as found here and relax."""
         term = (Relaxation(self.part.value, self.time.value),)
         layers = {name: scene.materials.of(name) for name in LAYERS}
-        relaxing = {name: replace(one, E=one.E * self.at_once, prony=term) for name, one in layers.items()}
-        return replace(scene, materials=replace(scene.materials, **relaxing))
+        prony_layers = {name: replace(one, E=one.E * self.at_once, prony=term) for name, one in layers.items()}
+        return replace(scene, materials=replace(scene.materials, **prony_layers))
 
 
 def relaxing_fit(

@@ -172,7 +172,7 @@ def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
 
 
 def part_of(progress: Progress | None, low: float, high: float) -> Progress | None:
-    """Return what reports the part done of a piece of work that reaches from `low` to `high` of the whole."""
+    """Scale a progress callback to the piece of the work from `low` to `high` of the whole."""
     return None if progress is None else lambda part: progress(low + (high - low) * part)
 
 

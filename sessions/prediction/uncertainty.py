@@ -43,7 +43,7 @@ from sessions.strokes.bootstrap import FrictionDraws, friction_draws
 from solver import Prediction, Scene
 from solver.response.nearby import Nearby
 
-DrawsOrReason = FrictionDraws | str  # what the friction of a trial may have been, or why that is not known
+DrawsOrReason = FrictionDraws | str  # draws of a trial's friction, or why there are none
 
 _SAMPLES = 60  # draws that are solved where derivatives do not suffice
 MISS = 0.05  # part of the interval's width by which derivatives may miss a draw that is solved [-]
@@ -75,7 +75,7 @@ def with_intervals(
 
 
 def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[DrawsOrReason]:
-    """Return for each trial what its friction may have been in each repeat, or why that is not known."""
+    """Return the draws of each trial's friction, one in each repeat, or why there are none."""
     return [_draws(analysis, row) for row in prediction.trials]
 
 

@@ -52,11 +52,11 @@ def seal(folder: Path) -> None:
         list_in_manifest(folder, SEALED, head_of_manifest(recording))
     except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
         new.unlink(missing_ok=True)
-        mended = remedy(error)
+        advice = remedy(error)
         raise DiskRefused(
-            f"{folder} could not be sealed ({error}); the live file is untouched: {mended}, and seal it again "
+            f"{folder} could not be sealed ({error}); the live file is untouched: {advice}, and seal it again "
             "with 'daq-app resume --end'",
-            f"({error}); {mended}",
+            f"({error}); {advice}",
         ) from error
 
 

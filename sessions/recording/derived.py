@@ -167,16 +167,16 @@ def why(name: str, stored: Mapping[str, Any], now: Mapping[str, str]) -> str:
     then: Mapping[str, Any] = cast("Mapping[str, Any]", software) if isinstance(software, Mapping) else {}
     if not then:
         return f"{name} does not say what made it"
-    changed = [
+    changes = [
         f"{library} {then.get(library, 'absent')} then and {now.get(library, 'absent')} now"
         for library in {**then, **now}
         if then.get(library) != now.get(library)
     ]
-    if not changed:
+    if not changes:
         return (
             f"{name} was made by the same versions as now: the document, the recording or the program was changed since"
         )
-    return f"{name} was made by other versions: {', '.join(changed)}"
+    return f"{name} was made by other versions: {', '.join(changes)}"
 
 
 def first_sentences(sentences: Sequence[str]) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ NETWORK = re.compile(
     r"nfs[34]?|cifs|smb[23]|smbfs|afpfs|webdav|davfs2?|ncpfs|afs|coda|ceph|glusterfs|lustre|gpfs|beegfs|orangefs|pvfs2"
     r"|fuse\.(sshfs|rclone|davfs2?|glusterfs|ceph|s3fs|gcsfuse|goofys|curlftpfs|smbnetfs|mfs|juicefs)|(osx|mac)fuse_sshfs"
 )
-SHARED = re.compile(r"vboxsf|vmhgfs|fuse\.vmhgfs-fuse|prl_fs|drvfs")  # folders of the machine around a virtual one
+SHARED_FOLDERS = re.compile(r"vboxsf|vmhgfs|fuse\.vmhgfs-fuse|prl_fs|drvfs")  # of a virtual machine's host
 CLOUD = re.compile(r"fuse\.(google-drive-ocamlfuse|onedriver|dropbox|pcloud|insync|mega|keybase|expandrive)")
 # Names of folders under which a synchronising program keeps its files, as those programs call them.
 SYNC_FOLDERS: tuple[tuple[str, str], ...] = (
@@ -156,7 +156,7 @@ def network_mount(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
     if inner is None:
         return None
     windows_drive = inner.kind == "9p" and re.match(r"([A-Z]:|drvfs)", inner.source) is not None  # seen from WSL
-    far = any(kinds.fullmatch(inner.kind) for kinds in (NETWORK, SHARED, CLOUD))
+    far = any(kinds.fullmatch(inner.kind) for kinds in (NETWORK, SHARED_FOLDERS, CLOUD))
     return inner if far or windows_drive else None
 
 

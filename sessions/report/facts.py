@@ -188,7 +188,7 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
 
 
 def _tilt(analysis: Analysis) -> tuple[str, str]:
-    """Return how the face leans, and whether that was levelled; nothing where nobody stated it."""
+    """Return the tilt of the face, empty where nobody stated it, and whether it was levelled."""
     tilt, x_y = analysis.tilt, analysis.settings.tilt
     levelling = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {x_y[0]:.2g}° and {x_y[1]:.2g}°"
     if tilt is None:

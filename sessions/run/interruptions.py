@@ -10,12 +10,12 @@ from types import FrameType
 class Interruptions:
     """Whether somebody wants the program to stop."""
 
-    heard = False
+    has_come = False
     _at_once = False
 
     def hear(self, _signal: int, _frame: FrameType | None) -> None:
         """Be the signal handler."""
-        self.heard = True
+        self.has_come = True
         if self._at_once:
             self._at_once = False  # once: a second signal must not break the clearing up after the first
             raise KeyboardInterrupt

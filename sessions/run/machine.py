@@ -301,7 +301,7 @@ def _next(place: Place) -> Step:
     """Go on to the next trial, if there is one, or to the rest before it."""
     if place.last:
         return Closing(place.at(place.index)), (steps.AskFinish(),)
-    after = place.following()
+    after = place.successor()
     if after.rest_due:
         return Resting(after), (steps.AskRest(after.plan.rests.duration),)
     return Mounting(after), _asking_for(after, new_block=after.block.name != place.block.name)

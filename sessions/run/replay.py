@@ -85,7 +85,7 @@ class _Rewriter(FleetingWriter):
     def follow(self, recording: Recording) -> None:
         self._later = [event for event in recording.events if event.kind in TELL_LOSSES]
         self._log: Sequence[LoggedEvent] = ()
-        self._cut = False
+        self._is_cut_short = False
         self._next_event = 0
         self._closing = False
         self.log_written: list[LoggedEvent] = []  # that was committed
@@ -95,12 +95,12 @@ class _Rewriter(FleetingWriter):
         """Take the instants from the log of a part, which may have been cut short."""
         super().commit()  # a part begins with all that came before acknowledged
         self._log = log
-        self._cut = not any(event.kind == "ended" for event in log)
+        self._is_cut_short = not any(event.kind == "ended" for event in log)
         self._next_event = 0
 
     def instant_ns(self, kind: str, trial: int | None) -> int:
         """Return when such an event was recorded next. Raises _CutShort where the recording ends without an end."""
-        if self._cut and (kind == "ended" or self._next_event == len(self._log)):
+        if self._is_cut_short and (kind == "ended" or self._next_event == len(self._log)):
             raise _CutShort("the recording was cut short here")
         ahead = range(self._next_event, len(self._log))
         place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
@@ -119,7 +119,7 @@ class _Rewriter(FleetingWriter):
     def finish(self) -> None:
         """Write down what sealing said of a torn log, and close."""
         self._closing = True
-        self._cut, self._log = False, ()
+        self._is_cut_short, self._log = False, ()
         for event in self._later:
             self.event(event.kind, data=event.data)
         super().close()

@@ -137,7 +137,7 @@ class _Run:
             if self.transducer is not None:
                 with interruption.raise_at_once():  # a device that does not answer may take its time
                     self.transducer.start()
-            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interruption.heard else stop())
+            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interruption.has_come else stop())
         except (LinkLost, DeviceFault, SetupError) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:

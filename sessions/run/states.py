@@ -69,8 +69,8 @@ class Place:
         """Return the place with another trial in hand, to which no redo has led."""
         return replace(self, index=index, before_redo=None)
 
-    def following(self) -> "Place":
-        """Return the place with the next trial in hand; an adaptive block's answers choose what it compares."""
+    def successor(self) -> "Place":
+        """Return the place with the next trial in hand; in an adaptive block the answers choose its stimuli."""
         after = self.at(self.index + 1)
         return replace(after, plan=with_comparison(self.plan, after.trial.number, after.answers))
 

@@ -77,7 +77,7 @@ def pool_visits(
 ) -> StudyFindings:
     """Return the findings of all visits together, which are taken in the order of their names.
 
-    `options` is what was asked of each visit, `quantity` that response of the model which is held against scores.
+    `options` are those of each visit; `quantity` is the model's response that is compared with scores.
     `ground_truth` is that of a synthetic study; nothing but the comparison uses it.
     """
     in_order = tuple(sorted(visits, key=lambda visit: visit.session))

@@ -349,5 +349,5 @@ class _AnswerTable(NamedTuple):
         squares = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[who].sum(axis=1)
         freedom = counts.sum(axis=(1, 2)) - cells.shape[1] - cells.shape[2] + 1
         unit = np.sqrt(2.0 * squares / freedom)[:, None]
-        scattered = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
-        return np.where(scattered, means, np.nan) / np.where(scattered, unit, 1.0)
+        varies = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
+        return np.where(varies, means, np.nan) / np.where(varies, unit, 1.0)

@@ -194,7 +194,7 @@ class _Repeats:
             if curve.crests is None:
                 at, top = int(np.nanargmax(curve.tangential)), self._top(curve.tangential, self._noise_t)
             else:
-                above_crest = curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
+                above_crest = curve.crest_gap * self._draw.uniform(size=self._settings.repeats)
                 at = int(np.nanargmax(curve.crests))
                 top = self._top(curve.crests, curve.crest_noise, filtered=False) + above_crest
             of_normal, _ = self._systematic.shares(drag_direction(curve.force[at : at + 1]))

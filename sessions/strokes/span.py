@@ -285,7 +285,7 @@ def noise_of_ratio(zero: StrokeZero, level: float, normal: float) -> float:
     return float(np.hypot(sideways, level * float(zero.noise[2]))) / normal
 
 
-def curve_of(span: Span, contact: Contact, zero: StrokeZero, missed: float | None = None) -> StrokeCurve:
+def curve_of(span: Span, contact: Contact, zero: StrokeZero, crest_gap: float | None = None) -> StrokeCurve:
     """Return the stroke's course with some time around it.
 
     `missed` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
@@ -299,7 +299,7 @@ def curve_of(span: Span, contact: Contact, zero: StrokeZero, missed: float | Non
     columns = (track.time, track.normal, unfiltered, track.tangential, force, track.ratio, track.position, track.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
     curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)
-    if missed is None:
+    if crest_gap is None:
         return curve
     crest_noise = float(np.sqrt((zero.noise[:2] ** 2).mean()))
-    return replace(curve, crests=drag, crest_noise=crest_noise, crest_missed=missed)
+    return replace(curve, crests=drag, crest_noise=crest_noise, crest_gap=crest_gap)

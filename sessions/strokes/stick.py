@@ -65,8 +65,8 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     climb = readings.fit(settings.filter.block, peaked=peaked)
     if climb is None or climb.rise + climb.peak < settings.ratio.stick_rise * (climb.rest + climb.rise):
         return None
-    explained = readings.mean_square(climb) <= settings.ratio.stick_left * float(readings.ratio.var())
-    return climb.meets if explained and climb.rest + climb.rise > 0.0 else None
+    fits = readings.mean_square(climb) <= settings.ratio.stick_left * float(readings.ratio.var())
+    return climb.meets if fits and climb.rest + climb.rise > 0.0 else None
 
 
 def thin(column: Array, most: int) -> Array:
@@ -182,7 +182,7 @@ class StickSlip:
     """A contact that sticks and slips."""
 
     frequency: float  # of the slips [Hz]
-    missed: float  # how far T/N climbs from one reading to the next: readings may miss a crest by it [-]
+    crest_gap: float  # how far T/N climbs from one reading to the next: readings may miss a crest by it [-]
 
 
 def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettings) -> StickSlip | None:

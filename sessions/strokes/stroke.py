@@ -60,7 +60,7 @@ class StrokeCurve:
     quiet: float  # how long that was seen [s]
     crests: Array | None = None  # (n,) unfiltered tangential force [N], where the contact sticks and slips
     crest_noise: float = 0.0  # its standard deviation, unloaded [N]
-    crest_missed: float = 0.0  # how far readings may miss its greatest value [N]
+    crest_gap: float = 0.0  # how far readings may miss its greatest value [N]
 
     def __post_init__(self) -> None:
         """Make the columns read-only views."""

@@ -52,7 +52,7 @@ def measure_stroke(
 
     `number` is that of the stroke within its trial; a person's `decisions` about it go before what is found.
     """
-    findings, missed, decisions = Findings(), None, decisions or StrokeDecisions({})
+    findings, crest_gap, decisions = Findings(), None, decisions or StrokeDecisions({})
     track = track_of(span, contact, zero)
     _judge_ends(findings, contact, track)
     _judge_zero(findings, zero, track)
@@ -66,9 +66,9 @@ def measure_stroke(
         window = slide(findings, span, track, decisions.value("steady"), uncut)
         _decide_slide_onset(findings, track, decisions)
         if window is not None:
-            missed = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area)
+            crest_gap = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area)
             _friction(findings, track, window)
-            _static_peak(findings, track, window, zero, turned=contact.start in contact.reversals)
+            _static_peak(findings, track, window, zero, turns=contact.start in contact.reversals)
             _break_away(findings, track, window)
             _judge_way(findings, track, window)
         _apply_decisions(findings, track, decisions)
@@ -91,7 +91,7 @@ def measure_stroke(
         number=number,
         kept=decisions.is_kept,
         decided=decisions.sentences,
-        curve=curve_of(span, contact, zero, missed),
+        curve=curve_of(span, contact, zero, crest_gap),
         **numbers,
     )
     return stroke, tuple(findings.flaws)
@@ -248,7 +248,7 @@ def _stick_slip(
     slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, load), track.settings)
     if slips is None:
         return None
-    missed = slips.missed * load
+    crest_gap = slips.crest_gap * load
     filtered, unfiltered = findings.numbers["peak_tangential"], float(np.nanmax(drag))
     traction, area = _greatest_traction(track, drag, planned_area)
     findings.numbers |= {"tau_max": traction, "contact_area": area, "peak_tangential": unfiltered}
@@ -256,10 +256,10 @@ def _stick_slip(
     sentence = (
         f"The contact sticks and slips at {slips.frequency:.2g} Hz: the greatest tangential force and tau_max are "
         f"those of unfiltered forces, {above:.2g} % above the filtered ones; readings may miss "
-        f"the crest by {100 * missed / unfiltered:.1g} %, and noise raises it."
+        f"the crest by {100 * crest_gap / unfiltered:.1g} %, and noise raises it."
     )
     findings.flaw(FlawName.STICK_SLIP, sentence, "note")
-    return missed
+    return crest_gap
 
 
 def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> None:
@@ -289,7 +289,7 @@ def _decide_slide_onset(findings: Findings, track: Track, decisions: StrokeDecis
         findings.flaw(FlawName.DECISION, sentence, "doubtful")
 
 
-def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZero, *, turned: bool) -> None:
+def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZero, *, turns: bool) -> None:
     """Give the static peak where one stands out of what follows it by its noise and by a share.
 
     What follows is both the level just after it and the highest crest of the steady window, for a contact that sticks
@@ -312,7 +312,7 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
     later = alike[max(end, window.start) : window.stop]
     crest = float(np.nanmax(later)) if np.isfinite(later).any() else level
     sd = noise_of_ratio(zero, level, float(track.normal[top]))
-    share = settings.ratio.static_share * (2.0 if turned else 1.0)
+    share = settings.ratio.static_share * (2.0 if turns else 1.0)
     if before[top] - max(level, crest) > max(settings.ratio.static_noise * sd, share * level):
         findings.numbers["mu_static"] = float(before[top])
         if findings.reasons["mu_static"] == _NO_PEAK:

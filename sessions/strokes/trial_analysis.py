@@ -244,8 +244,8 @@ def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: Tri
     task = "one" if limit == 1 else f"up to {limit}"
     model = next((stroke.number for stroke in strokes_for_model(strokes, trial, context.decisions)), None)
     gets = "none, as was decided" if model is None else "the first" if model == 1 else f"the one numbered {model}"
-    turned = any(FlawName.TURNED in stroke.flaws for stroke in strokes)
-    ways = " (each way of a finger that turned without lifting is one)" if turned else ""
+    turns = any(FlawName.TURNED in stroke.flaws for stroke in strokes)
+    ways = " (each way of a finger that turned without lifting is one)" if turns else ""
     sentence = f"{len(strokes)} strokes{ways} in a trial that asks for {task}: the model uses {gets}."
     yield Flaw(FlawName.SECOND_STROKE, sentence, "doubtful")
 

@@ -189,9 +189,9 @@ def test_what_a_simulated_device_sent_before_its_port_was_opened_is_lost_as_on_a
     terminal.say(bytes(ROOM))  # more than the system holds
     link = SerialLink(terminal.path, 38400)
     terminal.say(b"new")
-    heard = b""
-    while not heard.endswith(b"new"):
+    data = b""
+    while not data.endswith(b"new"):
         terminal.receive(0.01)
-        heard += link.receive(0.1) or b""
-    assert heard == b"new"
+        data += link.receive(0.1) or b""
+    assert data == b"new"
     link.close()

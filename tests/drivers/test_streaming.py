@@ -95,8 +95,8 @@ class SlowStart(Line):
 
     def receive(self, timeout):
         time.sleep(min(timeout, 0.01))
-        passed = time.monotonic() - self.began
-        due = self.sent_count if HALF < passed < 2.5 * HALF else int(passed * RATE * (0.7 if passed < HALF else 1.0))
+        elapsed = time.monotonic() - self.began
+        due = self.sent_count if HALF < elapsed < 2.5 * HALF else int(elapsed * RATE * (0.7 if elapsed < HALF else 1.0))
         data, self.sent_count = bytes(due - self.sent_count), due
         return data or None
 

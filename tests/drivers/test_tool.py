@@ -74,9 +74,9 @@ def test_it_is_recorded_with_its_origin_and_comes_back():
     info = info_with("net-ft://box?tool=0,0,-5,0,0,45")
     assert info.settings["user's tool transform"] == "0 0 -5 mm, 0 0 45 degrees, as the address says"
     assert "tool transform" in info.calibration.source
-    restored = info_from_dict(info_to_dict(info))
-    assert restored.calibration.tool == (0.0, 0.0, -5.0, 0.0, 0.0, 45.0)
-    np.testing.assert_array_equal(restored.calibration.matrix, info.calibration.matrix)
+    copy = info_from_dict(info_to_dict(info))
+    assert copy.calibration.tool == (0.0, 0.0, -5.0, 0.0, 0.0, 45.0)
+    np.testing.assert_array_equal(copy.calibration.matrix, info.calibration.matrix)
     assert info_from_dict(info_to_dict(replace(info, calibration=CALIBRATION))).calibration.tool == ()
 
 

@@ -26,14 +26,14 @@ PLAN = SessionPlan(
     forces=True,
     frame=Frame(),
 )
-MEASURED = 2.5  # N
+NORMAL_FORCE = 2.5  # N
 
 
 def stroke(trial, **fields):
     empty = dict.fromkeys(Stroke.__dataclass_fields__)
     basics = {"trial": trial, "readings": 100, "zero": "before contact", "flaws": (), "reasons": {}, "number": 1}
     basics |= {"kept": True, "decided": {}}
-    return Stroke(**(empty | basics | {"normal_force": MEASURED, "tangential_force": 1.2} | fields))
+    return Stroke(**(empty | basics | {"normal_force": NORMAL_FORCE, "tangential_force": 1.2} | fields))
 
 
 def parameters(trial, mu, tau_max, direction, speed=20.0, flaws=()):

@@ -82,11 +82,11 @@ class Hands:
         self.clock = clock
         self.transducer = transducer
         self.instead = instead or {}
-        self.shown = []
+        self.display = []
         self.events = []  # (due, event)
 
     def show(self, command):
-        self.shown.append(command)
+        self.display.append(command)
         now = self.clock.at_ns
         make = self.instead.get(type(command))
         events = make(command) if make else None

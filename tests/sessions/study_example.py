@@ -10,7 +10,7 @@ from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions
 
 INDICES = (0, 20, 50, 80, 100)
-MEASURED = {"tau_max": 0.02, "speed": 20.0, "normal_force": 2.5}
+STROKE_VALUES = {"tau_max": 0.02, "speed": 20.0, "normal_force": 2.5}
 ENDS = {"tau_max": (0.0196, 0.0204), "speed": (19.8, 20.3), "normal_force": (2.4, 2.7)}
 
 
@@ -65,7 +65,7 @@ def _full(bare_visit):
             row,
             rule="maximum",
             sed_interval="by derivatives",
-            **MEASURED | {"normal_force": 2.5 + 0.01 * number},
+            **STROKE_VALUES | {"normal_force": 2.5 + 0.01 * number},
             **_with_ends(mu=(row.mu - 0.02, row.mu + 0.02), sed=(0.98 * row.sed, 1.03 * row.sed), **ENDS),
             error_estimate=0.002,
             model_normal_force=2.1 + 0.01 * number,

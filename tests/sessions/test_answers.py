@@ -12,16 +12,16 @@ ANSWER = Scored(31.5, ((4.25, 60.0), (4.75, 31.5)), 4.25, 1, "left", "pen")
 
 def test_every_position_of_an_answer_its_first_touch_corrections_hand_and_device_are_recorded(tmp_path):
     recording = Session(tmp_path / "s", instead={AskScore: once(ANSWER)}).run()
-    scored = next(event for event in recording.events if event.kind == "scored")
-    assert scored.data["positions"] == [[4.25, 60.0], [4.75, 31.5]]
-    assert event_of(scored) == ANSWER
+    score_event = next(event for event in recording.events if event.kind == "scored")
+    assert score_event.data["positions"] == [[4.25, 60.0], [4.75, 31.5]]
+    assert event_of(score_event) == ANSWER
     assert recording.trials[0].score == 31.5
 
 
 def test_what_a_terminal_cannot_tell_of_an_answer_is_empty_and_not_invented(tmp_path):
     recording = Session(tmp_path / "s").run()
-    scored = next(event for event in recording.events if event.kind == "scored")
-    fields = {name: value for name, value in scored.data.items() if name != "score"}
+    score_event = next(event for event in recording.events if event.kind == "scored")
+    fields = {name: value for name, value in score_event.data.items() if name != "score"}
     assert fields == {"positions": [], "first_touch": None, "corrections": None, "hand": None, "input_device": None}
 
 

@@ -45,8 +45,8 @@ def test_every_number_lies_in_its_interval(strokes):
 
 
 def test_losses_that_leave_the_zero_no_filtered_reading_leave_the_intervals():
-    arrived = np.flatnonzero(((T > 1.0) & (T < 3.0)) | (np.arange(len(T)) % 8 > 0))  # elsewhere seven at a time
-    stroke = analyse(block(T[arrived], noisy(PLAIN)[arrived], sequence=arrived)).strokes[0]
+    present = np.flatnonzero(((T > 1.0) & (T < 3.0)) | (np.arange(len(T)) % 8 > 0))  # elsewhere seven at a time
+    stroke = analyse(block(T[present], noisy(PLAIN)[present], sequence=present)).strokes[0]
     intervals = stroke_intervals(stroke, 0)
     for name in (*NUMBERS, *FORCES):
         low, high = getattr(intervals, name)
@@ -144,8 +144,8 @@ def test_a_finger_that_slid_when_its_speed_was_first_known_began_at_any_instant_
 def truths(seed, truth):
     course = Course(SimulatedSubject(seed).stroke(truth.surface), truth.mu, truth.surface.holds)
     slant = course.stroke.slant
-    pressing = float(course.normal_force(np.linspace(*course.steady, 400)).mean())  # at full speed, fully pressed
-    yield from (("normal_force", pressing), ("tangential_force", truth.mu * pressing))
+    normal = float(course.normal_force(np.linspace(*course.steady, 400)).mean())  # at full speed, fully pressed
+    yield from (("normal_force", normal), ("tangential_force", truth.mu * normal))
     yield from (("mu_dynamic", truth.mu), ("tau_max", truth.tau_max), ("speed", truth.speed))
     yield from (("peak_normal", truth.peak_normal_force), ("peak_tangential", truth.mu * truth.peak_normal_force))
     yield "onset", truth.onset

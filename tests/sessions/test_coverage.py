@@ -28,7 +28,7 @@ LEVEL, SLOPE, SCATTER, NOISE = 5.0, 6.0, 1.5, 4.0  # of the second set: points, 
 DRIFTING = 0.5  # points a trial
 
 
-def planned(seed, subject):
+def plan_of(seed, subject):
     return plan(protocol(PROTOCOL), subject, seed)
 
 
@@ -57,7 +57,7 @@ def judged_visit(seed, subject):
     carries, does_not = (SimulatedSubject(seed, settings) for settings in (PEOPLE, replace(PEOPLE, carry_over=0.0)))
     drag, press = np.random.default_rng([seed, 7]).normal(1.0, CALIBRATION, 2)
     rows, true_strokes = [], []
-    for block in planned(seed, subject).blocks:
+    for block in plan_of(seed, subject).blocks:
         for place, trial in enumerate(block.trials):
             person = carries if block.name == "stickiness" else does_not
             surface = simulated_surface(trial)
@@ -90,7 +90,7 @@ def sed_visit(seed, subject):
     draw = np.random.default_rng([seed, 8])
     level, middle = draw.normal(50.0, LEVEL), draw.normal(8.0, 1.0)
     rows = []
-    (block, _) = planned(seed, subject).blocks
+    (block, _) = plan_of(seed, subject).blocks
     for place, trial in enumerate(block.trials):
         sed = draw.normal(middle, SCATTER)
         score = level + SLOPE * (sed - 8.0) + DRIFTING * place + NOISE * draw.normal()
@@ -102,7 +102,7 @@ def chance_visit(seed, subject):
     """Return the visit of one of the synthetic study's people to surfaces that nobody meets again."""
     person, draw = SimulatedSubject(seed, PEOPLE), np.random.default_rng([seed, 9])
     rows, before = [], None
-    (block, _) = planned(seed, subject).blocks
+    (block, _) = plan_of(seed, subject).blocks
     for place, trial in enumerate(block.trials):
         near, own = draw.normal(size=2).tolist()
         index = round(50 + 15 * near)

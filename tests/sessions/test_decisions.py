@@ -55,9 +55,11 @@ def test_a_decision_is_a_line_with_who_when_why_and_what_stood_before(recording)
 def test_everybody_who_decides_at_once_gets_a_line_and_a_number_of_its_own(recording):
     with ThreadPoolExecutor(8) as people:
         decisions = list(people.map(lambda _: append(recording, WINDOW), range(40)))
-    kept = read(recording.folder)
-    assert kept.problems == ()
-    assert sorted(decision.number for decision in decisions) == [line.number for line in kept.lines] == [*range(1, 41)]
+    stored = read(recording.folder)
+    assert stored.problems == ()
+    assert (
+        sorted(decision.number for decision in decisions) == [line.number for line in stored.lines] == [*range(1, 41)]
+    )
 
 
 def test_the_check_sum_is_that_of_the_text_before_it(recording):
@@ -175,10 +177,10 @@ def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_
             assert longer.startswith(content)  # nothing that was written is altered
             content = longer
             assert {line.stroke: line.new for line in read(Path(room)).in_force} == in_force(history)
-        torn = content[: cut % (len(content) + 1)]
-        decisions = parse(torn)
-        assert {line.stroke: line.new for line in decisions.in_force} == in_force(history[: torn.count(b"\n")])
-        assert bool(decisions.problems) == (torn != b"" and not torn.endswith(b"\n"))
+        part = content[: cut % (len(content) + 1)]
+        decisions = parse(part)
+        assert {line.stroke: line.new for line in decisions.in_force} == in_force(history[: part.count(b"\n")])
+        assert bool(decisions.problems) == (part != b"" and not part.endswith(b"\n"))
 
 
 # What decisions do
@@ -230,12 +232,12 @@ def test_a_window_decided_where_nothing_touches_gives_no_number_and_says_so():
 
 
 def test_an_onset_decided_later_leaves_the_intervals_what_they_are():
-    usual, cut = (
+    usual, later = (
         analysis.strokes[0]
         for analysis in (analyse_with(), analyse_with(Decision("E02", "seen", "onset", 1, 1, None, 1.3)))
     )
-    plain, late = stroke_intervals(usual, 0).mu_dynamic, stroke_intervals(cut, 0).mu_dynamic
-    assert cut.onset == 1.3
+    plain, late = stroke_intervals(usual, 0).mu_dynamic, stroke_intervals(later, 0).mu_dynamic
+    assert later.onset == 1.3
     assert late[1] - late[0] == pytest.approx(plain[1] - plain[0], rel=0.2)
 
 

@@ -75,25 +75,25 @@ def test_no_file_of_a_real_session_says_that_it_was_simulated(exports, form):
 def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, name):
     original = sources[name].recording
     result = import_session(read_export(exports[form, name]), tmp_path / "s")
-    restored = Recording.open(tmp_path / "s")
+    copy = Recording.open(tmp_path / "s")
     for column in ("sequence", "counter", "status", "time", "received_ns", "raw"):
-        assert getattr(restored.readings(), column).tobytes() == getattr(original.readings(), column).tobytes()
-    events = [event for event in restored.events if event.kind != "not_restored"]
+        assert getattr(copy.readings(), column).tobytes() == getattr(original.readings(), column).tobytes()
+    events = [event for event in copy.events if event.kind != "not_restored"]
     assert [(e.time_ns, e.kind, e.trial, e.data) for e in events] == [
         (e.time_ns, e.kind, e.trial, e.data) for e in original.events
     ]
-    assert restored.plan == original.plan
-    assert restored.trials == original.trials
-    assert restored.simulated_sentence == original.simulated_sentence
-    assert restored.flaws == original.flaws
-    assert {k: v for k, v in restored.provenance.items() if k != "restored_from"} == original.provenance
+    assert copy.plan == original.plan
+    assert copy.trials == original.trials
+    assert copy.simulated_sentence == original.simulated_sentence
+    assert copy.flaws == original.flaws
+    assert {k: v for k, v in copy.provenance.items() if k != "restored_from"} == original.provenance
     if original.info is not None:
-        np.testing.assert_equal(asdict(restored.info), asdict(original.info))  # an unknown number is nan in both
-    assert set(original.losses) <= set(restored.losses)
+        np.testing.assert_equal(asdict(copy.info), asdict(original.info))  # an unknown number is nan in both
+    assert set(original.losses) <= set(copy.losses)
     assert result.readings == len(original.readings())
-    assert side_files(restored.folder) == side_files(original.folder)
-    assert gain_error_set(restored.folder) == gain_error_set(original.folder)
-    assert [analyse(restored).to_dict()[part] for part in ("strokes", "friction")] == [
+    assert side_files(copy.folder) == side_files(original.folder)
+    assert gain_error_set(copy.folder) == gain_error_set(original.folder)
+    assert [analyse(copy).to_dict()[part] for part in ("strokes", "friction")] == [
         analyse(original).to_dict()[part] for part in ("strokes", "friction")
     ]
 
@@ -279,10 +279,10 @@ def test_a_reading_that_never_arrived_is_a_row_of_its_own_and_a_silence_begins_a
         .splitlines()
         for part in (1, 2)
     )
-    missing = [row for row in first if row.startswith("n/a")]
+    gap_rows = [row for row in first if row.startswith("n/a")]
     assert len(first) == 210  # 0 to 99, ten that never arrived, 110 to 209
-    assert len(missing) == 10
-    assert set(missing[0].split("\t")) == {"n/a"}
+    assert len(gap_rows) == 10
+    assert set(gap_rows[0].split("\t")) == {"n/a"}
     assert [int(row.split("\t")[0]) for row in second] == list(range(210, 310))
     starts = [
         json.loads((beh / f"sub-S01_task-madeup_recording-{part}_physio.json").read_text())["StartTime"]

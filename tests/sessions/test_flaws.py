@@ -47,14 +47,14 @@ class Case:
     extra: dict = field(default_factory=dict)  # further arguments
 
 
-def cut(keep):
+def leave_out(keep):
     return block(T[keep], noisy(PLAIN)[keep], sequence=np.flatnonzero(keep))
 
 
 def without(start, stop):
     keep = np.ones(len(T), bool)
     keep[start:stop] = False
-    return cut(keep)
+    return leave_out(keep)
 
 
 def with_rows(rows, values):
@@ -128,7 +128,7 @@ CASES = {
         (),
         frozenset({"begins_in_contact", "ends_in_contact"}),
     ),
-    "zero_after_contact": Case(cut(T >= 1.5), also=frozenset({"begins_in_contact"})),
+    "zero_after_contact": Case(leave_out(T >= 1.5), also=frozenset({"begins_in_contact"})),
     "drift": Case(block(T, noisy(PLAIN + 0.3 * (T > 2.0)[:, None] * np.eye(6)[0])), (*FRICTION, "normal_force"), ()),
     "normal_axis_implausible": Case(
         block(T, noisy(made(T, N * (1.0 + 0.2 * np.sin(2 * np.pi * 1.7 * T)), HALF, ALONG))),
@@ -155,8 +155,8 @@ CASES = {
         given_numbers=("mu_dynamic", "speed", "direction"),
         also=frozenset({"second_stroke", "wrong_direction"}),
     ),
-    "begins_in_contact": Case(cut(T >= 1.5), ("onset",), also=frozenset({"zero_after_contact"})),
-    "ends_in_contact": Case(cut(T <= 2.5), ("lift",)),
+    "begins_in_contact": Case(leave_out(T >= 1.5), ("onset",), also=frozenset({"zero_after_contact"})),
+    "ends_in_contact": Case(leave_out(T <= 2.5), ("lift",)),
     "slow_onset": Case(block(T, noisy(creeping()))),
     "too_little_force": Case(
         block(T, noisy(slide(T, newtons=0.2))), (*FRICTION, "speed"), (), frozenset({"no_steady_sliding", "drift"})

@@ -125,9 +125,9 @@ def test_another_descriptor_is_judged_by_direction_and_no_plan_gets_the_mean():
 
 
 def test_lost_readings_are_counted_and_cost_nothing_where_they_are_few():
-    arrived = np.ones(len(T), bool)
-    arrived[[300, 301, 450]] = False
-    analysis = analyse(block(T[arrived], noisy(PLAIN)[arrived], sequence=np.flatnonzero(arrived)))
+    present = np.ones(len(T), bool)
+    present[[300, 301, 450]] = False
+    analysis = analyse(block(T[present], noisy(PLAIN)[present], sequence=np.flatnonzero(present)))
     assert names(analysis) == {"lost_readings"}
     assert "3 readings" in analysis.flaws[0].sentence
     assert analysis.strokes[0].tau_max == pytest.approx(0.01, rel=0.01)
@@ -143,9 +143,9 @@ def test_a_rate_that_changes_midway_is_named_and_costs_no_stroke():
 
 
 def test_a_long_gap_in_the_stroke_withholds_its_peaks_but_not_its_mean():
-    arrived = np.ones(len(T), bool)
-    arrived[400:430] = False
-    (stroke,) = analyse(block(T[arrived], noisy(PLAIN)[arrived], sequence=np.flatnonzero(arrived))).strokes
+    present = np.ones(len(T), bool)
+    present[400:430] = False
+    (stroke,) = analyse(block(T[present], noisy(PLAIN)[present], sequence=np.flatnonzero(present))).strokes
     assert stroke.tau_max is None
     assert stroke.mu_max is None
     assert stroke.reasons["tau_max"] == "lost_readings"

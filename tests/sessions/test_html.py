@@ -31,14 +31,14 @@ class Words(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.words, self.fetched, self.tags, self.ids, self._hidden = [], [], [], [], 0
+        self.words, self.addresses, self.tags, self.ids, self._hidden = [], [], [], [], 0
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
         self.tags.append(tag)
         self._hidden += tag in ("style", "title", "script")
         self.ids += [value for name, value in attrs if name == "id"]
-        self.fetched += [value for name, value in attrs if name in FETCHES or name.endswith("href")]
+        self.addresses += [value for name, value in attrs if name in FETCHES or name.endswith("href")]
 
     def handle_endtag(self, tag):
         self._hidden -= tag in ("style", "title", "script")
@@ -56,16 +56,16 @@ def report():
 @pytest.fixture(scope="module")
 def drawing(report):
     """Return the pictures, drawn once for all tests, and the axes of which a label is cut."""
-    cut, save = [], Figure.savefig
+    labels, save = [], Figure.savefig
 
     def save_checked(self, *args, **kwargs):
         save(self, *args, **kwargs)
         box, extent = self.bbox_inches, self.get_tightbbox()
         if min(extent.x0, extent.y0, box.x1 - extent.x1, box.y1 - extent.y1) < 0:
-            cut.append([axes.get_ylabel() for axes in self.axes])
+            labels.append([axes.get_ylabel() for axes in self.axes])
 
     with patch.object(Figure, "savefig", save_checked):
-        return plates(report), cut
+        return plates(report), labels
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_nothing_on_the_page_is_fetched_from_anywhere(page_text):
     words = Words(page_text)
     assert "script" not in words.tags
     assert not {"link", "img", "iframe", "object", "embed"} & set(words.tags)
-    assert all(address.startswith(("#", "data:text/csv;")) for address in words.fetched)
+    assert all(address.startswith(("#", "data:text/csv;")) for address in words.addresses)
     assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page_text))
     assert "@import" not in page_text
 
@@ -108,7 +108,7 @@ def test_nothing_on_the_page_is_fetched_from_anywhere(page_text):
 def test_every_link_and_clip_of_the_page_leads_to_exactly_one_place(page_text):
     words = Words(page_text)
     assert len(words.ids) == len(set(words.ids))
-    targets = {address[1:] for address in words.fetched if address[0] == "#"}
+    targets = {address[1:] for address in words.addresses if address[0] == "#"}
     assert targets | set(re.findall(r"url\(#([^)]*)\)", page_text)) <= set(words.ids)
 
 
@@ -392,7 +392,7 @@ def test_every_word_of_every_table_is_on_the_printed_a4_pages(text, tmp_path):
     cells = " ".join(re.findall(r'(?:<td[^>]*>|<span class="ends">)([^<]+)<', text))
     words = {word for word in cells.split() if "&" not in word}
     assert words
-    missing = words - set(pdf.split())
+    absent = words - set(pdf.split())
     unbroken = re.sub(r"\s+", "", pdf)
-    assert {word for word in missing if len(word) <= 60 or word not in unbroken} == set()  # a long one goes on below
+    assert {word for word in absent if len(word) <= 60 or word not in unbroken} == set()  # a long one goes on below
     assert next(n for n, sheet in enumerate(pdf.split("\f")) if "Appendix:" in sheet) <= 3

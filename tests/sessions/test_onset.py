@@ -109,6 +109,6 @@ def test_a_baseline_given_is_used_from_the_first_reading_on():
 
 
 def test_readings_lost_in_the_middle_of_a_press_change_nothing_else():
-    arrived = np.ones(len(T), bool)
-    arrived[400:460] = False
-    assert ContactDetector().feed(T[arrived], FORCE[arrived]) == EVENTS
+    present = np.ones(len(T), bool)
+    present[400:460] = False
+    assert ContactDetector().feed(T[present], FORCE[present]) == EVENTS

@@ -101,7 +101,7 @@ def test_a_surface_that_was_always_chosen_has_no_finite_value_and_is_named():
 
 
 def test_preference_is_not_told_from_order_where_one_surface_was_always_first():
-    star = [Choice("P1", 0, other, chosen) for other in (20, 50) for chosen in (True, False, True)]
+    star = [Choice("P1", 0, other, won) for other in (20, 50) for won in (True, False, True)]
     scale = paired_scale(star)
     assert not scale.values
     assert "in both orders" in scale.reason

@@ -180,9 +180,9 @@ def test_leaving_out_the_one_subject_who_differs_raises_the_correlation_most():
 
 def test_magnitude_estimates_of_any_modulus_come_to_the_same_means_at_one_modulus():
     def estimate_visit(number, modulus):
-        scored = visit(number)
-        rows = [replace(row, score=None, estimate=modulus * 2.0 ** (row.index / 50)) for row in scored.rows]
-        return replace(scored, rows=tuple(rows))
+        visit_with_scores = visit(number)
+        rows = [replace(row, score=None, estimate=modulus * 2.0 ** (row.index / 50)) for row in visit_with_scores.rows]
+        return replace(visit_with_scores, rows=tuple(rows))
 
     finding = pool_visits([estimate_visit(1, 1.0), estimate_visit(2, 100.0), estimate_visit(3, 10.0)]).descriptors[0]
     means = finding.estimates.equal_moduli
@@ -310,9 +310,9 @@ def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that
 
 
 def test_the_table_of_standardised_scores_has_the_scores_as_given_beside_them():
-    (shown,) = [table for table in study_tables(pool_visits(VISITS))["scores"] if table.name == "table-normalised"]
+    (normalised,) = [table for table in study_tables(pool_visits(VISITS))["scores"] if table.name == "table-normalised"]
     scores = np.array([[{row.index: row.score for row in visit.rows}[index] for index in INDICES] for visit in VISITS])
     standardised = (scores - scores.mean(axis=1, keepdims=True)) / scores.std(axis=1, ddof=1, keepdims=True)
-    cells = [[float(row[n].text.replace("−", "-")) for n in (2, 5)] for row in shown.groups[0].rows]
+    cells = [[float(row[n].text.replace("−", "-")) for n in (2, 5)] for row in normalised.groups[0].rows]
     expected = np.column_stack([scores.mean(axis=0), standardised.mean(axis=0)])
     assert (np.abs(np.array(cells) - expected) <= (0.0501, 0.00501)).all()  # printed to one and two decimals

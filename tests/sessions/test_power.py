@@ -18,8 +18,8 @@ def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_te
     error = PLAIN.noise / np.sqrt(np.sum((mu - mu.mean()) ** 2))
     for design in power(PLAIN, (8, 16), (5,), 400, 1):
         n = design.subjects
-        closed = stats.nct.sf(stats.t.ppf(0.975, n - 1), n - 1, slope / error * np.sqrt(n))
-        assert design.share == pytest.approx(closed, abs=0.1)
+        closed_form = stats.nct.sf(stats.t.ppf(0.975, n - 1), n - 1, slope / error * np.sqrt(n))
+        assert design.share == pytest.approx(closed_form, abs=0.1)
 
 
 def test_without_an_effect_the_test_detects_one_in_about_five_of_a_hundred():

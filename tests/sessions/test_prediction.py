@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
+from paper_friction import NORMAL_FORCE, PLAN, analysis, parameters, stroke
 
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
@@ -107,14 +107,14 @@ def test_model_forces_are_those_per_mm_times_the_finger_s_width_which_is_marked_
     for row in prediction.trials:
         assert row.normal_force == pytest.approx(15.0 * row.prediction.normal_force)
         assert row.tangential_force == pytest.approx(15.0 * row.prediction.tangential_force)
-        assert row.measured_normal == MEASURED
+        assert row.measured_normal == NORMAL_FORCE
 
 
 def test_at_the_matching_depth_the_model_presses_as_hard_as_the_finger_did(prediction):
     for row in (prediction.trials[0], prediction.trials[9]):
         scene = row.prediction.scene
         deeper = replace(scene, loading=replace(scene.loading, indentation=row.matching_depth))
-        assert solve(deeper).normal_force * 15.0 == pytest.approx(MEASURED, rel=0.01)
+        assert solve(deeper).normal_force * 15.0 == pytest.approx(NORMAL_FORCE, rel=0.01)
 
 
 def test_the_opposite_direction_is_predicted_at_the_same_depth(prediction):

@@ -313,7 +313,7 @@ def test_counterbalanced_blocks_begin_with_each_block_for_half_of_the_subjects_a
 
 
 def test_within_a_block_the_order_of_surfaces_is_the_same_wherever_the_block_comes(tmp_path):
-    ours, listed = counterbalanced(tmp_path), protocol(PAPER)
+    ours, as_listed = counterbalanced(tmp_path), protocol(PAPER)
     for name in ("stickiness", "slipperiness"):
         orders = [
             [
@@ -322,7 +322,7 @@ def test_within_a_block_the_order_of_surfaces_is_the_same_wherever_the_block_com
                 if block.name == name
                 for trial in block.trials
             ]
-            for document in (ours, listed)
+            for document in (ours, as_listed)
         ]
         assert orders[0] == orders[1]
 

@@ -19,7 +19,7 @@ def brightness():
 
 
 def scattered():
-    return [Level(at, chosen, 20) for at, chosen in SCATTERED]
+    return [Level(at, choices, 20) for at, choices in SCATTERED]
 
 
 def test_without_lapses_the_function_is_the_probit_that_r_prints(monkeypatch):
@@ -89,11 +89,11 @@ def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelih
 )  # fmt: skip
 def test_of_several_maxima_the_greatest_is_found(answers, at):
     pse, slope, order, lapse, theta = at
-    x, chosen, presented, side = np.array(answers).T
+    x, choices, presented, side = np.array(answers).T
     p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (x - pse + order * side))
-    likelihood = stats.betabinom.logpmf(chosen, presented, p / theta, (1.0 - p) / theta).sum()
+    likelihood = stats.betabinom.logpmf(choices, presented, p / theta, (1.0 - p) / theta).sum()
     fit = psychometric([Level(*answer) for answer in answers])
-    assert fit.log_likelihood + np.log(special.binom(presented, chosen)).sum() >= likelihood - 1e-5
+    assert fit.log_likelihood + np.log(special.binom(presented, choices)).sum() >= likelihood - 1e-5
 
 
 def test_an_end_of_an_interval_is_where_the_likelihood_adjusted_for_three_fitted_parameters_has_dropped():
@@ -108,8 +108,8 @@ def test_an_end_of_an_interval_is_where_the_likelihood_adjusted_for_three_fitted
         return minimum.fun
 
     # Five cells are left: Student's interval of a mean is where n ln(1 + t^2 / n) has been lost.
-    dropped = 2.5 * math.log(1.0 + stats.t.ppf(0.975, 5) ** 2 / 5.0)
-    assert least([psychometric(scattered()).pse.high]) - least() == pytest.approx(dropped, abs=5e-3)
+    fall = 2.5 * math.log(1.0 + stats.t.ppf(0.975, 5) ** 2 / 5.0)
+    assert least([psychometric(scattered()).pse.high]) - least() == pytest.approx(fall, abs=5e-3)
 
 
 def observer(rng, ratios, each, truth, correlation=0.0):
@@ -184,8 +184,8 @@ def test_answers_that_step_between_two_levels_bound_the_jnd_above_and_the_pse_on
         p = stats.norm.cdf(slope * np.array(SIX[3:]))
         return -2.0 * np.sum(special.gammaln(p + 10) - special.gammaln(p) - special.gammaln(11))
 
-    dropped = 1.5 * math.log(1.0 + stats.f.ppf(0.95, 1, 3) / 3.0)  # six levels, three parameters
-    slope = optimize.brentq(lambda at: loss(at) - dropped, 1.0, 50.0)
+    fall = 1.5 * math.log(1.0 + stats.f.ppf(0.95, 1, 3) / 3.0)  # six levels, three parameters
+    slope = optimize.brentq(lambda at: loss(at) - fall, 1.0, 50.0)
     assert fit.jnd.high == pytest.approx(QUARTILE / slope, rel=0.01)
     assert -0.3 < fit.pse.low < -0.14 < 0.14 < fit.pse.high < 0.3
 

@@ -121,9 +121,9 @@ def test_a_score_that_was_not_given_is_not_a_number_in_the_copy(tmp_path):
 
 
 def test_the_manifest_lists_the_sha_256_of_each_file(sealed_dir):
-    listed = json.loads((sealed_dir / "MANIFEST.json").read_bytes())["files"]
-    assert set(listed) == {"session.h5", "session.json", "session.sqlite"}
-    for name, entry in listed.items():
+    files = json.loads((sealed_dir / "MANIFEST.json").read_bytes())["files"]
+    assert set(files) == {"session.h5", "session.json", "session.sqlite"}
+    for name, entry in files.items():
         assert entry["sha256"] == hashlib.sha256((sealed_dir / name).read_bytes()).hexdigest()
         assert entry["bytes"] == (sealed_dir / name).stat().st_size
 

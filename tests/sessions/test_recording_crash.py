@@ -51,11 +51,11 @@ def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log
         assert len(recording.events) >= safe_events
         assert [event.data["score"] for event in recording.events] == [3.0 * i for i in range(len(recording.events))]
 
-        cut = folder / "session.sqlite-wal"
-        if cut.exists():
-            content = cut.read_bytes()
-            cut.write_bytes(content[: len(content) - min(chance.randrange(1, 200_000), len(content))])
-            if log_tail(BytesIO(cut.read_bytes())).commits == 0 and (folder / "session.sqlite").stat().st_size < 8192:
+        log = folder / "session.sqlite-wal"
+        if log.exists():
+            content = log.read_bytes()
+            log.write_bytes(content[: len(content) - min(chance.randrange(1, 200_000), len(content))])
+            if log_tail(BytesIO(log.read_bytes())).commits == 0 and (folder / "session.sqlite").stat().st_size < 8192:
                 continue  # the cut reached back to before the tables were there
             remainder = Recording.open(folder)
             sequence = remainder.readings().sequence.tolist()

@@ -197,8 +197,8 @@ def test_a_log_whose_tail_was_cut_gives_its_whole_commits_and_names_the_rest(cra
     log = crashed_folder / "session.sqlite-wal"
     whole = log.read_bytes()
     lengths = set()
-    for cut in range(0, len(whole) - 32, 509):
-        log.write_bytes(whole[: len(whole) - cut])
+    for size in range(0, len(whole) - 32, 509):
+        log.write_bytes(whole[: len(whole) - size])
         tail = log_tail(BytesIO(log.read_bytes()))
         try:
             recording = Recording.open(crashed_folder)
@@ -280,19 +280,19 @@ def test_a_log_shorter_than_its_head_holds_nothing():
 
 def test_a_change_that_a_crash_cut_short_is_undone_in_a_copy_and_the_file_stays_as_it_is(tmp_path):
     folder = record_session(tmp_path / "s", blocks=20)
-    torn = tmp_path / "torn"
-    torn.mkdir()
+    copy = tmp_path / "torn"
+    copy.mkdir()
     with closing(sqlite3.connect(folder / "session.sqlite", isolation_level=None)) as connection:
         connection.execute("PRAGMA cache_size=1")  # changes go to the file before the commit
         connection.execute("BEGIN")
         connection.execute("UPDATE blocks SET raw = zeroblob(4800)")
         for path in folder.iterdir():
-            shutil.copy(path, torn)
-    assert (torn / "session.sqlite-journal").exists()
-    before = hashes(torn)
-    recording = Recording.open(torn)
+            shutil.copy(path, copy)
+    assert (copy / "session.sqlite-journal").exists()
+    before = hashes(copy)
+    recording = Recording.open(copy)
     assert recording.readings().raw.tolist() == readings(0, 2000).raw.tolist()
-    assert hashes(torn) == before
+    assert hashes(copy) == before
 
 
 # ---- what the log says of a trial

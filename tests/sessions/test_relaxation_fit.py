@@ -35,8 +35,8 @@ def hold_curve(elastic, press, part, tau, rng, rise=0.5, hold=3.0, size=1.0):
     for at, now in enumerate(time):
         s = np.linspace(0.0, min(now, rise), 4001)
         e = CALM(DEEP * s / rise)
-        gone = 1.0 - np.exp(-(now - s) / tau)
-        force[at] = size * (e[-1] - part * np.sum((gone[1:] + gone[:-1]) / 2.0 * np.diff(e)))
+        relaxation = 1.0 - np.exp(-(now - s) / tau)
+        force[at] = size * (e[-1] - part * np.sum((relaxation[1:] + relaxation[:-1]) / 2.0 * np.diff(e)))
     depth = DEEP * np.minimum(time / rise, 1.0)
     return HoldCurve(time, depth + elastic.touch[press], force + 0.005 * rng.standard_normal(len(time)))
 
@@ -131,6 +131,6 @@ def test_the_solver_s_own_finger_that_relaxes_presses_as_the_formula_says():
     assert len(deep) > 10
     for at in deep[::5]:
         past = fine <= time[at]
-        gone = 1.0 - np.exp(-(time[at] - fine[past]) / tau)
-        force = e[past][-1] - part * np.sum((gone[1:] + gone[:-1]) / 2.0 * np.diff(e[past]))
+        relaxation = 1.0 - np.exp(-(time[at] - fine[past]) / tau)
+        force = e[past][-1] - part * np.sum((relaxation[1:] + relaxation[:-1]) / 2.0 * np.diff(e[past]))
         assert 15.0 * history.normal_force[down][at] == pytest.approx(force, rel=0.02)

@@ -184,8 +184,8 @@ def test_a_session_in_which_people_do_anything_at_any_moment_comes_out_identical
                 )
             return acts
 
-    missing = {chance.randrange(4000) for _ in range(40)}
-    recording = record_session(tmp_path / "session", hands=Restless, lost=missing, stop=lambda sent: sent > 4000)
+    losses = {chance.randrange(4000) for _ in range(40)}
+    recording = record_session(tmp_path / "session", hands=Restless, lost=losses, stop=lambda sent: sent > 4000)
     assert any(event.kind == "refused" for event in recording.events)
     replay_identical(recording, tmp_path)
 
@@ -197,7 +197,7 @@ def test_lost_readings_are_told_of_at_the_same_moments(tmp_path):
 
 
 def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_path):
-    class Leaning(Hands):
+    class LeaningHands(Hands):
         def show(self, command):
             if isinstance(command, AskMount) and not self.transducer.touches:
                 for i in range(48):  # a hand that leans on it now and then, for 14 s
@@ -205,7 +205,7 @@ def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_pa
                     self.transducer.touches.append((at, at + 100_000_000, 1.0))
             super().show(command)
 
-    recording = record_session(tmp_path / "session", hands=Leaning)
+    recording = record_session(tmp_path / "session", hands=LeaningHands)
     assert sum(event.kind == "told" for event in recording.events) > 1
     replay_identical(recording, tmp_path)
 
@@ -223,14 +223,14 @@ def test_a_session_that_was_stopped_ends_so_again(tmp_path):
 
 
 def test_a_session_that_our_own_error_ended_ends_so_again(tmp_path):
-    class Broken(Hands):
+    class BrokenHands(Hands):
         def poll(self):
             if self.transducer.sent > 500:
                 raise ZeroDivisionError("an error: of ours")
             return super().poll()
 
     with pytest.raises(ZeroDivisionError):
-        record_session(tmp_path / "session", hands=Broken)
+        record_session(tmp_path / "session", hands=BrokenHands)
     recording = Recording.open(tmp_path / "session")
     assert recording.events[-1].data["reason"] == "ZeroDivisionError: an error: of ours"
     replay_identical(recording, tmp_path)
@@ -239,7 +239,7 @@ def test_a_session_that_our_own_error_ended_ends_so_again(tmp_path):
 @pytest.mark.parametrize("last", [1, 4, 6, 7, 8, 9, 11, 13, 40])
 def test_a_session_cut_short_anywhere_is_replayed_to_where_it_was_cut(last, tmp_path):
     record_session(tmp_path / "session")
-    cut(tmp_path / "session", last)
+    cut_short(tmp_path / "session", last)
     recording = Recording.open(tmp_path / "session")
     assert "cut short" in recording.losses[-1]
     replica = replay_identical(recording, tmp_path)
@@ -295,7 +295,7 @@ def test_at_a_chosen_speed_the_outcome_is_the_same(whole, tmp_path):
     assert differences(whole, replay_session(whole, tmp_path, speed=200.0)) == []
 
 
-def cut(folder, last):
+def cut_short(folder, last):
     """Leave of a session what a crash leaves: the events up to number `last`, and the blocks committed by then."""
     keep = rows(folder, f"SELECT readings FROM events WHERE number = {last}")[0][0]
     change(folder, "DELETE FROM events WHERE number > ?", (last,))
@@ -312,7 +312,7 @@ def test_a_session_that_was_cut_short_and_resumed_comes_out_identical(lasts, tmp
     folder = tmp_path / "session"
     record_session(folder)
     for last in lasts:
-        cut(folder, last)
+        cut_short(folder, last)
         resume(folder, seed=last)
     recording = Recording.open(folder)
     assert recording.end["complete"]
@@ -334,7 +334,7 @@ def test_a_session_whose_transducer_was_lost_and_that_was_resumed_comes_out_iden
 def test_a_resumed_session_that_was_altered_is_found(tmp_path):
     folder = tmp_path / "session"
     record_session(folder)
-    cut(folder, 20)
+    cut_short(folder, 20)
     resume(folder)
     (number,) = rows(folder, "SELECT max(number) FROM events WHERE kind = 'contact_onset'")[0]
     event = Recording.open(folder).events[number - 1]

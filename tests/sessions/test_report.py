@@ -131,10 +131,12 @@ def test_a_simulated_session_says_so_in_its_first_line(report):
 def test_one_simulated_visit_among_the_scores_makes_the_report_simulated(tmp_path):
     recording = record_foreign(tmp_path / "real")
     real = findings(recording, analyse(recording), scores=[visit("P02", 40.0)])
-    mixed = findings(recording, analyse(recording), scores=[visit("P02", 40.0), visit("P03", 50.0, simulated=True)])
+    with_simulated = findings(
+        recording, analyse(recording), scores=[visit("P02", 40.0), visit("P03", 50.0, simulated=True)]
+    )
     assert (real.simulated, real.head) == (False, "")
-    assert mixed.simulated
-    assert mixed.head == "SIMULATED: 1 of the sessions whose scores are used here is simulated"
+    assert with_simulated.simulated
+    assert with_simulated.head == "SIMULATED: 1 of the sessions whose scores are used here is simulated"
 
 
 def test_a_recording_without_a_plan_gives_a_report_of_its_strokes(tmp_path):
@@ -158,9 +160,9 @@ def test_a_visit_for_scores_only_gives_a_report_of_its_scores(tmp_path):
 
 
 def test_a_value_that_nobody_set_is_marked(report):
-    marked = {fact.name: fact.remark for fact in report.apparatus}
-    assert marked["contact area"].startswith("default")
-    assert marked["height of the face"] == "measured"
+    remarks = {fact.name: fact.remark for fact in report.apparatus}
+    assert remarks["contact area"].startswith("default")
+    assert remarks["height of the face"] == "measured"
 
 
 def test_a_number_withheld_carries_the_sentence_of_its_flaw(tmp_path):
@@ -273,9 +275,9 @@ def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing
             return ReadingBlock.concatenate([block.between(0, before), block.between(after, len(block))])
 
     forces = course(Cut())
-    (missing,) = np.flatnonzero(np.isnan(forces.normal))
-    assert np.flatnonzero(np.isnan(forces.tangential)) == [missing]
-    ends = forces.time[missing - 1], forces.time[missing + 1]
+    (gaps,) = np.flatnonzero(np.isnan(forces.normal))
+    assert np.flatnonzero(np.isnan(forces.tangential)) == [gaps]
+    ends = forces.time[gaps - 1], forces.time[gaps + 1]
     assert ends == pytest.approx([(before - 1) * 0.005, after * 0.005], abs=1e-9)
 
 

@@ -89,9 +89,9 @@ def test_the_summary_counts_predictions_in_doubt(report):
 
 
 def test_what_got_no_prediction_is_a_trial_of_a_plan_or_a_stroke_without_one(report):
-    missing = tuple(replace(p, sed=None) for p in report.predictions[:2])
-    assert "2 trials got no prediction" in " ".join(summary(replace(report, predictions=missing)))
-    unplanned = tuple(replace(p, trial=None) for p in missing)
+    without_sed = tuple(replace(p, sed=None) for p in report.predictions[:2])
+    assert "2 trials got no prediction" in " ".join(summary(replace(report, predictions=without_sed)))
+    unplanned = tuple(replace(p, trial=None) for p in without_sed)
     assert "2 strokes got no prediction" in " ".join(summary(replace(report, predictions=unplanned)))
 
 

@@ -127,8 +127,8 @@ def test_a_killed_session_goes_on_at_the_same_trial_and_nothing_acknowledged_is_
         assert after.plan == before.plan
         for number, record in kept_records.items():
             assert after.trial(number) == record
-        discarded = [take.discard_reason for record in after.trials for take in record.other_takes]
-        assert set(discarded) <= {"the recording was cut short in the middle of it"}
+        reasons = [take.discard_reason for record in after.trials for take in record.other_takes]
+        assert set(reasons) <= {"the recording was cut short in the middle of it"}
         joint = after.readings()
         assert (joint.sequence[1:] - joint.sequence[:-1] == 1).all()
         assert (joint.time[1:] > joint.time[:-1]).all()

@@ -320,8 +320,8 @@ def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_su
     assert asdict(report)["experiments"][0]["rivals"][at]["contrast"]["z"] == rivals[at].contrast.z
     sentences = " ".join(distinctions(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in sentences
-    needed = required_cases(*correlations_of(report.experiments[0]))
-    assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in sentences
+    cases = required_cases(*correlations_of(report.experiments[0]))
+    assert f"{float(f'{cases:.2g}'):.0f} (µ of the model)" in sentences
 
 
 def correlations_of(experiment):

@@ -235,7 +235,7 @@ def test_an_event_that_is_not_meant_is_refused_shown_and_logged(tmp_path):
         f"trial 1 needs the stimulus {code}, not A00",
         f"trial 1 needs the stimulus {code}, not X",
     ]
-    assert sum(isinstance(command, Refuse) for command in session.hands.shown) == 2
+    assert sum(isinstance(command, Refuse) for command in session.hands.display) == 2
 
 
 def test_a_further_stroke_before_the_score_is_recorded_and_flagged(tmp_path):
@@ -260,7 +260,7 @@ def test_a_further_stroke_before_the_score_is_recorded_and_flagged(tmp_path):
 def test_no_zero_is_taken_while_something_touches_and_somebody_is_told(tmp_path):
     session = Session(tmp_path / "s")
 
-    def leaning(_):
+    def lean(_):
         if not session.transducer.touches:  # a hand that comes and goes for 8 s
             at = session.clock.at_ns
             for i in range(20):
@@ -268,11 +268,11 @@ def test_no_zero_is_taken_while_something_touches_and_somebody_is_told(tmp_path)
                 session.transducer.touches.append((begin, begin + 200_000_000, 1.0))
             session.leaning_until = session.transducer.touches[-1][1]
 
-    session.hands.instead[MeasureZero] = leaning
+    session.hands.instead[MeasureZero] = lean
     recording = session.run()
     zeroed = next(event for event in recording.events if event.kind == "zeroed")
     assert zeroed.time_ns > session.leaning_until
-    assert any(isinstance(command, Tell) and "take hands off" in command.sentence for command in session.hands.shown)
+    assert any(isinstance(command, Tell) and "take hands off" in command.sentence for command in session.hands.display)
 
 
 # ---- losses and status

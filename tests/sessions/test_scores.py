@@ -197,7 +197,7 @@ def test_answers_that_are_no_scores_on_the_line_are_shown_and_never_averaged_wit
     assert mean_scores([table]) == ()
     report = findings(recording, analyse(recording))
     assert [experiment.other_answers for experiment in report.experiments] == [(row,)]
-    assert [shown.name for shown in tables(report)["scores"]] == ["table-other-answers"]
+    assert [one.name for one in tables(report)["scores"]] == ["table-other-answers"]
     assert report.excluded == ()
 
 

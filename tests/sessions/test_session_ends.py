@@ -84,10 +84,10 @@ def test_a_lost_link_ends_the_session_and_keeps_what_had_come(tmp_path):
 
 
 def test_an_error_in_the_operators_program_is_written_down_and_raised(tmp_path):
-    def broken(_):
+    def fail(_):
         raise RuntimeError("no screen")
 
-    session = Session(tmp_path / "s", instead={AskStroke: broken})
+    session = Session(tmp_path / "s", instead={AskStroke: fail})
     with pytest.raises(RuntimeError, match="no screen"):
         session.run()
     assert_ended(Recording.open(session.folder), "RuntimeError: no screen", "program")

@@ -29,7 +29,7 @@ from sessions.toml_file import SettingsError
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [DOCS / "session-format.md", *sorted((DOCS / "session-format").glob("*.md"))]
 PAGE = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
-NAMED = set(re.findall(r"`([\w./-]+)`", PAGE))
+NAMES = set(re.findall(r"`([\w./-]+)`", PAGE))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def session_folder(tmp_path_factory):
 def test_every_column_of_the_live_file_is_told(session_folder, table):
     assert f"## Table `{table}`" in PAGE
     columns = {name for _, name, *_ in rows(session_folder, f"PRAGMA table_info({table})")}
-    assert columns <= NAMED
+    assert columns <= NAMES
 
 
 def test_the_live_file_has_no_other_table(session_folder):
@@ -59,14 +59,14 @@ def test_every_data_set_of_the_copy_is_told(session_folder):
     data_sets = []
     with h5py.File(session_folder / "session.h5") as copy:
         copy.visititems(lambda name, item: data_sets.append(name) if isinstance(item, h5py.Dataset) else None)
-        assert set(copy.attrs) <= NAMED
-    assert set(data_sets) <= NAMED
+        assert set(copy.attrs) <= NAMES
+    assert set(data_sets) <= NAMES
 
 
 def test_every_kind_of_event_is_told(session_folder):
     kinds = {kind for (kind,) in rows(session_folder, "SELECT kind FROM events")}
     possible = {event_log.kind_of(kind) for kind in get_args(Event)}
-    assert kinds | possible | set(COUNTS) <= NAMED
+    assert kinds | possible | set(COUNTS) <= NAMES
 
 
 def test_every_key_of_a_protocol_is_told():

@@ -25,5 +25,5 @@ def test_a_setting_is_stored_in_its_group_and_still_under_its_name_alone():
 def test_an_analysis_that_was_stored_without_groups_is_made_again_with_what_was_asked_for():
     old_settings = {"cut_off": 20.0, "steady_rule": "widened", "gain_error": 0.003, "bootstrap_seed": 7}
     old_settings["area"] = {"law": "hertz", "exponent": 2 / 3, "force": 1.0}
-    restored = settings_of({"settings": old_settings})
-    assert (restored.area.law, restored.gain_error, restored.bootstrap_seed) == ("hertz", 0.003, 7)
+    settings = settings_of({"settings": old_settings})
+    assert (settings.area.law, settings.gain_error, settings.bootstrap_seed) == ("hertz", 0.003, 7)

@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
+from paper_friction import NORMAL_FORCE, PLAN, analysis, parameters, stroke
 
 from sessions.prediction import PredictionOptions, predict, uncertainty
 from sessions.prediction.stored import Variant
@@ -63,10 +63,10 @@ def test_the_reading_as_printed_is_that_of_a_scene_with_a_hundredth_of_the_bound
 def test_pressed_with_the_force_measured_the_model_has_that_force_at_the_depth_that_matches(plain, variants):
     for row, before in zip(variants.trials, plain.trials, strict=True):
         variant = pick(row, "computed", "force")
-        assert variant.normal_force == pytest.approx(MEASURED, rel=1e-6)
+        assert variant.normal_force == pytest.approx(NORMAL_FORCE, rel=1e-6)
         assert variant.indentation == pytest.approx(before.matching_depth, rel=5e-3)
         assert row.matching_depth == variant.indentation  # one question, one answer
-        assert variant.tangential_force <= row.mu * MEASURED * (1 + 1e-9)
+        assert variant.tangential_force <= row.mu * NORMAL_FORCE * (1 + 1e-9)
 
 
 def test_the_other_way_is_the_same_depth_slid_back(variants):

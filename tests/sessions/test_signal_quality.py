@@ -180,8 +180,8 @@ def test_twelve_spikes_of_eighty_newtons_hide_no_good_stroke(seed, spike):
 def test_twelve_spikes_close_together_are_told_apart_from_the_stroke_they_lie_in(first, spacing):
     raw = CLEAN.copy()
     raw[first : first + 12 * spacing : spacing, FZ] -= 80.0
-    marked = spikes(raw, SETTINGS.signal)
-    assert np.flatnonzero(marked[:, FZ]).tolist() == list(range(first, first + 12 * spacing, spacing))
+    marks = spikes(raw, SETTINGS.signal)
+    assert np.flatnonzero(marks[:, FZ]).tolist() == list(range(first, first + 12 * spacing, spacing))
     analysis = analyse_raw(raw)
     assert len(analysis.strokes) == 3
     assert analysis.strokes[0].mu_dynamic == pytest.approx(MU, rel=0.01)

@@ -99,8 +99,8 @@ def test_no_two_enrolled_subjects_ever_hold_the_same_place_and_no_place_stays_em
         if joins and subject not in members:
             members[subject] = Member(subject, free_slot(list(members.values())), Body())
         elif not joins and subject in members:
-            gone = members.pop(subject)
-            members[f"{subject} gone {len(members)}"] = Member(gone.subject, gone.slot, gone.body, "left")
+            place = members.pop(subject)
+            members[f"{subject} gone {len(members)}"] = Member(place.subject, place.slot, place.body, "left")
     slots = [member.slot for member in members.values() if member.withdrawn is None]
     assert len(set(slots)) == len(slots)
     assert free_slot(list(members.values())) == min(set(range(len(slots) + 1)) - set(slots))
@@ -292,11 +292,11 @@ def test_a_key_that_was_changed_is_found(blind):
     session = scored_visit(blind, "P01")
     key = study_key(blind)
     (first, first_stimulus), (second, second_stimulus), *rest = key.stimuli.items()
-    swapped = Key(key.salt, {first: second_stimulus, second: first_stimulus, **dict(rest)})
-    store_derived(session, UNBLINDING, {"by": "E01", "key": swapped.to_dict()})
+    other_key = Key(key.salt, {first: second_stimulus, second: first_stimulus, **dict(rest)})
+    store_derived(session, UNBLINDING, {"by": "E01", "key": other_key.to_dict()})
     with pytest.raises(RecordingError, match="not the key that was sealed"):
         reveal(Recording.open(session))
-    (blind / KEY_FILE).write_text(json.dumps({"sealed": swapped.seal()}))
+    (blind / KEY_FILE).write_text(json.dumps({"sealed": other_key.seal()}))
     with pytest.raises(StudyError, match="its SHA-256 differs"):
         study_key(blind)
 

@@ -17,7 +17,7 @@ T = times(12.0)
 LEAN = (2.0, -1.2)  # degrees, to +x and to +y
 
 
-def leaning(clean, lean=LEAN):
+def lean_wrench(clean, lean=LEAN):
     """Return a wrench as a transducer feels it under a face that leans: turned about x, then about y, by hand."""
     a, b = np.arctan(np.tan(np.radians(lean)))
     about_y = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
@@ -36,7 +36,7 @@ def presses(pushes=(0.0, 0.0, 0.0)):
 
 
 def test_the_interval_of_a_lean_holds_the_true_one():
-    tilt = analyse(block(T, noisy(leaning(presses())))).tilt
+    tilt = analyse(block(T, noisy(lean_wrench(presses())))).tilt
     assert len(tilt.presses) == 3
     assert tilt.lean == pytest.approx(LEAN, abs=0.05)
     assert tilt.x_interval[0] <= LEAN[0] <= tilt.x_interval[1]
@@ -45,7 +45,7 @@ def test_the_interval_of_a_lean_holds_the_true_one():
 
 
 def test_presses_that_push_sideways_differently_make_the_interval_wider_and_it_still_holds():
-    tilt = analyse(block(T, noisy(leaning(presses((0.03, -0.02, 0.0)))))).tilt
+    tilt = analyse(block(T, noisy(lean_wrench(presses((0.03, -0.02, 0.0)))))).tilt
     assert tilt.x_interval[0] <= LEAN[0] <= tilt.x_interval[1]
     assert tilt.x_interval[1] - tilt.x_interval[0] > 3.0
     assert "3 presses" in tilt.kind
@@ -54,7 +54,7 @@ def test_presses_that_push_sideways_differently_make_the_interval_wider_and_it_s
 def test_the_interval_of_presses_holds_the_lean_as_often_as_it_says():
     draw = np.random.default_rng(5)
     inside = 0
-    (press, *_), _ = analyse(block(T, noisy(leaning(presses())))).tilt.presses, None
+    (press, *_), _ = analyse(block(T, noisy(lean_wrench(presses())))).tilt.presses, None
     for _ in range(400):
         leans = 2.0 + draw.standard_normal(4)
         tilt = tilt_of([replace(press, lean=(float(lean), 0.0)) for lean in leans], SETTINGS)
@@ -64,18 +64,18 @@ def test_the_interval_of_presses_holds_the_lean_as_often_as_it_says():
 
 def test_one_press_tells_a_lean_and_that_the_hand_is_not_in_its_interval():
     first_press = T < 4.0
-    tilt = analyse(block(T[first_press], noisy(leaning(presses()))[first_press])).tilt
+    tilt = analyse(block(T[first_press], noisy(lean_wrench(presses()))[first_press])).tilt
     assert tilt.lean == pytest.approx(LEAN, abs=0.05)
     assert "what the hand itself pushed sideways is not in it" in tilt.kind
 
 
 def test_a_stroke_tells_no_lean():
-    assert analyse(block(T, noisy(leaning(slide(T))))).tilt is None
+    assert analyse(block(T, noisy(lean_wrench(slide(T))))).tilt is None
 
 
 def test_levelling_takes_the_error_of_the_lean_out_of_friction():
     """mu is off by about e (1 + mu^2) under a lean of e along the stroke; levelled it is the true one."""
-    raw = noisy(leaning(slide(T, mu=0.5)))
+    raw = noisy(lean_wrench(slide(T, mu=0.5)))
     (leant,) = analyse(block(T, raw)).strokes
     assert leant.mu_dynamic - 0.5 == pytest.approx(np.radians(-LEAN[0]) * 1.25, rel=0.1)
     (level,) = analyse(block(T, raw), settings=replace(SETTINGS, tilt=LEAN)).strokes
@@ -84,13 +84,13 @@ def test_levelling_takes_the_error_of_the_lean_out_of_friction():
 
 
 def test_a_lean_that_was_levelled_is_still_told_as_that_of_the_face():
-    tilt = analyse(block(T, noisy(leaning(presses()))), settings=replace(SETTINGS, tilt=LEAN)).tilt
+    tilt = analyse(block(T, noisy(lean_wrench(presses()))), settings=replace(SETTINGS, tilt=LEAN)).tilt
     assert tilt.lean == pytest.approx(LEAN, abs=0.05)
 
 
 def test_presses_of_practice_count_and_its_strokes_do_not():
     practice = replace(trial(), phase="practice")
-    parts = [(practice, block(T, noisy(leaning(presses()))))]
+    parts = [(practice, block(T, noisy(lean_wrench(presses()))))]
     analysis = analyse_blocks(parts, TrialContext(plan([practice]), INFO, SETTINGS))
     assert [press.trial for press in analysis.presses] == [1, 1, 1]
 
@@ -101,7 +101,7 @@ def width(analysis):
 
 
 def test_three_presses_narrow_the_interval_of_mu_and_a_lean_that_nobody_levelled_moves_it_over_the_true_mu():
-    clean = [leaning(slide(T, mu=0.5)), leaning(presses())]
+    clean = [lean_wrench(slide(T, mu=0.5)), lean_wrench(presses())]
     parts = [(trial(number=number), block(T, noisy(raw))) for number, raw in zip((1, 2), clean, strict=True)]
     analysis = analyse_blocks(parts, TrialContext(plan([of for of, _ in parts]), INFO, SETTINGS))
     alone = analyse_blocks(parts[:1], TrialContext(plan([parts[0][0]]), INFO, SETTINGS))

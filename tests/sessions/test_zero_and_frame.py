@@ -98,9 +98,9 @@ def wide():
 def test_a_height_nobody_stated_forbids_a_speed_that_depends_on_it():
     ratio = 0.5 + 0.04 * (T - 2.0)  # rises by 8 % a second
     raw = noisy(wrench(T, N, ratio, 7.0 * (T - 2.0)))
-    (known,) = analyse(block(T, raw)).strokes
+    (stroke,) = analyse(block(T, raw)).strokes
     (unknown,) = analyse(block(T, raw), frame=Frame("-z", "default", HEIGHT, "default")).strokes
-    assert known.speed == pytest.approx(7.0, rel=0.05)
+    assert stroke.speed == pytest.approx(7.0, rel=0.05)
     assert unknown.speed is None
     assert unknown.reasons["speed"] == "height_unknown"
 

@@ -124,9 +124,9 @@ def walks(draw):
 def steps(plan, events):
     """Every (state before, event, state after, commands) of a walk."""
     state, _ = start(plan)
-    passed = []
+    walk = []
     for event in events:
         before = state
         state, commands = advance(state, event)
-        passed.append((before, event, state, commands))
-    return passed
+        walk.append((before, event, state, commands))
+    return walk

@@ -167,9 +167,9 @@ def test_a_shear_limit_acts_alike_on_both_sides_of_a_friction_of_one():
     assert above.tangential_force == pytest.approx(below.tangential_force, rel=1e-8)
 
 
-@pytest.mark.parametrize(("least_dofs", "known"), [(5_000, True), (1e9, False)])
+@pytest.mark.parametrize(("least_dofs", "estimate_known"), [(5_000, True), (1e9, False)])
 def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
-    monkeypatch, least_dofs, known
+    monkeypatch, least_dofs, estimate_known
 ):
     nested = finite_answers.solve_nested
 
@@ -179,8 +179,8 @@ def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said
     monkeypatch.setattr(finite_answers, "solve_nested", lose_coarse)
     scene = Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick"))
     prediction = solve(scene)
-    assert (prediction.error_estimate < 0.01) == known
-    assert (ERROR_UNKNOWN in prediction.warnings) == (not known)
+    assert (prediction.error_estimate < 0.01) == estimate_known
+    assert (ERROR_UNKNOWN in prediction.warnings) == (not estimate_known)
 
 
 def test_setting_up_a_mesh_counts_once_where_the_first_mesh_is_that_of_the_answer():

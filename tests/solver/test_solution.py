@@ -43,7 +43,7 @@ REFERENCE = {
     "slipperiness 55": (0.00525, 0.005294, 0.09631, 0.04238),
     "slipperiness 100": (0.005185, 0.0053, 0.09677, 0.02323),
 }
-PRESSED = (0.0051777, 0.0053391, 0.10065, 0.0)  # d = 1.5 without friction
+AFTER_PRESS = (0.0051777, 0.0053391, 0.10065, 0.0)  # d = 1.5 without friction
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +68,9 @@ def test_the_reference_cases_are_met(ten, title):
 
 def test_a_finger_that_is_pressed_without_friction_meets_the_reference():
     prediction = solve(Scene(friction=Friction(0.0), loading=Loading(1.5, "none")))
-    assert prediction.sed_ending == pytest.approx(PRESSED[0], rel=0.003)
-    assert prediction.sed_point == pytest.approx(PRESSED[1], rel=0.01)
-    assert prediction.normal_force == pytest.approx(PRESSED[2], rel=0.003)
+    assert prediction.sed_ending == pytest.approx(AFTER_PRESS[0], rel=0.003)
+    assert prediction.sed_point == pytest.approx(AFTER_PRESS[1], rel=0.01)
+    assert prediction.normal_force == pytest.approx(AFTER_PRESS[2], rel=0.003)
     assert prediction.tangential_force == 0.0
 
 
@@ -160,15 +160,15 @@ def test_the_marched_course_ends_in_the_state_solved_directly(ten, histories):
 def test_the_course_presses_within_a_second_then_slides_at_the_scene_s_speed(histories):
     for prediction in histories:
         course, loading = prediction.history, prediction.scene.loading
-        pressing = course.time <= 1.0
-        assert np.allclose(course.bone_y[pressing], -loading.indentation * course.time[pressing])
-        assert not course.bone_x[pressing].any()
-        slip = loading.direction * loading.speed * (course.time[~pressing] - 1.0)
-        assert np.allclose(course.bone_x[~pressing], slip)
+        press = course.time <= 1.0
+        assert np.allclose(course.bone_y[press], -loading.indentation * course.time[press])
+        assert not course.bone_x[press].any()
+        slip = loading.direction * loading.speed * (course.time[~press] - 1.0)
+        assert np.allclose(course.bone_x[~press], slip)
         assert course.sed_ending[0] == 0.0
         assert np.all(np.diff(course.time) > 0)
         assert course.slipping[-1] == 1.0
-        assert course.slipping[pressing][-1] < 1.0
+        assert course.slipping[press][-1] < 1.0
 
 
 def test_the_course_loses_no_work(histories):

@@ -138,7 +138,7 @@ def _relaxation_flaws(curves: PressCurves) -> list[str]:
 def _fit(
     options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
 ) -> _Outcome:
-    """Return the fit of presses, and its check by the solver. Raises FitError."""
+    """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
     holds = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
     if options.relaxation and not holds:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")

@@ -144,7 +144,7 @@ class _WatchedRecorder:
             raise SelfTestFailed("a recorder that was killed did not end")
 
     def _reports(self, seconds: float) -> Iterator[m.Report]:
-        """Yield the reports of so many seconds, and note each; reports left in the queue wait for the next call."""
+        """Yield what comes within so many seconds, each noted; what nobody takes any more waits for the next call."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self._queue += self.recorder.poll(0.01)
@@ -194,7 +194,7 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
 
 
 def _begin_or_resume(witness: _WatchedRecorder, folder: Path) -> int | None:
-    """Begin or resume a session, and return the trial of a resumption."""
+    """Have a session running, and return the trial at which it was resumed."""
     if not folder.exists():
         witness.recorder.send(m.Connect("sim:?seed=1"))
         witness.until(m.Device)
@@ -207,7 +207,7 @@ def _begin_or_resume(witness: _WatchedRecorder, folder: Path) -> int | None:
 
 
 def _check_recording(recording: Recording, witness: _WatchedRecorder, trial: int | None) -> None:
-    """Raise SelfTestFailed unless the file holds all acknowledged data and the session went on at its trial."""
+    """Raise SelfTestFailed unless all that was acknowledged is in the file, and the session went on where it was."""
     rows = {event.number: event_row(event) for event in recording.events}
     if any(rows.get(event.number) != event_row(event) for event in witness.events):
         raise SelfTestFailed("an event that had been acknowledged was not in the file after a kill")

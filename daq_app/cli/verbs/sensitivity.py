@@ -104,7 +104,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
-    """Compute all fingers, and print the signs of the slope of one quantity and the shares of all quantities."""
+    """Ask all fingers and print the signs of the slope of one quantity, and the shares of all."""
     at = _NAMES.index(options.quantity)
     label = QUANTITIES[at].label
     changes = sign_map.single_changes(options.kinematics)

@@ -95,7 +95,7 @@ def window_texts() -> list[str]:
 
 
 def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[str, int]:
-    """Return the XLIFF file of a language, and the number of texts without a translation."""
+    """Return the XLIFF file of a language, and how many of the texts are not translated."""
     earlier = translations(context, language)
     root = ElementTree.Element("xliff", version="1.2", xmlns="urn:oasis:names:tc:xliff:document:1.2")
     about = {"original": context, "datatype": "plaintext", "source-language": ENGLISH, "target-language": language}

@@ -28,8 +28,7 @@ Panels = Iterable[Panel | None]
 def plates(report: Report) -> tuple[Plate, ...]:
     """Return the figures that a report has numbers for, in their order."""
     with look(simulated=report.simulated):
-        drawn = tuple(_plate(report, name) for name in _PANELS)
-    return tuple(plate for plate in drawn if plate.panels)
+        return tuple(plate for plate in [_plate(report, name) for name in _PANELS] if plate.panels)
 
 
 def picture(report: Report, plate: str, experiment: str | None = None) -> Panel | None:

@@ -129,10 +129,10 @@ Row = tuple[int, int | None, float, float, int]
 def _draw(picture: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
     """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
     (axes,) = picture.axes
-    ordered = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
+    in_order = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
     rows: list[Row] = []
     labels: list[Label] = []
-    for (stroke, trace), shade in zip(ordered, shades(of.colour, max(len(ordered), 1)), strict=False):
+    for (stroke, trace), shade in zip(in_order, shades(of.colour, max(len(in_order), 1)), strict=False):
         values: Array = getattr(trace, of.values)
         first, last = stroke.steady or (math.inf, -math.inf)
         inside = (first <= trace.origin + trace.time) & (trace.origin + trace.time <= last)
@@ -155,11 +155,11 @@ def _draw(picture: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFindi
         low, high = min(*greatest, 0.0), max(greatest)
         axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
     if len(labels) <= MOST_LABELLED:
-        label_right(picture, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
+        label_right(picture, axes, labels, "index" if in_order and in_order[0][0].index is not None else "stroke")
     return tuple(rows)
 
 
-PRESSED = 1.0  # the model presses for 1 s, then slides [s]
+PRESS_DURATION = 1.0  # the model presses for 1 s, then slides [s]
 
 
 def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel | None:
@@ -189,13 +189,13 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
         labels.append(Label(label, end, float(kilopascal[-1])))
         course = zip(history.time.tolist(), history.sed_ending.tolist(), strict=True)
         rows += [(prediction.trial, prediction.index, *instant) for instant in course]
-        sliding_values += kilopascal[history.time >= PRESSED].tolist()
-    whole.axvline(PRESSED, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
+        sliding_values += kilopascal[history.time >= PRESS_DURATION].tolist()
+    whole.axvline(PRESS_DURATION, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
     whole.set_ylim(0.0, 1.25 * max(row[3] for row in rows) * 1e3)
     for text, offset, side in (("pressing", -4, "right"), ("sliding", 4, "left")):
-        _mark(whole, text, (PRESSED, 0.98), (offset, 0), ha=side, va="top", color=GREY)
+        _mark(whole, text, (PRESS_DURATION, 0.98), (offset, 0), ha=side, va="top", color=GREY)
     whole.set_title(name)
-    sliding.set_xlim(PRESSED, end)
+    sliding.set_xlim(PRESS_DURATION, end)
     low, high = min(sliding_values), max(sliding_values)
     margin = 0.06 * (high - low or high)
     sliding.set(ylim=(low - margin, high + margin), ylabel="SED while sliding [kPa]", xlabel="time [s]")

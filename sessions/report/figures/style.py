@@ -167,12 +167,12 @@ def _shade(colour: str, towards: float) -> str:
 def in_pixels(note: str = "") -> Generator[dict[str, bytes]]:
     """Also draw every picture made meanwhile in pixels, with a `note` under it: yields PNGs by the pictures' names."""
     images: dict[str, bytes] = {}
-    before, noted = _PIXELS.set(images), _NOTE.set(note)
+    pixels_token, note_token = _PIXELS.set(images), _NOTE.set(note)
     try:
         yield images
     finally:
-        _PIXELS.reset(before)
-        _NOTE.reset(noted)
+        _PIXELS.reset(pixels_token)
+        _NOTE.reset(note_token)
 
 
 def rows_of(*columns: Array) -> tuple[tuple[Cell, ...], ...]:
@@ -182,7 +182,7 @@ def rows_of(*columns: Array) -> tuple[tuple[Cell, ...], ...]:
 
 
 def svg(picture: Sheet, name: str, title: str) -> str:
-    """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
+    """Return the picture as an SVG document, inside `look`; the same picture gives the same bytes."""
     if _SIMULATED.get():
         picture.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
     if note := _NOTE.get():

@@ -213,10 +213,10 @@ def _cell(
     one: Psychometric,
     unit: Callable[[float], float],
     after: int,
-    missing: str = "orders are not known",
+    without_order: str = "orders are not known",
 ) -> Cell:
     if profile is None:
-        return number_cell(None, str, one.reason or missing)
+        return number_cell(None, str, one.reason or without_order)
     ends = None if profile.ends is None else (unit(profile.ends[0]), unit(profile.ends[1]))
     sides = [f"above {digits(unit(profile.low), after)}"] if profile.low is not None else []
     sides += [f"below {digits(unit(profile.high), after)}"] if profile.high is not None else []

@@ -292,8 +292,8 @@ def test_every_drop_down_is_read_aloud_with_one_label_and_what_is_chosen(driver)
     assert len(lists) >= 6
     for box in lists:
         reader = QAccessible.queryAccessibleInterface(box)
-        related = reader.relations()
-        labels = [of.text(QAccessible.Text.Name) for of, how in related if how & QAccessible.RelationFlag.Label]
+        relations = reader.relations()
+        labels = [of.text(QAccessible.Text.Name) for of, how in relations if how & QAccessible.RelationFlag.Label]
         assert labels == [box.accessibleName()]
         assert labels[0].strip()
         assert reader.text(QAccessible.Text.Value) == box.currentText()
