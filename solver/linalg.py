@@ -6,7 +6,6 @@ result is the exact Schur complement, the stiffness condensed to the skin. Conta
 matrix. The work grows like unknowns^1.5.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -18,79 +17,103 @@ from solver.arrays import Array, Factors, Flags, Indices, Narrow, SymbolicFactor
 from solver.mesh import Mesh, distinct
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Part:
-    """A part of the body: the unknowns that it eliminates and those that it passes on."""
-
-    inner: Indices  # (k,) unknowns eliminated here
-    border: Indices  # (b,) unknowns passed on
-    children: tuple[int, ...]  # numbers of the parts joined here, none for a leaf
-    elements: slice  # of a leaf: its elements, in the order of `Tree.order`
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tree:
-    """Elimination order of one mesh."""
+class _Tree(NamedTuple):
+    """Parts of a mesh by nested dissection: p of them, children before parents; the last is the whole body."""
 
     order: Indices  # (e,) elements, leaf after leaf
-    parts: tuple[Part, ...]  # children before parents; the last one is the whole body
-    interface: Indices  # (m,) unknowns never eliminated, in the order given
-    size: int  # number of unknowns, fixed ones included
+    low: Indices  # (p,) first position of each part in `order`
+    high: Indices  # (p,) position after its last
+    children: Indices  # (p, 2) child parts, -1 in a leaf
+    level: Indices  # (p,) number of bisections above each part
 
-    @staticmethod
-    def of(elements: Indices, centres: Array, fixed: Indices, interface: Indices, leaf: int) -> "Tree":
-        """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2), at most `leaf` elements a leaf.
+    @property
+    def parent(self) -> Indices:
+        """Parent of each part (p,), 0 for the whole body."""
+        out = np.zeros(len(self.low), np.int64)
+        joint = self.children[:, 0] >= 0
+        out[self.children[joint]] = np.flatnonzero(joint)[:, None]
+        return out
 
-        Unknowns in `fixed` have zero displacement and take no part. Those in `interface` are passed on to the end.
-        """
-        order, ranges, children = _bisect(centres, leaf)
-        position = np.empty(len(order), np.int64)
-        position[order] = np.arange(len(order))
-        size = int(elements.max()) + 1
-        first = np.full(size, len(order))
-        last = np.full(size, -1)
-        spread = np.repeat(position, elements.shape[1])
-        np.minimum.at(first, elements.ravel(), spread)
-        np.maximum.at(last, elements.ravel(), spread)
-        last[interface] = len(order)  # never complete
-        free = np.ones(size, bool)
-        free[fixed] = False
-        parts: list[Part] = []
-        for (low, high), below in zip(ranges, children, strict=True):
-            own = elements[order[low:high]]
-            unknowns = own.ravel() if not below else np.concatenate([parts[c].border for c in below])
-            unknowns = distinct(unknowns)
-            unknowns = unknowns[free[unknowns]]
-            complete = (first[unknowns] >= low) & (last[unknowns] < high)
-            inner, border = unknowns[complete], unknowns[~complete]
-            if high - low == len(order):
-                border = interface
-            parts.append(Part(inner, border, below, slice(low, high)))
-        return Tree(order, tuple(parts), interface, size)
+    @property
+    def leaf(self) -> Indices:
+        """Leaf that holds each position of `order` (e,)."""
+        leaves = np.flatnonzero(self.children[:, 0] < 0)
+        return np.repeat(leaves, (self.high - self.low)[leaves])
 
 
-def _bisect(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], list[tuple[int, ...]]]:
-    """Return an order of elements, the range of each part in it, and each part's children; children come first."""
-    order = np.arange(len(centres))
-    ranges: list[tuple[int, int]] = []
-    children: list[tuple[int, ...]] = []
+def _bisect(centres: Array, leaf: int) -> _Tree:
+    """Return the parts of elements at `centres` (e, 2), at most `leaf` elements in a part that is not bisected.
 
-    def halve(low: int, high: int) -> int:
-        below: tuple[int, ...] = ()
-        if high - low > leaf:
-            subset = order[low:high]
-            along = int(np.argmax(np.ptp(centres[subset], axis=0)))
-            order[low:high] = subset = subset[np.argsort(centres[subset, along], kind="stable")]
-            # cut between two rows or columns: the line of a stepped cut has more nodes
-            cuts = low + 1 + np.flatnonzero(np.diff(centres[subset, along]))
-            middle = int(cuts[np.abs(2 * cuts - low - high).argmin()]) if len(cuts) else (low + high) // 2
-            below = (halve(low, middle), halve(middle, high))
-        ranges.append((low, high))
-        children.append(below)
-        return len(ranges) - 1
+    All parts of one level are bisected at once, each along its longer side and between two rows or columns next to its
+    middle: the line of a stepped cut has more nodes.
+    """
+    order, count = np.arange(len(centres)), len(centres)
+    low, high = np.array([0]), np.array([count])
+    lows, highs, levels = [low], [high], [np.zeros(1, np.int64)]
+    joints = [np.empty(0, np.int64)]  # parts that are bisected, numbered level by level
+    while (large := high - low > leaf).any():
+        joints.append(sum(map(len, lows)) - len(low) + np.flatnonzero(large))
+        low, high = low[large], high[large]
+        size = high - low
+        begins = np.cumsum(size) - size
+        part = np.repeat(np.arange(len(size)), size)
+        at = np.arange(len(part)) + (low - begins)[part]
+        x = centres[order[at]]
+        along = np.argmax(np.maximum.reduceat(x, begins) - np.minimum.reduceat(x, begins), axis=1)
+        x = x[np.arange(len(x)), along[part]]
+        ascending = np.lexsort((x, part))
+        order[at], x = order[at][ascending], x[ascending]
+        between = np.append(False, x[1:] != x[:-1]) & (at != low[part])
+        ends = (low + high)[part]  # a part in which all have the same x is cut in its middle
+        distance = np.where(between, np.abs(2 * at - ends), 2 * count + (at != ends // 2))
+        nearest = np.flatnonzero(distance == np.minimum.reduceat(distance, begins)[part])
+        middle = at[nearest[np.searchsorted(part[nearest], np.arange(len(size)))]]
+        low, high = np.stack([low, middle], axis=1).ravel(), np.stack([middle, high], axis=1).ravel()
+        lows.append(low)
+        highs.append(high)
+        levels.append(np.full(len(low), len(levels)))
+    low, high = np.concatenate(lows), np.concatenate(highs)
+    children_first = np.lexsort((-low, high))
+    number = np.argsort(children_first)
+    children = np.full((len(low), 2), -1)
+    children[number[np.concatenate(joints)]] = number[1:].reshape(-1, 2)
+    return _Tree(order, low[children_first], high[children_first], children, np.concatenate(levels)[children_first])
 
-    halve(0, len(centres))
-    return order, ranges, children
+
+class _FrontUnknowns(NamedTuple):
+    """The unknowns of every part, as ascending pairs: the part times the number of all unknowns, plus the unknown."""
+
+    inner: Indices  # of a part and an unknown that it eliminates
+    border: Indices  # of a part and an unknown that it passes on
+
+
+def _assign_unknowns(tree: _Tree, elements: Indices, free: Flags, interface: Indices) -> _FrontUnknowns:
+    """Return the unknowns of every part; `elements` (e, n) hold unknowns, in the order of `tree`.
+
+    Unknowns that are not `free` have zero displacement and take no part. Those in `interface` are never eliminated.
+    """
+    count, size = len(elements), len(free)
+    first, last = np.full(size, count), np.full(size, -1)
+    position = np.repeat(np.arange(count), elements.shape[1])
+    np.minimum.at(first, elements.ravel(), position)
+    np.maximum.at(last, elements.ravel(), position)
+    last[interface] = count
+    inner: list[Indices] = []
+    border: list[Indices] = [np.empty(0, np.int64)]
+    for level in range(int(tree.level.max()), -1, -1):
+        there = tree.level[tree.leaf] == level
+        of_leaves = (tree.leaf[there, None] * size + elements[there])[free[elements[there]]]
+        part, unknown = np.divmod(border[-1], size)
+        pairs = distinct(np.concatenate([of_leaves, tree.parent[part] * size + unknown]))
+        part, unknown = np.divmod(pairs, size)
+        complete = (first[unknown] >= tree.low[part]) & (last[unknown] < tree.high[part])
+        inner.append(pairs[complete])
+        border.append(pairs[~complete])
+    border[-1] = (len(tree.low) - 1) * size + interface
+    return _FrontUnknowns(np.sort(np.concatenate(inner)), np.sort(np.concatenate(border)))
+
+
+_SIDES = ((0, -1), (1, 0), (0, 1), (-1, 0))  # steps across the four sides of an element
 
 
 def places(elements: Indices) -> Array:
@@ -103,25 +126,25 @@ def places(elements: Indices) -> Array:
     sides = elements[:, 4:8].ravel()  # at most two elements share a mid-side node
     order = np.argsort(sides, kind="stable")
     twice = np.flatnonzero(sides[order][1:] == sides[order][:-1])
-    neighbours = np.full(4 * count, -1)
-    neighbours[order[twice]], neighbours[order[twice + 1]] = order[twice + 1] // 4, order[twice] // 4
-    neighbours = neighbours.reshape(count, 4)
-    ways = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
-    out = np.full((count, 2), np.nan)
+    across = np.full(4 * count, -1)
+    across[order[twice]], across[order[twice + 1]] = order[twice + 1] // 4, order[twice] // 4
+    neighbours = across.reshape(count, 4).tolist()
+    place: dict[int, tuple[int, int]] = {}
     for seed in range(count):
-        if not np.isnan(out[seed, 0]):
+        if seed in place:
             continue
-        out[seed] = 0.0
-        edge = np.array([seed])
-        while len(edge):
-            near = neighbours[edge]
-            new = (near >= 0) & np.isnan(out[near, 0])
-            out[near[new]] = (out[edge][:, None] + ways)[new]
-            edge = distinct(near[new])
-    return out
+        place[seed] = 0, 0
+        connected = [seed]
+        for element in connected:  # grows on the way
+            row, column = place[element]
+            for (down, right), neighbour in zip(_SIDES, neighbours[element], strict=True):
+                if neighbour >= 0 and neighbour not in place:
+                    place[neighbour] = row + down, column + right
+                    connected.append(neighbour)
+    return np.array([place[element] for element in range(count)], np.float64)
 
 
-LEAF: Final = 8  # most elements in a part that is not bisected
+_LEAF: Final = 8  # most elements in a part that is not bisected
 
 
 def symbolic_factorization(mesh: Mesh) -> SymbolicFactorization:
@@ -139,50 +162,53 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     elements = elements.reshape(-1, 9)
     raw = (2 * elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
     skin = (2 * skin_nodes[:, None] + np.arange(2)).ravel()
-    tree = Tree.of(raw, places(elements), fixed, skin, LEAF)
+    tree = _bisect(places(elements), _LEAF)
+    free = np.ones(2 * count, bool)
+    free[fixed] = False
+    unknowns = _assign_unknowns(tree, raw[tree.order], free, skin)
+    parts = len(tree.low)
+    part, eliminated = np.divmod(unknowns.inner, len(free))
+    inner = np.bincount(part, minlength=parts)
+    start = np.cumsum(inner) - inner
     number = np.full(2 * count, -1)
-    sequence = np.concatenate([*(part.inner for part in tree.parts), skin])
+    sequence = np.concatenate([eliminated, skin])
     number[sequence] = np.arange(len(sequence))
-    total = len(sequence)
-    borders = [np.sort(number[part.border]) for part in tree.parts]
-    inner = np.array([len(part.inner) for part in tree.parts])
-    border = np.array([len(b) for b in borders])
-    start = np.concatenate([[0], np.cumsum(inner)[:-1]])
-    border_at = np.concatenate([[0], np.cumsum(border)[:-1]])
-    place = np.zeros(int(border.sum()), np.int32)
-    children = np.full((len(border), 2), -1)
-    leaf = np.zeros((len(border), 2), np.int64)
-    at = np.full((len(tree.order), 16), -1)
-    where = np.full(total + 1, -1)  # index -1, the number of fixed unknowns, is the last place
+    owner, passed_on = np.divmod(unknowns.border, len(free))
+    keys = np.sort(owner * len(sequence) + number[passed_on])  # each border by number
+    owner, entry = np.divmod(keys, len(sequence))
+    border = np.bincount(owner, minlength=parts)
+    border_at = np.cumsum(border) - border
+
+    def position(part: Indices, unknown: Indices) -> Indices:
+        """Return where unknowns stand in the front of a part: those that it eliminates, then its border."""
+        in_border = np.searchsorted(keys, part * len(sequence) + unknown) - border_at[part]
+        own = unknown - start[part]
+        return np.where(own < inner[part], own, inner[part] + in_border)
+
     number[fixed] = -1
-    for p, part in enumerate(tree.parts):
-        where[start[p] : start[p] + inner[p]] = np.arange(inner[p])
-        where[borders[p]] = inner[p] + np.arange(border[p])
-        if part.children:
-            children[p] = part.children
-            for child in part.children:
-                place[border_at[child] : border_at[child] + border[child]] = where[borders[child]]
-        else:
-            leaf[p] = part.elements.start, part.elements.stop
-            at[part.elements] = where[number[raw[tree.order[part.elements]]]]
+    joined = owner < parts - 1
+    place = np.zeros(len(keys), np.int32)
+    place[joined] = position(tree.parent[owner[joined]], entry[joined])
+    unknown = number[raw]
+    own = unknown[tree.order]
     sizes = inner * (inner + border)
-    wait_at, waiting = _waiting(children, border)
+    wait_at, waiting = _waiting(tree, border)
     return SymbolicFactorization(
-        unknown=_narrow(number[raw]),
-        size=total,
+        unknown=_narrow(unknown),
+        size=len(sequence),
         start=_narrow(start),
         inner=_narrow(inner),
         border=_narrow(border),
-        children=_narrow(children),
+        children=_narrow(tree.children),
         border_at=_narrow(border_at),
-        numbers=_narrow(np.concatenate(borders)),
+        numbers=_narrow(entry),
         place=place,
         run=_narrow(_runs(place, border)),
         factor_at=np.cumsum(sizes) - sizes,
         wait_at=wait_at,
-        leaf=_narrow(leaf),
+        leaf=_narrow(np.where(tree.children[:, :1] < 0, np.stack([tree.low, tree.high], axis=1), 0)),
         order=_narrow(tree.order),
-        at=_narrow(at),
+        at=_narrow(np.where(own < 0, -1, position(tree.leaf[:, None], own))),
         factors=int(sizes.sum()),
         waiting=waiting,
     )
@@ -202,18 +228,13 @@ def _runs(place: Narrow, border: Indices) -> Indices:
     return ends[np.searchsorted(ends, number)] + 1 - np.repeat(np.cumsum(border) - border, border)
 
 
-def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
+def _waiting(tree: _Tree, border: Indices) -> tuple[Indices, int]:
     """Return where each part's Schur complement waits for its parent, and the size of the memory for all.
 
     Each level of the tree has a place for a first and a second child.
     """
-    level = np.zeros(len(border), np.int64)
-    second = np.zeros(len(border), np.int64)
-    for p in range(len(border) - 1, -1, -1):
-        for turn, child in enumerate(children[p]):
-            if child >= 0:
-                level[child], second[child] = level[p] + 1, turn
-    slot = 2 * level + second
+    slot = 2 * tree.level
+    slot[tree.children[tree.children[:, 1] >= 0, 1]] += 1
     room = np.zeros(int(slot.max()) + 1, np.int64)
     np.maximum.at(room, slot, border * border)
     return (np.cumsum(room) - room)[slot], int(room.sum())

@@ -5,7 +5,7 @@ from solver import Finger, Receptor
 from solver.body import Probes
 from solver.body.linear import Elastic, LinearBody
 from solver.constitutive import Hooke
-from solver.linalg import Tree, places
+from solver.linalg import symbolic_factorization
 from solver.mesh import Q2P1, block, local_coordinates
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle import linear as oracle
@@ -50,9 +50,9 @@ def test_places_are_found_again_in_curved_elements():
 
 def test_elimination_of_a_single_part_works_too():
     mesh = block(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
-    tree = Tree.of(mesh.elements, places(mesh.elements), mesh.held, mesh.skin, 8)
-    assert len(tree.parts) == 1
-    assert set(tree.parts[0].inner) == set(range(9)) - set(mesh.held) - set(mesh.skin)
+    plan = symbolic_factorization(mesh)
+    assert plan.inner.tolist() == [4]  # x and y of the middles of both sides
+    assert plan.border.tolist() == [6]  # those of the skin's three nodes
 
 
 def test_a_held_block_that_is_sheared_answers_as_the_closed_form():
