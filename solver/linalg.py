@@ -25,24 +25,12 @@ class _Tree(NamedTuple):
     high: Indices  # (p,) position after its last
     children: Indices  # (p, 2) child parts, -1 in a leaf
     level: Indices  # (p,) number of bisections above each part
-
-    @property
-    def parent(self) -> Indices:
-        """Parent of each part (p,), 0 for the whole body."""
-        out = np.zeros(len(self.low), np.int64)
-        joint = self.children[:, 0] >= 0
-        out[self.children[joint]] = np.flatnonzero(joint)[:, None]
-        return out
-
-    @property
-    def leaf(self) -> Indices:
-        """Leaf that holds each position of `order` (e,)."""
-        leaves = np.flatnonzero(self.children[:, 0] < 0)
-        return np.repeat(leaves, (self.high - self.low)[leaves])
+    parent: Indices  # (p,) of each part, 0 for the whole body
+    leaf: Indices  # (e,) part that holds each position of `order` and is not bisected
 
 
-def _bisect(centres: Array, leaf: int) -> _Tree:
-    """Return the parts of elements at `centres` (e, 2), at most `leaf` elements in a part that is not bisected.
+def _bisect(centres: Array, most: int) -> _Tree:
+    """Return the parts of elements at `centres` (e, 2), at most `most` elements in a part that is not bisected.
 
     All parts of one level are bisected at once, each along its longer side and between two rows or columns next to its
     middle: the line of a stepped cut has more nodes.
@@ -51,7 +39,7 @@ def _bisect(centres: Array, leaf: int) -> _Tree:
     low, high = np.array([0]), np.array([count])
     lows, highs, levels = [low], [high], [np.zeros(1, np.int64)]
     joints = [np.empty(0, np.int64)]  # parts that are bisected, numbered level by level
-    while (large := high - low > leaf).any():
+    while (large := high - low > most).any():
         joints.append(sum(map(len, lows)) - len(low) + np.flatnonzero(large))
         low, high = low[large], high[large]
         size = high - low
@@ -76,8 +64,12 @@ def _bisect(centres: Array, leaf: int) -> _Tree:
     children_first = np.lexsort((-low, high))
     number = np.argsort(children_first)
     children = np.full((len(low), 2), -1)
-    children[number[np.concatenate(joints)]] = number[1:].reshape(-1, 2)
-    return _Tree(order, low[children_first], high[children_first], children, np.concatenate(levels)[children_first])
+    children[joint := number[np.concatenate(joints)]] = number[1:].reshape(-1, 2)
+    parent = np.zeros(len(low), np.int64)
+    parent[number[1:]] = np.repeat(joint, 2)
+    low, high, level = low[children_first], high[children_first], np.concatenate(levels)[children_first]
+    leaf = np.flatnonzero(children[:, 0] < 0)
+    return _Tree(order, low, high, children, level, parent, np.repeat(leaf, (high - low)[leaf]))
 
 
 class _FrontUnknowns(NamedTuple):
