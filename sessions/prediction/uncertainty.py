@@ -92,10 +92,7 @@ def _why(row: TrialPrediction, name: str) -> str:
 
 
 def intervals_of(
-    column: Sequence[Prediction | str],
-    draws_by_trial: Sequence[DrawsOrReason],
-    scale: float,
-    progress: Progress | None = None,
+    column: Sequence[Prediction | str], draws: Sequence[DrawsOrReason], scale: float, progress: Progress | None = None
 ) -> list[SedInterval]:
     """Return the interval of each settled SED of a column, or what stands there why there is none.
 
@@ -105,8 +102,8 @@ def intervals_of(
     return [
         SedInterval(None, None, None, reason=answer)
         if isinstance(answer, str)
-        else _interval(answer, next(taken_up), draws, scale)
-        for answer, draws in zip(column, draws_by_trial, strict=True)
+        else _interval(answer, next(taken_up), friction, scale)
+        for answer, friction in zip(column, draws, strict=True)
     ]
 
 
@@ -148,10 +145,11 @@ def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrRea
     # Each stands for an equal share of all: the middle one, by what the derivatives carry.
     middles = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES * len(linear)).astype(np.int64)
     some = solve_draws(np.argsort(linear, kind="stable")[middles])
-    failures = int(np.isnan(some).sum())
-    if failures:
-        what = "draws of the friction have no settled state, or lie too near the limit to tell"
-        reason = f"{failures} of {_SAMPLES} {what}"
+    failed = int(np.isnan(some).sum())
+    if failed:
+        reason = (
+            f"{failed} of {_SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
+        )
         return replace(whole, low=None, high=None, method="sampling", reason=reason)
     low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
     return replace(whole, low=low, high=high, method="sampling")

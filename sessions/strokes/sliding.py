@@ -136,36 +136,33 @@ def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array
 
 
 def slide(
-    findings: Findings,
-    span: Span,
-    track: Track,
-    decision: tuple[float, float] | None = None,
-    uncut: Track | None = None,
+    findings: Findings, span: Span, track: Track, ends: tuple[float, float] | None = None, uncut: Track | None = None
 ) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 
-    A person's `decision` on the window [s, device clock] is taken, with its flaws. Turns cut the stroke out of `uncut`.
+    The window between `ends` [s, device clock] that a person decided is taken, with its flaws. Turns cut the stroke out
+    of `uncut`.
     """
     window, settings = None, track.settings
-    if decision is not None:
-        window = _decided_window(track, decision)
+    if ends is not None:
+        window = _decided_window(track, ends)
     elif np.isfinite(track.speed).any():
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
     motion, trouble = _speed(span, track, window)
-    if trouble is not None and decision is None:  # the centre of pressure does not tell when the finger slides
+    if trouble is not None and ends is None:  # the centre of pressure does not tell when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         motion, trouble = _speed(span, track, window)
     at_rest = _rest(span, track, track if uncut is None else uncut, window)
-    if window is not None and at_rest is not None and decision is not None:
+    if window is not None and at_rest is not None and ends is not None:
         sentence = f"{at_rest[1]} The window was decided by a person: its numbers are given."
         findings.flaw(at_rest[0], sentence, "doubtful")
         at_rest = None
     if window is None or at_rest is not None:
         name, sentence = at_rest or (
             (FlawName.NO_STEADY_SLIDING, "T/N holds steady over no long enough part of the stroke.")
-            if decision is None
+            if ends is None
             else (FlawName.DECISION, "The window that was decided holds too few readings with a T/N.")
         )
         forbidden = (*COEFFICIENTS, *SPEED, *DIRECTION, "normal_force", "tangential_force")
@@ -183,10 +180,10 @@ def slide(
     return window
 
 
-def _decided_window(track: Track, instants: tuple[float, float]) -> slice | None:
+def _decided_window(track: Track, ends: tuple[float, float]) -> slice | None:
     """Return the readings between two instants; None where too few of them have a ratio."""
-    start = int(np.searchsorted(track.time, instants[0] - _ROUNDING))
-    stop = int(np.searchsorted(track.time, instants[1] + _ROUNDING, "right"))
+    start = int(np.searchsorted(track.time, ends[0] - _ROUNDING))
+    stop = int(np.searchsorted(track.time, ends[1] + _ROUNDING, "right"))
     enough = np.isfinite(track.ratio[start:stop]).sum() >= track.settings.steady.steady_readings
     return slice(start, stop) if enough else None
 

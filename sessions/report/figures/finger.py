@@ -33,19 +33,13 @@ _WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
 def finger_panels(field: Field, levels: tuple[float, ...]) -> tuple[Panel, Panel]:
     """Return the whole finger and a close view of its contact; `levels` [kPa] are the borders of the colours."""
     whole, close = sheet(328, 330), sheet(328, 330)
-    contours = _tissue(whole.axes[0], field, levels)
+    colours = _tissue(whole.axes[0], field, levels)
     _tissue(close.axes[0], field, levels)
     x, y = field.finger.nodes.T
     whole.axes[0].set(xlim=(x.min() - 0.5, x.max() + 0.5), ylim=(-1.2, y.max() + 0.5))
-    if contours is not None:
+    if colours is not None:
         bar = whole.figure.colorbar(
-            contours,
-            ax=whole.axes[0],
-            location="bottom",
-            spacing="proportional",
-            aspect=28,
-            pad=0.02,
-            label="SED [kPa]",
+            colours, ax=whole.axes[0], location="bottom", spacing="proportional", aspect=28, pad=0.02, label="SED [kPa]"
         )
         bar.set_ticks(levels[:: -(-len(levels) // 6)])
     _name_layers(whole.axes[0], field)
