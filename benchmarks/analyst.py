@@ -84,14 +84,14 @@ def _painting(film) -> None:  # noqa: ANN001
     canvas = FingerCanvas(LIGHT)
     canvas.resize(520, 560)
     for near in (False, True):
-        took: list[float] = []
+        times: list[float] = []
         for frame in film.frames[::4]:
             canvas.show_frame(frame, film.parts, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
             start = time.process_time()
             canvas.grab()
-            took.append(time.process_time() - start)
+            times.append(time.process_time() - start)
         print(
-            f"painting the {'contact' if near else 'finger '}                  {1e3 * statistics.median(took):5.0f} ms"
+            f"painting the {'contact' if near else 'finger '}                  {1e3 * statistics.median(times):5.0f} ms"
         )
     delete(canvas)  # a widget that outlives its application makes the process end with a fault
     del application
@@ -102,16 +102,16 @@ def _stops(folder: Path) -> None:
     from daq_app.analyst import state as m
     from daq_app.analyst.process import Analyst
 
-    took: list[float] = []
+    delays: list[float] = []
     for _ in range(STOPS):
         analyst = Analyst(folder)
         _until(analyst, m.TrialAnswer)
         start = time.monotonic()
         analyst.ask(m.Stop())
         _until(analyst, m.Cancelled)
-        took.append(time.monotonic() - start)
+        delays.append(time.monotonic() - start)
         analyst.close()
-    median, longest = 1e3 * statistics.median(took), 1e3 * max(took)
+    median, longest = 1e3 * statistics.median(delays), 1e3 * max(delays)
     print(f"a stop is answered after {median:.0f} ms by the wall, the longest {longest:.0f} ms")
 
 

@@ -161,8 +161,8 @@ class Visit:
         if self._trouble.slips:
             phase = np.maximum(time - stroke.slip, 0.0) * self._slips_each % 1.0
             # A climb over nine tenths of the time, a drop in the last: 7 to 20 ms, as fingers' relaxation allows.
-            saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
-            factor *= np.where(time > stroke.slip, 1.0 - self._drop * (1.0 - saw), 1.0)
+            sawtooth = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
+            factor *= np.where(time > stroke.slip, 1.0 - self._drop * (1.0 - sawtooth), 1.0)
         if self._trouble.law:
             push = np.maximum(-self._bench.true_wrench(time)[:, 2], 1e-3)
             factor *= (push / stroke.peak_normal_force) ** self._trouble.law

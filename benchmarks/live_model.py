@@ -47,14 +47,14 @@ def _alone(kinematics: str, repeats: int) -> None:
     follower = Follower(Use(None, kinematics))
     at, wrench = _forces(5.0, 200)
     for size, name in ((1, "one picture a step"), (4, "a picture every four steps")):
-        took = []
+        times = []
         for _ in range(repeats):
-            began = time.process_time()
+            start = time.process_time()
             for i in range(0, len(at), size):
                 part = slice(i, i + size)
                 follower.take(Forces(at[part], -wrench[part, 2], -wrench[part, 0], 0, 1))
-            took.append(time.process_time() - began)
-        words = f"{len(at) / statistics.median(took):.0f} steps a second of the processor"
+            times.append(time.process_time() - start)
+        words = f"{len(at) / statistics.median(times):.0f} steps a second of the processor"
         print(f"alone, {kinematics} strain, {name}: {words}, median of {repeats}")
 
 
@@ -70,13 +70,13 @@ def _with_readings(seconds: float) -> None:
         model.poll()
         time.sleep(0.05)
     ages, sent, before = [], 0, model.predictions
-    began = time.monotonic()
-    while (now := time.monotonic() - began) < seconds:
+    start = time.monotonic()
+    while (now := time.monotonic() - start) < seconds:
         last = int(now * RATE)
         if last > sent:
             number, at, received, wrench, status = _block(sent, last)
             at = at.astype(np.float64)
-            received = (1e9 * (began + at)).astype(np.int64)
+            received = (1e9 * (start + at)).astype(np.int64)
             model.add(Live(1, number, at, received, wrench, status, (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
             sent = last
         for prediction in model.poll():

@@ -60,10 +60,10 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     """Measure one rate [Hz] for so many real seconds, asking `every` so many seconds."""
     factor = max(1.0, rate / TOP)
     context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    box = context.Process(target=serve, args=(min(rate, TOP), factor, theirs))
+    box_pipe, far_end = context.Pipe()
+    box = context.Process(target=serve, args=(min(rate, TOP), factor, far_end))
     box.start()
-    uri, origin = ours.recv()
+    uri, origin = box_pipe.recv()
     drawer_pipe, window = context.Pipe()
     drawer = context.Process(target=draw, args=(rate, window)) if drawing else None
     if drawer is not None:
@@ -71,10 +71,10 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
         drawer_pipe.recv()
     transducer: Transducer = open_transducer(uri, clock_at(factor))
     if ready:
-        there, theirs = context.Pipe()
-        sender = context.Process(target=send, args=(rate, seconds + 5.0, theirs), daemon=True)
+        sender_pipe, far_end = context.Pipe()
+        sender = context.Process(target=send, args=(rate, seconds + 5.0, far_end), daemon=True)
         sender.start()
-        port, info = there.recv(), replace(transducer.info, rate=float(TOP))
+        port, info = sender_pipe.recv(), replace(transducer.info, rate=float(TOP))
         transducer = NetFtTransducer(info, lambda _: UdpLink("127.0.0.1", port), lambda: info, clock_at(factor))
     calibration = transducer.info.calibration
     transducer.start()
@@ -82,8 +82,8 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     lags: list[float] = []
     blocks: list[ReadingBlock] = []
     due = 0.0
-    began, processor, received = time.monotonic(), time.process_time(), transducer.health.received
-    while (now := time.monotonic()) - began < seconds:
+    start, processor, received = time.monotonic(), time.process_time(), transducer.health.received
+    while (now := time.monotonic()) - start < seconds:
         block = transducer.read(0.1 * factor)
         if len(block):
             now = time.monotonic()
@@ -97,11 +97,11 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
             if drawer is not None:
                 drawer_pipe.send((readings.time, wrench))
         time.sleep(every)
-    wall, processor = time.monotonic() - began, time.process_time() - processor
+    wall, processor = time.monotonic() - start, time.process_time() - processor
     health = transducer.health
     received = health.received - received
     transducer.close()
-    ours.send("end")
+    box_pipe.send("end")
     box.join()
     frames = 0.0
     if drawer is not None:
@@ -135,10 +135,10 @@ def send(rate: int, seconds: float, pipe: Connection) -> None:
     pipe.send(port.getsockname()[1])
     _, asker = port.recvfrom(100)
     port.connect(asker)
-    began, sent = time.monotonic(), 0
+    start, sent = time.monotonic(), 0
     with contextlib.suppress(ConnectionError):  # whoever asked has gone
         while sent < count:
-            due = min(round((time.monotonic() - began) * rate), count)
+            due = min(round((time.monotonic() - start) * rate), count)
             for i in range(sent, due):
                 port.send(data[i * size : (i + 1) * size])
             sent = due

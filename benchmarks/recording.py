@@ -61,9 +61,9 @@ def main() -> None:
 @contextmanager
 def print_time(what: str) -> Iterator[None]:
     """Print how long something took, by the clock and by the processor: others may be using the machine."""
-    began, cpu = time.perf_counter(), time.process_time()
+    start, cpu = time.perf_counter(), time.process_time()
     yield
-    print(f"{what}: {time.perf_counter() - began:.2f} s ({time.process_time() - cpu:.2f} s of processor time)")
+    print(f"{what}: {time.perf_counter() - start:.2f} s ({time.process_time() - cpu:.2f} s of processor time)")
 
 
 def memory() -> float:
@@ -85,18 +85,18 @@ def measure_writer(folder: Path, seconds: int) -> None:
         i = np.arange(first, first + BLOCK)
         block = ReadingBlock(i, i, i * 0, i / RATE, np.full(BLOCK, clock.now_ns()), raw)
         clock.sleep(BLOCK / RATE)
-        began = time.perf_counter()
+        start = time.perf_counter()
         writer.readings(block)
-        calls.append(time.perf_counter() - began)
+        calls.append(time.perf_counter() - start)
         if first == early_s * RATE:
             early = memory()
     cpu_s = time.process_time() - cpu_s
     late = memory()
     event_times: list[float] = []
     for _ in range(50):
-        began = time.perf_counter()
+        start = time.perf_counter()
         writer.event("scored", data={"score": 1.0})
-        event_times.append(time.perf_counter() - began)
+        event_times.append(time.perf_counter() - start)
     writer.event("ended", data={"reason": "the benchmark is over"})
     writer.close()
     print(
@@ -126,11 +126,11 @@ def measure_writer(folder: Path, seconds: int) -> None:
 
 def measure_process(uri: str, rate: int, seconds: int, room: Path) -> None:
     """Run sessions at one rate, and print what they cost."""
-    began = time.perf_counter()
+    start = time.perf_counter()
     with Recorder.start() as recorder:
         recorder.send(m.Connect(uri))
         until(recorder, m.Device)
-        print(f"{rate} Hz: connected {time.perf_counter() - began:.2f} s after the start of the process")
+        print(f"{rate} Hz: connected {time.perf_counter() - start:.2f} s after the start of the process")
         stops: list[float] = []
         for number in range(STOPS):
             recorder.send(m.StartSession(PLAN, str(room / f"{rate}-{number}")))
@@ -150,15 +150,15 @@ def listen(recorder: Recorder, seconds: int) -> None:
     lags: list[float] = []
     readings = left_out = 0
     process = psutil.Process(recorder.pid)
-    cpu_s, began = sum(process.cpu_times()[:2]), time.perf_counter()
-    while time.perf_counter() - began < seconds:
+    cpu_s, start = sum(process.cpu_times()[:2]), time.perf_counter()
+    while time.perf_counter() - start < seconds:
         for report in recorder.poll(0.005):
             if isinstance(report, m.Live):
                 ages.append((time.monotonic_ns() - int(report.received_ns[-1])) * 1e-6)
                 readings, left_out = readings + len(report.sequence), left_out + report.left_out
             elif isinstance(report, Status):
                 lags.append(report.lag_ms)
-    wall_s = time.perf_counter() - began
+    wall_s = time.perf_counter() - start
     share = (sum(process.cpu_times()[:2]) - cpu_s) / wall_s
     ages.sort()
     late = ages[len(ages) * 99 // 100]

@@ -45,12 +45,12 @@ def _print_replay(recording: Recording, room: Path) -> None:
     replay_s: list[float] = []
     total_s: list[float] = []
     for number in range(RUNS):
-        began = time.perf_counter()
+        start = time.perf_counter()
         copy = replay(recording, room / f"replay-{number}", None, lambda *_: None)
-        replay_s.append(time.perf_counter() - began)
+        replay_s.append(time.perf_counter() - start)
         differences = [*different_readings(recording, copy), *different_events(recording, copy)]
         analyse(copy)
-        total_s.append(time.perf_counter() - began)
+        total_s.append(time.perf_counter() - start)
     print(f"session of {span_s:.1f} s, {recording.events[-1].readings} readings")
     print(f"replayed in {median(replay_s):.3f} s: {span_s / median(replay_s):.0f} times real time (median of {RUNS})")
     print(f"compared and analysed too: {median(total_s):.3f} s, {span_s / median(total_s):.0f} times real time")
@@ -83,9 +83,9 @@ def _median_time(work: Callable[[], object]) -> float:
     """Return the median processor time of some work [s]."""
     times: list[float] = []
     for _ in range(RUNS):
-        began = time.process_time()
+        start = time.process_time()
         work()
-        times.append(time.process_time() - began)
+        times.append(time.process_time() - start)
     return median(times)
 
 

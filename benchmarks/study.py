@@ -47,9 +47,9 @@ def main(count: int, options: VisitOptions) -> None:
         work: dict[int, list[float]] = {1: [], 2: []}
         for repeat in range(REPEATS):
             for workers in (1, 2):
-                took = measure(folders, base / f"shelf-{workers}-{repeat}", options, workers)
-                wall[workers].append(took[0])
-                work[workers].append(took[1] / count)
+                wall_s, work_s = measure(folders, base / f"shelf-{workers}-{repeat}", options, workers)
+                wall[workers].append(wall_s)
+                work[workers].append(work_s / count)
         one, two = (median(wall[workers]) for workers in (1, 2))
         processor = [median(work[workers]) for workers in (1, 2)]
         print(f"load average at the end: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")

@@ -55,10 +55,10 @@ def main() -> None:
 def _first_paint(repeats: int) -> None:
     wall, processor = [], []
     for _ in range(repeats + 1):
-        began = time.time()
+        start = time.time()
         out = subprocess.run([sys.executable, "-c", FIRST_PAINT], capture_output=True, text=True, check=True).stdout
         paint_time, cpu = map(float, out.split())
-        wall.append(paint_time - began)
+        wall.append(paint_time - start)
         processor.append(cpu)
     print(
         f"first paint (warm, median of {repeats}): {statistics.median(wall[1:]):.2f} s from start, "

@@ -60,10 +60,10 @@ class Child:
     def __init__(self, target: Callable[..., None], *more: object, name: str) -> None:
         """Start it: `target` gets its end of the pipe, and `more`."""
         context = fresh_processes()
-        self._pipe, theirs = context.Pipe()
-        self.process: BaseProcess = context.Process(target=target, args=(theirs, *more), daemon=True, name=name)
+        self._pipe, child_end = context.Pipe()
+        self.process: BaseProcess = context.Process(target=target, args=(child_end, *more), daemon=True, name=name)
         self.process.start()
-        theirs.close()
+        child_end.close()
 
     def send(self, message: object) -> None:
         """Send a message. Raises OSError where the process is gone."""

@@ -44,8 +44,8 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     sheet = style.sheet(*SQUARE)
     axes = sheet.axes[0]
     table: list[tuple[str | float, ...]] = []
-    for kinematics, mine in _by_strain(rows).items():
-        spans = [(r.judged_error, getattr(r, time), r) for r in mine]
+    for kinematics, group in _by_strain(rows).items():
+        spans = [(r.judged_error, getattr(r, time), r) for r in group]
         timings = [(error, 1e3 * span, r) for error, span, r in spans if error is not None and span is not None]
         if not timings:
             continue
@@ -82,12 +82,12 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
     sheet = style.sheet(*SQUARE)
     axes = sheet.axes[0]
     by_strain = _by_strain(rows)
-    for kinematics, mine in by_strain.items():
+    for kinematics, group in by_strain.items():
         for error_of, words in (("worst_estimate", "guaranteed"), ("worst_error", "true")):
             points = [
                 (error, 1e3 * r.took_s / r.surfaces, words == "true",
                  f"{r.surfaces} surfaces, {r.dofs} unknowns: {words} ", " each")
-                for r in mine
+                for r in group
                 if (error := getattr(r, error_of))
             ]  # fmt: skip
             _curve(sheet, kinematics, points)
@@ -121,8 +121,8 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
             linewidth=0.9, gid=sheet.note(words),
         )  # fmt: skip
         table += [
-            (row.problem, row.quantity, row.kinematics, size, error, took)
-            for size, error, took in zip(row.sizes, row.errors, row.took_s, strict=True)
+            (row.problem, row.quantity, row.kinematics, size, error, span)
+            for size, error, span in zip(row.sizes, row.errors, row.took_s, strict=True)
         ]
     for quantity in dict.fromkeys(row.quantity for row in rows):
         axes.plot([], [], "-", color=colours.get(quantity, style.GREEN), label=quantity)
@@ -198,11 +198,11 @@ def _cost_panel(rows: Sequence[Cost]) -> style.Panel:
 def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
     sheet = style.sheet(*SQUARE)
     axes = sheet.axes[0]
-    for kinematics, mine in _by_strain(rows).items():
-        power = exponent(mine)
+    for kinematics, group in _by_strain(rows).items():
+        power = exponent(group)
         words = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
         axes.plot(
-            [r.dofs for r in mine], [1e3 * r.floor_s for r in mine], label=words, color=_COLOURS[kinematics],
+            [r.dofs for r in group], [1e3 * r.floor_s for r in group], label=words, color=_COLOURS[kinematics],
             marker=_MARKS[kinematics], markersize=4, linewidth=0.9,
         )  # fmt: skip
     largest = max(rows, key=lambda row: row.dofs)

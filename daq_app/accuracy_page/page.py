@@ -100,13 +100,13 @@ def _estimates(results: RunResults) -> Table:
     rows = results.of(Estimate)
     cells: list[tuple[str, ...]] = []
     for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), GOALS):
-        mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
-        if mine:
-            met = _share([row.meets_tolerance for row in mine]) if name == TRUE_NUMBERS[0] else "–"
-            ratios = [row.estimate / max(row.error, 1e-9) for row in mine if row.above is not None]
+        group = [row for row in rows if row.kinematics == kinematics and row.number == name]
+        if group:
+            met = _share([row.meets_tolerance for row in group]) if name == TRUE_NUMBERS[0] else "–"
+            ratios = [row.estimate / max(row.error, 1e-9) for row in group if row.above is not None]
             ratio = number(median(ratios), 2) if ratios else "–"
-            above, near = _share([row.above for row in mine]), _share([row.near for row in mine])
-            cells.append((f"{kinematics} strain", name, str(len(mine)), above, near, met, ratio))
+            above, near = _share([row.above for row in group]), _share([row.near for row in group])
+            cells.append((f"{kinematics} strain", name, str(len(group)), above, near, met, ratio))
     caption = (
         "Estimates against true errors, of answers asked for with a tolerance. Above: the estimate is at least the "
         "true error. Near: below ten times the larger of true error and 0.02 %. Counted only where the truth can tell."
@@ -229,7 +229,7 @@ _TABLES: tuple[Callable[[RunResults], Table], ...] = (
             "problem": lambda row: row.problem, "quantity": lambda row: row.quantity,
             "strain": lambda row: row.kinematics,
             "errors, coarse to fine": lambda row: " / ".join(f"{error:.1e}" for error in row.errors),
-            "time [ms]": lambda row: " / ".join(number(1e3 * took) for took in row.took_s),
+            "time [ms]": lambda row: " / ".join(number(1e3 * span) for span in row.took_s),
             "order": lambda row: f"{row.order:.2f}", "at least": lambda row: f"{row.least:g}",
         },
     ),
@@ -287,13 +287,13 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, by_name = plates(results) if figures is None else figures, tables(results)
-    there = [section for section in SECTIONS if any(part in figures or part in by_name for part in section[2])]
+    sections = [section for section in SECTIONS if any(part in figures or part in by_name for part in section[2])]
     return template("accuracy.html.jinja", "daq_app.accuracy_page").render(
         results=results,
         figures=figures,
         tables=by_name,
-        sections=[(name, words) for name, words, _ in there],
-        parts={name: parts for name, _, parts in there},
+        sections=[(name, words) for name, words, _ in sections],
+        parts={name: parts for name, _, parts in sections},
         wide=("benchmarks", "orders", "costs"),
         embed=embed,
         processor_time=PROCESSOR_TIME,

@@ -90,9 +90,9 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
     other, row = (None, None) if state is None else (state.other, selected_row(state))
     if state is None or other is None or state.report is None or row is None or row.prediction is None:
         return None, ""
-    mine, theirs = (_of_stimulus(report, row.prediction) for report in (state.report, other.report))
-    place = [one.stroke for one in mine].index(row.prediction.stroke)
-    theirs_row = theirs[place] if place < len(theirs) else None
+    predictions, other_predictions = (_of_stimulus(report, row.prediction) for report in (state.report, other.report))
+    place = [one.stroke for one in predictions].index(row.prediction.stroke)
+    theirs_row = other_predictions[place] if place < len(other_predictions) else None
     finger = None if theirs_row is None else other.fingers.get((theirs_row.trial, theirs_row.stroke))
     if theirs_row is None or theirs_row.sed is None or finger is None:
         return None, tr("{session} has no answer to this stimulus.", session=other.report.session)

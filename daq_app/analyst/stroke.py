@@ -122,8 +122,8 @@ def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
     end = stroke.lift if stroke.lift is not None else begin + (0.0 if trace is None else float(trace.time[-1]))
     steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
     times = dict(zip(EDGES, (begin, *steady, end), strict=True))
-    there = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
-    return tuple(PlacedEdge(e, times[e], there[WHAT[e]], stroke.decided.get(WHAT[e], "")) for e in EDGES)
+    present = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
+    return tuple(PlacedEdge(e, times[e], present[WHAT[e]], stroke.decided.get(WHAT[e], "")) for e in EDGES)
 
 
 def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:

@@ -98,14 +98,14 @@ class Work:
 
     def progress_listener(self, words: str, load_steps: int = 0) -> Callable[[float], bool]:
         """Return a listener to progress that reports the part done and the time left, and stops for urgent requests."""
-        began = last_report = time.monotonic()
+        start = last_report = time.monotonic()
 
         def report_part(part: float) -> bool:
             nonlocal last_report
             now = time.monotonic()
             if now - last_report > 0.05:
-                last_report, took = now, now - began
-                remaining_s = took * (1.0 - part) / part if part > 0.05 and took > 1.0 else None
+                last_report, elapsed_s = now, now - start
+                remaining_s = elapsed_s * (1.0 - part) / part if part > 0.05 and elapsed_s > 1.0 else None
                 self._say(m.Step(part, words, remaining_s, load_steps))
             return not self._urgent()
 

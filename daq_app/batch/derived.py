@@ -82,10 +82,10 @@ def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | No
     before = _read_or_empty(recording, PREDICTION)
     if not before:
         return None
-    stood = settings_of(before)
-    other = ["another law of the contact area"] if stood.area != now.area else []
-    other += ["another calibration error"] if stood.gain_error != now.gain_error else []
-    other += ["another seed of the intervals"] if stood.bootstrap_seed != now.bootstrap_seed else []
+    settings = settings_of(before)
+    other = ["another law of the contact area"] if settings.area != now.area else []
+    other += ["another calibration error"] if settings.gain_error != now.gain_error else []
+    other += ["another seed of the intervals"] if settings.bootstrap_seed != now.bootstrap_seed else []
     if not other:
         return None
     return f"{PREDICTION} was made with {' and '.join(other)}: 'daq-app predict' makes it anew"
@@ -166,11 +166,11 @@ def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | Non
 
 def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
     """Name what a stored prediction was asked for and another is not, with the words that ask for it."""
-    stood = from_table(before.get("options", {}), PredictionOptions, PREDICTION)
+    options = from_table(before.get("options", {}), PredictionOptions, PREDICTION)
     rank = ("none", "small", "both").index
-    lost = ["intervals of the SED (--intervals)"] if stood.intervals and not now.intervals else []
-    if before and rank(stood.variants) > rank(now.variants):
-        lost.append(f"the variants side by side (--variants {stood.variants})")
+    lost = ["intervals of the SED (--intervals)"] if options.intervals and not now.intervals else []
+    if before and rank(options.variants) > rank(now.variants):
+        lost.append(f"the variants side by side (--variants {options.variants})")
     return lost
 
 

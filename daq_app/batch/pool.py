@@ -122,9 +122,9 @@ def by_cluster(
         compatible = set[str]()  # workers whose versions are ours
         last_worker_time = time.monotonic()  # when a worker was last there
         while queue or under_way:
-            there: dict[str, int] = client.nthreads()
-            threads = sum(there.values())
-            newcomers = [worker for worker in there if worker not in compatible]
+            crew: dict[str, int] = client.nthreads()
+            threads = sum(crew.values())
+            newcomers = [worker for worker in crew if worker not in compatible]
             if newcomers:  # before it is given anything to compute, also where it comes later
                 refuse_other_workers(client, newcomers, address)
                 compatible.update(newcomers)
@@ -168,12 +168,12 @@ def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> N
             refuse_unlike(cast("dict[str, str]", versions), address, f"the worker {worker}")
 
 
-def refuse_unlike(there: Mapping[str, Any], address: str, who: str) -> None:
+def refuse_unlike(versions: Mapping[str, Any], address: str, who: str) -> None:
     """Raise SchedulerError for what was computed by other versions: one study holds the numbers of one program."""
     here = software_versions()
-    differ = [name for name in NUMBERS_BY if there.get(name) != here.get(name)]
+    differ = [name for name in NUMBERS_BY if versions.get(name) != here.get(name)]
     if differ:
-        other = ", ".join(f"{name} {there.get(name)} (here {here.get(name)})" for name in differ)
+        other = ", ".join(f"{name} {versions.get(name)} (here {here.get(name)})" for name in differ)
         raise SchedulerError(
             f"{address}: {who} computes with {other}; give every worker the versions that are here and "
             "run this again: what is done is kept"
@@ -184,8 +184,8 @@ async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: 
     """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
     try:
         options = security.get_connection_args("client")
-        async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=options) as there:
-            return str((await there.identity())["type"])
+        async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=options) as server:
+            return str((await server.identity())["type"])
     except Exception as error:  # any program may listen there and answer anything
         why = " ".join(str(error).split()) or f"nothing within {_ANSWERS:.0f} s"
         raise SchedulerError(

@@ -204,9 +204,9 @@ def _load_answers(keep: Path | None) -> dict[str, Any]:
 
 def same_signs(answers: Sequence[Answer | str], as_published: Answer) -> Array:
     """Return which quantities keep the published signs in both series (n, q): 1 or 0, nan without an answer."""
-    mine = _signs(as_published)
-    rows = [np.full(mine.shape, np.nan) if isinstance(answer, str) else _signs(answer) for answer in answers]
-    return np.array([np.where(np.isnan(row).any(axis=0), np.nan, (row == mine).all(axis=0)) for row in rows])
+    published = _signs(as_published)
+    rows = [np.full(published.shape, np.nan) if isinstance(answer, str) else _signs(answer) for answer in answers]
+    return np.array([np.where(np.isnan(row).any(axis=0), np.nan, (row == published).all(axis=0)) for row in rows])
 
 
 def _signs(answer: Answer) -> Array:

@@ -238,12 +238,12 @@ class NewSessionPage(Panel):
 
     def _place_changed(self) -> None:
         """Offer the studies of the folder, and the code after those that were there."""
-        there = ["", *studies_in(folder_of(self.form()))]
-        if there != [self.studies.itemText(at) for at in range(self.studies.count())]:
+        names = ["", *studies_in(folder_of(self.form()))]
+        if names != [self.studies.itemText(at) for at in range(self.studies.count())]:
             with QSignalBlocker(self.study):  # what stands in the field stays
                 typed = self.study.text()
                 self.studies.clear()
-                self.studies.addItems(there)
+                self.studies.addItems(names)
                 self.studies.setEditText(typed)
             if (completer := self.studies.completer()) is not None:  # as an editable list has
                 completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)

@@ -115,11 +115,11 @@ class ComparedView(QWidget):
 
     def show_rows(self, rows: ComparisonRows, sessions: tuple[str, str]) -> None:
         """Show the stimuli of two sessions, by their names."""
-        there = bool(sessions[1])
+        visible = bool(sessions[1])
         names = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
-        say(self.words, names if there else tr("No second session is open."))
-        self.table.setVisible(there)
-        self.picture.setVisible(there)
+        say(self.words, names if visible else tr("No second session is open."))
+        self.table.setVisible(visible)
+        self.picture.setVisible(visible)
         lines: list[tuple[str, ...]] = []
         for stimulus, pairs in rows:
             cells = [stimulus]

@@ -232,10 +232,10 @@ class StrokeView(QWidget):
         self._fill()
 
     def _fill(self) -> None:
-        there = self._stroke is not None and self._stroke.steady is not None
+        visible = self._stroke is not None and self._stroke.steady is not None
         ends = [float(self._lines[edge][0].value()) for edge in ("steady begin", "steady end")]
         for window in self._windows:
-            window.setVisible(there)
+            window.setVisible(visible)
             window.setRegion(ends)
         self._make_room()
 

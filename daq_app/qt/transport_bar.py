@@ -142,9 +142,9 @@ class TransportBar(QWidget):
         self.moved.emit(at)
 
     def _enable(self) -> None:
-        there = len(self._times) > 0
+        playable = len(self._times) > 0
         for part in (self.play, self.back, self.forward, self.slider, self.speed):
-            part.setEnabled(there)
+            part.setEnabled(playable)
         self.play.setText("❚❚" if self.playing else "▶")
         words = tr("pause {what}", what=self._what) if self.playing else tr("play {what}", what=self._what)
         self.play.setAccessibleName(words)

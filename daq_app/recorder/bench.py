@@ -101,11 +101,11 @@ class Bench:
 
     def disconnect(self) -> None:
         """Close the transducer."""
-        was = self.uri
+        uri = self.uri
         self._close()
         self._display.forget()
         self.uri = self._before = None
-        if was is not None:
+        if uri is not None:
             self._send(NoDevice())
 
     def begin_tare(self, duration: float) -> None:

@@ -103,8 +103,8 @@ def _study_note(form: SessionForm) -> str:
         return ""
     if record is not None:
         return tr("A study of protocol {protocol}.", protocol=record.protocol)
-    there = ", ".join(studies_in(place_of(form).parent))
-    elsewhere = tr(" Studies there: {there}.", there=there) if there else ""
+    names = ", ".join(studies_in(place_of(form).parent))
+    elsewhere = tr(" Studies there: {there}.", there=names) if names else ""
     words = tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name)
     return words + elsewhere
 

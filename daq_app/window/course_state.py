@@ -330,10 +330,10 @@ def _discard(session: SessionState, number: int | None, reason: str) -> SessionS
 def _restore(session: SessionState, number: int | None, take: int) -> SessionState:
     """Return the session with a discarded take as the present one again, with its answer and quality."""
     of = session.of(number)
-    was = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
-    if was is None:
+    earlier = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
+    if earlier is None:
         return session
-    values = {name: getattr(was, name) for name in ("takes", "answer", "quality", "discard_reason")}
+    values = {name: getattr(earlier, name) for name in ("takes", "answer", "quality", "discard_reason")}
     return session.with_trial(number, outcome="coming", **values)
 
 

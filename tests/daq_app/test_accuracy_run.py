@@ -96,15 +96,15 @@ def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_
 
 def test_every_part_of_the_solver_whose_time_is_counted_is_there():
     solver = Path(__file__).parents[2] / "solver"
-    defined = {
+    names = {
         ".".join([*file.relative_to(solver).with_suffix("").parts, node.name]).replace(".__init__", "")
         for file in solver.rglob("*.py")
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef)
     }
-    places = {".".join(name.split(".")[:n]) for name in defined for n in (1, 2, 3, 4)}
+    places = {".".join(name.split(".")[:n]) for name in names for n in (1, 2, 3, 4)}
     assert set(COST_PARTS) - places == set()
-    assert set(ENTIRE) - {name.split(".")[-1] for name in defined} == set()
+    assert set(ENTIRE) - {name.split(".")[-1] for name in names} == set()
 
 
 @pytest.mark.slow

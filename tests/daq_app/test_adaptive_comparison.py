@@ -82,8 +82,8 @@ def test_each_comparison_leaves_the_least_entropy_that_can_be_expected():
 
 def test_a_session_compares_what_its_answers_ask_for_and_its_recording_says_so(recording):
     trials = [record.trial for record in recording.trials]
-    mounted = [event.data["code"] for event in recording.events if event.kind == "stimulus_mounted"]
-    assert [trial.stimulus.code for trial in trials] == mounted
+    codes = [event.data["code"] for event in recording.events if event.kind == "stimulus_mounted"]
+    assert [trial.stimulus.code for trial in trials] == codes
     candidates, answers = recording.plan.blocks[0].candidates, []
     for first, second in zip(recording.trials[::2], recording.trials[1::2], strict=True):
         comparison = second if first.trial.standard else first

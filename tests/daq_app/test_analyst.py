@@ -71,8 +71,8 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
 )
 def test_a_line_says_what_the_subject_answered_to_its_trial(state, answer, words):
     finding = AnswerFinding(3, "stickiness", 20, "K20", *answer)
-    answered = fold(state, m.ReportReady("predicted", replace(state.report, answers=(finding,))))
-    assert [row.trial for row in rows(answered) if words in words_of(row)] == [3]
+    after = fold(state, m.ReportReady("predicted", replace(state.report, answers=(finding,))))
+    assert [row.trial for row in rows(after) if words in words_of(row)] == [3]
 
 
 def test_the_answers_shown_are_those_that_the_session_recorded():
@@ -86,9 +86,9 @@ def test_the_answers_shown_are_those_that_the_session_recorded():
 def test_a_session_of_scores_alone_has_a_line_for_each_answer():
     answers = [AnswerFinding(n, "stickiness", 20, "K20", "scored", 10.0 * n) for n in (1, 2)]
     report = replace(example(), strokes=(), predictions=(), answers=tuple(answers))
-    opened = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
-    assert [words_of(row) for row in rows(opened)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
-    second = fold(opened, m.Choose(1))
+    state = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
+    assert [words_of(row) for row in rows(state)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
+    second = fold(state, m.Choose(1))
     assert selected_row(second).trial == 2
     assert numbers(second) == ()
     assert [link.place for link in lineage(second)] == ["session", "trial"]
@@ -206,8 +206,8 @@ def test_a_stroke_without_a_steady_window_is_offered_one(steady):
 def test_an_edge_never_passes_its_neighbours(steady, at, time):
     limit = within(steady, at, time)
     times = {one.edge: one.time for one in edges_of(steady)} | {at: limit}
-    ordered = [times[edge] for edge in EDGES]
-    assert all(b - a >= EDGE_DISTANCE * (1 - 1e-6) for a, b in itertools.pairwise(ordered))
+    in_order = [times[edge] for edge in EDGES]
+    assert all(b - a >= EDGE_DISTANCE * (1 - 1e-6) for a, b in itertools.pairwise(in_order))
 
 
 def test_a_moved_edge_is_a_decision_with_who_why_and_what_stood_there(steady):

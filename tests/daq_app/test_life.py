@@ -48,8 +48,8 @@ def test_drift_noise_and_overloads_are_those_that_were_kept():
 def test_a_torn_line_costs_itself_alone(data_folder, end):
     remember_overload(INFO, (1.2, 0, 0, 0, 0, 0, 1.2))
     (file,) = (data_folder / "transducers").iterdir()
-    with file.open("ab") as torn:
-        torn.write(b'{"time": "2026-11-21", "kind": "zero", "wrench": [1, \xff' + end)
+    with file.open("ab") as output:
+        output.write(b'{"time": "2026-11-21", "kind": "zero", "wrench": [1, \xff' + end)
     remember_overload(INFO, (1.3, 0, 0, 0, 0, 0, 1.3))
     transducer_life = life_of("FT1234")
     assert transducer_life is not None

@@ -56,8 +56,8 @@ def report_dir(two_trials, tmp_path_factory):
     session = shutil.copytree(two_trials, room / "P01")
     (room / "mine.toml").write_text(f"{SCENE}\n[finger]\ntip_radius = 5.5\n[materials.fat]\nE = 0.03\nnu = 0.48\n")
     words = ["--beside", "none", "--indentation", "1.2", "--tau", "as-printed", "--scene", str(room / "mine.toml")]
-    seeded = ["--bootstrap-seed", "7"]
-    assert run(["analyse", str(session), "--area", "hertz", "--calibration-error", "0.3", *seeded]) == 0
+    seed_option = ["--bootstrap-seed", "7"]
+    assert run(["analyse", str(session), "--area", "hertz", "--calibration-error", "0.3", *seed_option]) == 0
     assert run(["predict", str(session), *words, "--afferent", "--afferent-set", "static_gain=30"]) == 0
     assert run(["report", str(session)]) == 0
     return session
@@ -78,9 +78,9 @@ def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(report_di
 
 
 def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(report_dir):
-    computed, document = (json.loads((report_dir / f"{name}.json").read_text()) for name in ("analysis", "prediction"))
+    analysis, document = (json.loads((report_dir / f"{name}.json").read_text()) for name in ("analysis", "prediction"))
     assert document["options"]["tau_reading"] == "as-printed"
-    for row, other in zip(document["trials"], computed["friction"], strict=True):
+    for row, other in zip(document["trials"], analysis["friction"], strict=True):
         assert row["tau_max"] == pytest.approx(other["tau_max"] / 100)
 
 
@@ -94,12 +94,12 @@ def test_exports_carry_the_error_of_calibration_that_their_intervals_hold(report
 def test_a_finger_alone_does_for_a_scene_and_what_is_not_taken_is_said(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("[finger]\ntip_radius = 5.5\n")
-    scene, ignored = finger_in(file)
-    assert (scene.finger.tip_radius, ignored) == (5.5, "")
+    scene, remark = finger_in(file)
+    assert (scene.finger.tip_radius, remark) == (5.5, "")
     file.write_text("[finger]\ntip_radius = 5.5\n[friction]\nmu = 0.3\n[solve]\ncourse = 'steady'\ntolerance = 0.01\n")
-    scene, ignored = finger_in(file)
+    scene, remark = finger_in(file)
     assert scene.solve.tolerance == 0.01
-    assert ignored.startswith(f"{file}: [friction], solve.course are not taken")
+    assert remark.startswith(f"{file}: [friction], solve.course are not taken")
     file.write_text("title = 'mine'\n[finger]\ntip_radius = -1.0\n")
     with pytest.raises(SettingsError, match=r"line 3: finger\.tip_radius"):
         finger_in(file)
@@ -298,11 +298,11 @@ def test_a_decision_is_not_recorded_where_a_damaged_setting_would_keep_it_from_b
 
 def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, capsys):
     run(["analyse", str(small), "--json"])
-    fixed = answer(capsys)["strokes"]
+    strokes = answer(capsys)["strokes"]
     assert run(["analyse", str(small), "--area", "hertz", "--area-force", "1", "--json"]) == 0
     document = answer(capsys)
     assert document["settings"]["area"] == {"law": "hertz", "exponent": pytest.approx(2 / 3), "force": 1.0}
-    for stroke, fixed_stroke in zip(document["strokes"], fixed, strict=True):
+    for stroke, fixed_stroke in zip(document["strokes"], strokes, strict=True):
         assert stroke["tau_max"] * stroke["contact_area"] <= fixed_stroke["tau_max"] * 100.0 * (1 + 1e-9)
         assert stroke["contact_area"] > 100.0  # every stroke of the simulated subject presses harder than 1 N
     assert run(["verify", str(small)]) == 0
@@ -310,13 +310,13 @@ def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, caps
 
 def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_is_set(small, capsys):
     run(["analyse", str(small), "--json"])
-    assumed = answer(capsys)["bootstrap"]
-    assert assumed["settings"]["gain_error_origin"] == "assumed"
+    usual = answer(capsys)["bootstrap"]
+    assert usual["settings"]["gain_error_origin"] == "assumed"
     run(["analyse", str(small), "--calibration-error", "0.1", "--json"])
     bootstrap = answer(capsys)["bootstrap"]
-    for stroke, assumed_stroke in zip(bootstrap["strokes"], assumed["strokes"], strict=True):
+    for stroke, usual_stroke in zip(bootstrap["strokes"], usual["strokes"], strict=True):
         # What is not known of the lean is in both.
-        assert np.ptp(stroke["normal_force"]) < np.ptp(assumed_stroke["normal_force"])
+        assert np.ptp(stroke["normal_force"]) < np.ptp(usual_stroke["normal_force"])
     (small / "analysis.json").write_text("torn")  # what was set is no part of what can be made anew
     run(["analyse", str(small), "--json"])
     assert answer(capsys)["bootstrap"] == bootstrap
@@ -337,8 +337,8 @@ def test_what_was_set_is_exported_without_an_analysis_and_a_damaged_setting_is_n
     run(["analyse", str(small), "--calibration-error", "0.1"])
     (small / "analysis.json").unlink()
     assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "csv")]) == 0
-    exported = json.loads((small.parent / "csv" / "analysis.json").read_text())
-    assert exported["bootstrap"]["settings"]["gain_error"] == 0.001
+    copy = json.loads((small.parent / "csv" / "analysis.json").read_text())
+    assert copy["bootstrap"]["settings"]["gain_error"] == 0.001
     (small / "calibration-error.json").write_text("torn")
     for verb in ("analyse", "predict", "report"):
         capsys.readouterr()

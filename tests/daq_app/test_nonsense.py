@@ -39,8 +39,8 @@ def documents(session):
 
 def spoil(data, document):
     """Return a document with nonsense at one place of it, of those that are no long column of numbers."""
-    damaged = copy.deepcopy(document)
-    inside = damaged
+    spoilt_copy = copy.deepcopy(document)
+    inside = spoilt_copy
     while True:
         names = list(inside) if isinstance(inside, dict) else list(range(min(len(inside), 3)))
         name = data.draw(st.sampled_from(names))
@@ -53,7 +53,7 @@ def spoil(data, document):
         del inside[name]
     else:
         inside[name] = nonsense
-    return damaged
+    return spoilt_copy
 
 
 @pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])

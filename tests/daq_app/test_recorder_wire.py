@@ -71,11 +71,11 @@ def same(a, b):
 @given(data=st.data())
 def test_messages_come_out_as_they_went_in_but_for_one_that_is_cut_short(types, messages, data):
     codec = Codec(types)
-    packed = list(map(codec.encode, messages))
-    end = data.draw(st.integers(0, sum(map(len, packed))))
-    whole = sum(total <= end for total in itertools.accumulate(map(len, packed)))
-    received = list(codec.read(io.BytesIO(b"".join(packed)[:end])))
-    assert all(itertools.starmap(same, zip(messages[:whole], received, strict=True)))
+    parts = list(map(codec.encode, messages))
+    end = data.draw(st.integers(0, sum(map(len, parts))))
+    whole = sum(total <= end for total in itertools.accumulate(map(len, parts)))
+    results = list(codec.read(io.BytesIO(b"".join(parts)[:end])))
+    assert all(itertools.starmap(same, zip(messages[:whole], results, strict=True)))
 
 
 def test_no_two_messages_of_one_direction_share_a_name():

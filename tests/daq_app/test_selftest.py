@@ -31,15 +31,15 @@ def test_the_selftest_kills_cuts_fills_stops_and_later_sessions_carry_its_certif
 
 
 def test_a_selftest_that_is_stopped_leaves_nothing_however_long_its_recorder_has_run(tmp_path, monkeypatch):
-    def press_ctrl_c(observed, _):
-        observed.until(Status)
+    def press_ctrl_c(witness, _):
+        witness.until(Status)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(selftest._WatchedRecorder, "hear", press_ctrl_c)
-    killed = []
-    monkeypatch.setattr(selftest.Recorder, "kill", lambda recorder: killed.append(recorder) or kill(recorder))
+    kills = []
+    monkeypatch.setattr(selftest.Recorder, "kill", lambda recorder: kills.append(recorder) or kill(recorder))
     assert run(["selftest", "--out", str(tmp_path)]) == 130
-    assert [recorder._process.wait(0) for recorder in killed] == [-9]
+    assert [recorder._process.wait(0) for recorder in kills] == [-9]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -47,14 +47,14 @@ def test_a_selftest_that_is_stopped_leaves_nothing_however_long_its_recorder_has
 def test_the_selftest_fails_where_anything_acknowledged_is_missing(tmp_path, what):
     recording = Recording.open(record_session(tmp_path / "s"))
     events = list(recording.events)
-    observed = SimpleNamespace(events=events, safe=300)
-    selftest._check_recording(recording, observed, 1)
+    witness = SimpleNamespace(events=events, safe=300)
+    selftest._check_recording(recording, witness, 1)
     if what == "readings":
-        observed.safe = 301
+        witness.safe = 301
     if what == "event":
-        observed.events = [*events, LoggedEvent(len(events) + 1, 0, "scored", 1, 300, {"score": 1.0})]
+        witness.events = [*events, LoggedEvent(len(events) + 1, 0, "scored", 1, 300, {"score": 1.0})]
     with pytest.raises(selftest.SelfTestFailed):
-        selftest._check_recording(recording, observed, 2 if what == "trial" else 1)
+        selftest._check_recording(recording, witness, 2 if what == "trial" else 1)
 
 
 def test_a_certificate_of_other_versions_says_so_and_a_damaged_one_counts_for_nothing(tmp_path):

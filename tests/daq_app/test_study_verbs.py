@@ -40,16 +40,16 @@ def run_json(capsys, *words):
 
 def test_a_session_that_cannot_be_read_is_named_and_the_rest_of_its_study_is_done(study, tmp_path, capsys):
     friction = shutil.copytree(study, tmp_path / "friction")
-    torn = friction / "P02_scores" / "session.sqlite"
-    torn.chmod(0o600)
-    torn.write_bytes(b"torn")
+    database = friction / "P02_scores" / "session.sqlite"
+    database.chmod(0o600)
+    database.write_bytes(b"torn")
     assert run(["unblind", str(friction), "--by", "E02"]) == 3
     assert run(["unblind", str(friction), "--by", "E02"]) == 1
-    assert str(torn) in capsys.readouterr().err  # nothing is left but this one
+    assert str(database) in capsys.readouterr().err  # nothing is left but this one
     page = tmp_path / "page.html"
     assert run(["report", str(friction), "--subject", "P01", "-o", str(page)]) == 3
-    assert str(torn) in capsys.readouterr().err
-    assert str(torn) in page.read_text()
+    assert str(database) in capsys.readouterr().err
+    assert str(database) in page.read_text()
     code, prediction = run_json(capsys, "predict", friction, "--subject", "P01", "--variants", "none")
     assert (code, {row["stimulus"]["index"] for row in prediction["trials"]}) == (3, {0})
 

@@ -346,13 +346,13 @@ def test_a_report_takes_no_scores_twice(session, tmp_path, capsys):
 
 
 def test_a_report_takes_no_visit_that_adds_no_score(session, tmp_path, capsys):
-    skipped = tmp_path / "P08"
-    writer = new_writer(skipped)
+    folder = tmp_path / "P08"
+    writer = new_writer(folder)
     writer.event("skip", 1)
     writer.event("ended", data={"reason": "done"})
     writer.close()
     foreign = record_session(tmp_path / "P09", plan=replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(ROUGH,)),)))
-    for visit, why in ((skipped, "no score of any stimulus"), (foreign, "no score of a stimulus of this session")):
+    for visit, why in ((folder, "no score of any stimulus"), (foreign, "no score of a stimulus of this session")):
         assert run(["report", str(session), "-o", str(tmp_path / "page.html"), "--scores", str(visit)]) == 2
         sentence = capsys.readouterr().err
         assert str(visit) in sentence

@@ -69,9 +69,9 @@ def main():
     record(base / "sealed", lambda: None)
     seal(base / "sealed")
     with tempfile.TemporaryDirectory() as room:
-        running = Path(room) / "s"
+        folder = Path(room) / "s"
         # What lies on the disk at this instant, the log among it, is what a crash leaves.
-        record(running, lambda: shutil.copytree(running, base / "live", ignore=shutil.ignore_patterns("*-shm")))
+        record(folder, lambda: shutil.copytree(folder, base / "live", ignore=shutil.ignore_patterns("*-shm")))
     for path in sorted(base.rglob("*.*")):
         print(path.relative_to(HERE), path.stat().st_size)  # noqa: T201
 

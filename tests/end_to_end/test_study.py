@@ -145,8 +145,8 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
 def test_another_recording_or_other_options_are_another_key(study):
     shelf = Shelf(study, STEADY)
     assert shelf.key(study / "S01") != shelf.key(study / "S02")
-    printed = VisitOptions(PredictionOptions(tau_reading="as-printed"))
-    assert shelf.key(study / "S01") != Shelf(study, printed).key(study / "S01")
+    as_printed = VisitOptions(PredictionOptions(tau_reading="as-printed"))
+    assert shelf.key(study / "S01") != Shelf(study, as_printed).key(study / "S01")
     assert shelf.key(study / "S01") != Shelf(study, VisitOptions(paths="small")).key(study / "S01")
 
 
@@ -186,11 +186,11 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(pool, study, tmp_path, monkeypatc
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="no /proc to see processes in")
 def test_killed_at_any_moment_it_leaves_no_process_behind_and_goes_on_where_it_was(study, tmp_path):
     command = [sys.executable, "-m", "daq_app", "study", str(study), "--out", str(tmp_path), "--workers", "1"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         results = tmp_path / "results"
         _until(lambda: any(results.glob("[!.]*.json")))  # not one that is half written
-        children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
-        running.send_signal(signal.SIGKILL)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        process.send_signal(signal.SIGKILL)
     assert children
     _until(lambda: not any(_runs(child) for child in children))
     again = subprocess.run([*command, "--json"], capture_output=True, text=True, check=False)

@@ -122,7 +122,7 @@ def _changes(before: Analysis, after: Analysis) -> list[str]:
     strokes = [{one.stroke for one in analysis.friction} for analysis in (before, after)]
     for at, (old, new) in enumerate(zip(before.strokes, after.strokes, strict=False)):
         numbers = ((name, number(getattr(old, name), 4), number(getattr(new, name), 4)) for name in CHANGING)
-        words = [f"{name} {was} -> {now}" for name, was, now in numbers if was != now]
+        words = [f"{name} {earlier} -> {later}" for name, earlier, later in numbers if earlier != later]
         if (at in strokes[0]) != (at in strokes[1]):
             words.append("the model gets it" if at in strokes[1] else "the model does not get it")
         if words:

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> int:
-    began = time.monotonic()
+    start = time.monotonic()
     clock = clock_at(1.0 if options.real_time else _PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:
@@ -73,7 +73,7 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
         "readings": study.readings,
         "lost": study.lost,
         "flaws": [flaw.sentence for flaw in analysis.flaws],
-        "seconds": time.monotonic() - began,
+        "seconds": time.monotonic() - start,
     }
     console.result(summary)
     _print(summary, rows, console)

@@ -126,9 +126,9 @@ def _probe(uri: str, console: Console) -> int:
 
 def _listen(transducer: Transducer, clock: Clock, console: Console) -> ReadingBlock:
     transducer.start()
-    began = clock.now_ns()
+    start = clock.now_ns()
     blocks: list[ReadingBlock] = []
-    while (elapsed_s := (clock.now_ns() - began) / 1e9) < PROBED:
+    while (elapsed_s := (clock.now_ns() - start) / 1e9) < PROBED:
         console.progress(elapsed_s / PROBED, f"listening, {transducer.health.received} readings")
         blocks.append(transducer.read(0.1))
     transducer.stop()

@@ -36,12 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     recording = Recording.open(options.session)
     with tempfile.TemporaryDirectory(prefix="daq-app-replay-") as room:
-        began = time.perf_counter()
+        start = time.perf_counter()
         try:
             copy = replay(recording, Path(room) / "replay", None if options.fast else options.speed, console.progress)
         except Stopped:
             raise KeyboardInterrupt from None
-        wall_s = time.perf_counter() - began
+        wall_s = time.perf_counter() - start
         differences = [
             *different_readings(recording, copy),
             *first_sentences(list(different_events(recording, copy))),

@@ -82,7 +82,7 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
 
     Raises SelfTestFailed where a promise did not hold, RecordingError where the disk allows no recording at all.
     """
-    began = time.monotonic()
+    start = time.monotonic()
     chance = random.Random()
     kills, logs = _try_kills(room, chance, progress)
     progress(0.75, "stopping sessions")
@@ -108,7 +108,7 @@ def selftest(room: Path, progress: Progress) -> dict[str, Any]:
         "disk": {"file_system": file_system(room)},
         "machine": machine(),
         "software": software_versions(),
-        "seconds": round(time.monotonic() - began, 1),
+        "seconds": round(time.monotonic() - start, 1),
     }
 
 
@@ -222,18 +222,18 @@ def _check_recording(recording: Recording, witness: _WatchedRecorder, trial: int
 
 def _try_stops(room: Path) -> float:
     """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
-    took: list[float] = []
+    spans: list[float] = []
     for number in range(STOPS):
         with closing(_WatchedRecorder()) as witness:
             _begin_or_resume(witness, room / str(number))
             witness.hear(0.3)
-            began = time.monotonic()
+            start = time.monotonic()
             witness.recorder.send(m.Stop())
             witness.until(m.SessionEnded)
-            took.append(time.monotonic() - began)
+            spans.append(time.monotonic() - start)
         if Recording.open(room / str(number)).end is None:
             raise SelfTestFailed("a session that was stopped had no written end")
-    return round(float(np.median(took)) * 1e3, 1)
+    return round(float(np.median(spans)) * 1e3, 1)
 
 
 def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
@@ -279,16 +279,16 @@ def _try_quota(folder: Path) -> dict[str, Any]:
     )
     writer = _QuotaWriter.create(folder, _PLAN, info, provenance(clock), clock=clock, reserve=RESERVE)
     writer.limit(QUOTA)
-    took: list[float] = []
+    spans: list[float] = []
     position = 0
     while writer.must_end is None:
         if position > 100 * _RATE:
             raise SelfTestFailed("a session that had no more room went on without a word")
         writer.readings(_numbered_readings(position, clock.now_ns()))
         position += _RATE
-        began = time.monotonic()
+        start = time.monotonic()
         writer.commit()
-        took.append(time.monotonic() - began)
+        spans.append(time.monotonic() - start)
     safe = writer.acknowledged.readings
     writer.event("ended", data={"reason": writer.must_end, "cause": "disk", "complete": False, "readings": safe})
     writer.close()
@@ -300,7 +300,7 @@ def _try_quota(folder: Path) -> dict[str, Any]:
         )
     if not np.array_equal(block.raw, _numbered_readings(0, 0, position).raw):
         raise SelfTestFailed("readings came back otherwise than they were written when the room was full")
-    return {"bytes": QUOTA, "readings": safe, "commit_ms": round(float(np.median(took)) * 1e3, 2)}
+    return {"bytes": QUOTA, "readings": safe, "commit_ms": round(float(np.median(spans)) * 1e3, 2)}
 
 
 def _numbered_readings(first: int, received_ns: int, count: int = _RATE) -> ReadingBlock:

@@ -27,8 +27,8 @@ class PaintedText:
         return not self.room.adjusted(-ROUNDING, -ROUNDING, ROUNDING, ROUNDING).contains(self.place)
 
     def collides(self, other):
-        shared = self.ink.intersected(other.ink)
-        return min(shared.width(), shared.height()) > ROUNDING
+        overlap = self.ink.intersected(other.ink)
+        return min(overlap.width(), overlap.height()) > ROUNDING
 
 
 def painted_texts(widget):
@@ -43,9 +43,9 @@ def painted_texts(widget):
 def cut_or_colliding(widget):
     """Return the painted texts that are not wholly seen, and pairs of them that lie on each other."""
     texts = painted_texts(widget)
-    cut = [(text.words, text.place, text.room) for text in texts if text.is_cut]
+    partial = [(text.words, text.place, text.room) for text in texts if text.is_cut]
     pairs = [(a.words, b.words) for at, a in enumerate(texts) for b in texts[at + 1 :] if a.collides(b)]
-    return cut + pairs
+    return partial + pairs
 
 
 def paints_by_hand(widget):

@@ -82,8 +82,8 @@ def english_in(window):
     english = set()
     for widget in (window, *window.findChildren(QWidget)):
         if not type(widget).__module__.startswith("PySide6") or not widget.objectName().startswith("qt_"):
-            painted = painted_texts(widget) if widget.isVisible() and paints_by_hand(widget) else []
-            texts = (*texts_of(widget), *(text.words for text in painted))
+            paints = painted_texts(widget) if widget.isVisible() and paints_by_hand(widget) else []
+            texts = (*texts_of(widget), *(text.words for text in paints))
             english.update(text for text in texts if english_rest(text))
     return {text for text in english if not text.startswith("Scroll ")}  # Qt's own
 

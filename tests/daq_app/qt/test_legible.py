@@ -316,25 +316,25 @@ def is_too_narrow(scrolled):
 
 def cut_axes(window):
     """Return every name of an axis that is longer than its axis, or lies on its numbers."""
-    cut = []
+    faults = []
     for plot in window.findChildren(ZoomedPlot):
         across = plot.getPlotItem().getAxis("bottom")
         numbers = across.style["tickTextOffset"][1] + QFontMetricsF(across.style["tickFont"]).ascent()
         if plot.isVisible() and across.label.isVisible() and across.label.y() + DOCUMENT_MARGIN < numbers:
-            cut.append((across.labelText, across.label.y(), numbers))
+            faults.append((across.labelText, across.label.y(), numbers))
         for side in ("left", "bottom") if plot.isVisible() else ():
             axis = plot.getPlotItem().getAxis(side)
             room = axis.size().height() if side == "left" else axis.size().width()
             if axis.label.isVisible() and axis.label.boundingRect().width() > room + ROUNDING:
-                cut.append((axis.labelText, axis.label.boundingRect().width(), room))
+                faults.append((axis.labelText, axis.label.boundingRect().width(), room))
     for canvas in window.findChildren(FingerCanvas):
         axis = canvas._bar.getAxis("bottom")
         place = axis.label.mapRectToParent(axis.label.boundingRect())
         if canvas.isVisible() and (
             place.left() < -DOCUMENT_MARGIN or place.right() > axis.size().width() + DOCUMENT_MARGIN
         ):
-            cut.append((axis.labelText, place, axis.size()))
-    return cut
+            faults.append((axis.labelText, place, axis.size()))
+    return faults
 
 
 @pytest.mark.parametrize("language", ["en", "de", "fr", "ja", "ar"])

@@ -184,8 +184,8 @@ class Walk:
         session = self.driver.session
         if session is None:
             not_ready = [frame for frame in window.page.frames.values() if "not ready" in frame.accessibleName()]
-            explained = [frame for frame in not_ready if frame.words.isVisibleTo(frame) and frame.words.text().strip()]
-            return "" if not_ready and explained == not_ready else "Start is not lit, and no card says why"
+            reasons = [frame for frame in not_ready if frame.words.isVisibleTo(frame) and frame.words.text().strip()]
+            return "" if not_ready and reasons == not_ready else "Start is not lit, and no card says why"
         if window.subject.scoring:
             answer = window.course.buttons["no answer"].isEnabled()
             return "" if answer or window.course.asking else "an answer is due, and cannot be given or left out"

@@ -121,9 +121,9 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
 
 def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_stroke(driver):
     window, live = at_size(driver, 1000, 700)
-    for visible, folded in ((0, 3), (3, 0), (0, 3)):
+    for visible, hidden in ((0, 3), (3, 0), (0, 3)):
         assert live.plots[visible].isVisible()
-        assert not live.plots[folded].isVisible()
+        assert not live.plots[hidden].isVisible()
         QTest.keyClick(window, Qt.Key.Key_D)
     assert preferences.settings().value(DRAWER) is None  # what there was no room for is no wish
 
@@ -168,10 +168,10 @@ def test_a_tile_of_a_session_that_is_over_cannot_be_pressed():
     strip = TrialStrip(lambda _: None)
     strip.show_tiles(tuple(Tile(number, "K50", "coming") for number in range(1, 4)))
     strip.show()
-    gone = strip.tiles[2]
+    third = strip.tiles[2]
     strip.show_tiles((Tile(1, "D86", "current"),))
     assert len(strip.tiles) == 1
-    assert not gone.isVisible()
+    assert not third.isVisible()
 
 
 def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(own_panel):

@@ -34,8 +34,8 @@ def test_every_control_has_a_name_for_screen_readers(driver):
 
 def test_every_painted_widget_says_what_it_shows(driver):
     window = driver.window
-    painted = [window.live.map, *window.live.plots, window.subject.line, *window.bench._bars.values()]
-    assert all(widget.accessibleName() for widget in painted)
+    paintings = [window.live.map, *window.live.plots, window.subject.line, *window.bench._bars.values()]
+    assert all(widget.accessibleName() for widget in paintings)
 
 
 def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_control(driver):
@@ -44,12 +44,12 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
     page.subject.setFocus()
     order, reached = [], set()
     for _ in range(60):
-        focused = window.focusWidget()
-        if focused in reached:
+        focus = window.focusWidget()
+        if focus in reached:
             break
-        reached.add(focused)
-        order.append(focused)
-        QTest.keyClick(focused, Qt.Key.Key_Tab)
+        reached.add(focus)
+        order.append(focus)
+        QTest.keyClick(focus, Qt.Key.Key_Tab)
     fields = [page.subject, page.stroking, page.answering, page.with_forces, page.area]
     fields += [page.studies, page.protocol, page.seed, page.people_score, page.folder]
     places = [order.index(widget) for widget in fields]
@@ -154,11 +154,11 @@ def fit_line(subject):
 
 def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_remembered(driver):
     window, model = driver.window, driver.window.bridge.model
-    remembered = preferences.settings
+    original = preferences.settings
     for kinematics, value in (("finite", "yes"), ("small", "no")):
         QTest.keyClick(window, Qt.Key.Key_M)
         assert model.kinematics == kinematics
-        assert remembered().value(FINITE) == value
+        assert original().value(FINITE) == value
         again = LivePanel(window.bridge.feed, model)
         assert again.bar.finite.isChecked() == (kinematics == "finite")
 

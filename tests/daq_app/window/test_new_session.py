@@ -227,8 +227,8 @@ def test_a_skipped_trial_of_a_session_that_was_cut_short_is_not_done(tmp_path):
     writer.event("take_kept", 1, {"take": 1})
     writer.event("skip", 2)
     writer.close()
-    (cut,) = unfinished_sessions(tmp_path)
-    assert cut.words.endswith(": trials done 1 of 3")
+    (session,) = unfinished_sessions(tmp_path)
+    assert session.words.endswith(": trials done 1 of 3")
 
 
 def test_sessions_of_one_subject_that_were_cut_short_are_told_apart_by_when_they_began(tmp_path, monkeypatch):
@@ -242,7 +242,7 @@ def test_sessions_of_one_subject_that_were_cut_short_are_told_apart_by_when_they
     monkeypatch.setattr("sessions.recording.head.datetime", Clock)
     for hour in (8, 11):
         new_writer(tmp_path / f"at-{hour}", plan=PLAN).close()
-    words = {cut.folder.name: cut.words[: len("S01, 2026-11-26 17:51")] for cut in unfinished_sessions(tmp_path)}
+    words = {one.folder.name: one.words[: len("S01, 2026-11-26 17:51")] for one in unfinished_sessions(tmp_path)}
     assert words == {"at-8": "S01, 2026-11-26 17:51", "at-11": "S01, 2026-11-26 20:51"}
     monkeypatch.undo()
     time.tzset()

@@ -78,12 +78,12 @@ def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
 
 def test_the_mirror_keeps_what_the_protocol_keeps_from_the_experimenter():
     subject = ("instruction", "trial count", "forces")
-    for experimenter, counted in ((("answer",), False), (("trial count", "forces"), True)):
+    for experimenter, has_count in ((("answer",), False), (("trial count", "forces"), True)):
         plan = replace(PLAN, shown=Visibility(subject, experimenter))
         session = replace(after(*READY).session, plan=plan)
         assert subject_view(session).force
         assert "Surface 1 of 10." in subject_view(session).text
         mirror = mirror_view(session)
         assert not mirror.force
-        assert ("Surface 1 of 10." in mirror.text) is counted
+        assert ("Surface 1 of 10." in mirror.text) is has_count
         assert mirror.title == subject_view(session).title

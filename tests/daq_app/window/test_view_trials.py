@@ -129,8 +129,8 @@ def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset
     assert inspection(now, 1).verdict == "Good"
     assert "score 40" in inspection(now, 1).heading
     assert not course_view(now, BenchState(), 0.0).buttons["undo"].enabled
-    stroked = after(*first_take, *again, steps.AskStroke(FIRST), log("contact_onset", 1, time=9.0, noticed=9.0)).session
-    assert not course_view(stroked, BenchState(), 0.0).buttons["undo"].enabled
+    later = after(*first_take, *again, steps.AskStroke(FIRST), log("contact_onset", 1, time=9.0, noticed=9.0)).session
+    assert not course_view(later, BenchState(), 0.0).buttons["undo"].enabled
 
 
 def test_a_redo_before_the_stroke_or_in_the_middle_of_it_offers_no_undo():

@@ -174,9 +174,9 @@ def test_redo_names_both_of_two_that_are_compared():
 
 
 def test_a_flaw_is_the_reason_to_redo_only_the_trial_it_was_found_in():
-    flawed = (*SCORE, Judged(1, 1, BAD), log("take_kept", 1, take=1), steps.AskMount(SECOND))
-    assert derive_view(after(*flawed)).course.buttons["redo"].sends == steps.Redo("no steady window")
-    third = (*flawed, steps.StartTake(2, 1), log("take_kept", 2, take=1), steps.AskMount(PLAN.trials[2]))
+    messages = (*SCORE, Judged(1, 1, BAD), log("take_kept", 1, take=1), steps.AskMount(SECOND))
+    assert derive_view(after(*messages)).course.buttons["redo"].sends == steps.Redo("no steady window")
+    third = (*messages, steps.StartTake(2, 1), log("take_kept", 2, take=1), steps.AskMount(PLAN.trials[2]))
     redo = derive_view(after(*third)).course.buttons["redo"]
     assert (redo.label, redo.sends) == ("Redo 2", None)
 

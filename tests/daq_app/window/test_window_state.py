@@ -87,11 +87,11 @@ def test_the_plan_shows_what_is_done_in_hand_and_coming():
 
 
 def test_a_skipped_and_an_unanswered_trial_are_told_apart():
-    skipped = (*READY, log("skip", 1, reason="torn"), log("take_discarded", 1, take=1, reason="skipped: torn"))
-    rows = derive_view(after(*skipped, steps.AskMount(SECOND))).course.rows
+    skip_messages = (*READY, log("skip", 1, reason="torn"), log("take_discarded", 1, take=1, reason="skipped: torn"))
+    rows = derive_view(after(*skip_messages, steps.AskMount(SECOND))).course.rows
     assert (rows[1].kind, rows[1].outcome) == ("skipped", "skipped")
-    unanswered = (*SCORE, log("scored", 1, score=None), log("take_kept", 1, take=1), steps.AskMount(SECOND))
-    rows = derive_view(after(*unanswered)).course.rows
+    no_answer = (*SCORE, log("scored", 1, score=None), log("take_kept", 1, take=1), steps.AskMount(SECOND))
+    rows = derive_view(after(*no_answer)).course.rows
     assert (rows[1].kind, rows[1].outcome) == ("done", "no answer")
 
 
