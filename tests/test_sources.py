@@ -21,10 +21,13 @@ HELD_NODES = {"held"}  # of a mesh: driven nodes, as scripts name them
 PARTICIPLES = {
     *("asked", "beside", "both", "carried", "chosen", "felt", "found", "given", "heard", "held", "leaning", "made"),
     *("marked", "others", "owed", "planted", "said", "solved", "stated", "swapped", "taken", "told", "used", "wanted"),
-    "written",
+    *("saved", "spoken", "written"),
 }
 # Records and messages have these for fields and kinds, and constants for parts of their names; other values do not.
-PARTICIPLES_OF_RECORDS = {"decided", "done", "drawn", "judged", "kept", "known", "related", "seen", "shown"}
+PARTICIPLES_OF_RECORDS = {
+    *("arrived", "broken", "compared", "decided", "done", "drawn", "gathered", "gone", "judged", "kept", "known"),
+    *("listed", "named", "needed", "packed", "related", "replayed", "seen", "shown"),
+}
 # Modules that read what can run, and calls that run what was read.
 RUNS = frozenset({"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"})
 CALLS = frozenset({"eval", "exec", "compile", "__import__", "read_pickle"})

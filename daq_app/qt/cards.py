@@ -58,7 +58,7 @@ class CardFrame(Panel):
 class CutShort(Panel):
     """Lists the sessions that can go on; without one it is not seen."""
 
-    _listed = Signal(object)  # from a thread
+    _new_list = Signal(object)  # from a thread
 
     def __init__(self, send: Callable[[Message], None]) -> None:
         super().__init__("", "banner")
@@ -71,7 +71,7 @@ class CutShort(Panel):
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
         heading = label(tr("▲ Sessions that were cut short"), wrap=True)
         fill(QVBoxLayout(self), heading, self._sessions, self._words, self.go_on)
-        self._listed.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
+        self._new_list.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
         self.show_sessions(())
 
     def look_in(self, folder: Path) -> None:
@@ -80,7 +80,7 @@ class CutShort(Panel):
         def look() -> None:
             sessions = unfinished_sessions(folder)
             with suppress(RuntimeError):  # the page is gone by now
-                self._listed.emit(sessions)
+                self._new_list.emit(sessions)
 
         threading.Thread(target=look, daemon=True).start()
 

@@ -34,7 +34,7 @@ class TabletScreen(QObject):
 
     answered = Signal(object)  # an event of `run.steps`
     changed = Signal()  # the tablet has come or gone, it has another line, or the code is a new one
-    _arrived = Signal(object, float)  # from the server's threads
+    _incoming = Signal(object, float)  # from the server's threads
     _moved = Signal()
 
     def __init__(self, address: str | None, port: int) -> None:
@@ -44,9 +44,9 @@ class TabletScreen(QObject):
         self._pixels: float | None = None  # in a millimetre, measured with a ruler
         self._part = 0.0
         self._last_sent = 0.0  # when the bar got its last value [s]
-        self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
+        self._incoming.connect(self._take, Qt.ConnectionType.QueuedConnection)
         self._moved.connect(self.changed, Qt.ConnectionType.QueuedConnection)
-        self.server = TabletServer(address or own_address(), port, self._arrived.emit, self._moved.emit)
+        self.server = TabletServer(address or own_address(), port, self._incoming.emit, self._moved.emit)
         self._dialogue = Dialogue(self.server.send)
 
     @property
