@@ -184,7 +184,7 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
     driver.until(lambda: driver.session.phase == "scoring", "the score is asked for again")
     driver.answer(Qt.Key.Key_Right)
     window.bridge.send(steps.Redo("mistaken too"))
-    driver.until(lambda: driver.session.trial == 1, "the first trial again")
+    driver.until(lambda: driver.session.trial == 1 and window.middle.undo.isVisible(), "the first trial again")
     QTest.mouseClick(window.middle.undo, Qt.MouseButton.LeftButton)
     driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the second trial")
     assert driver.session.of(1).quality is not None
