@@ -200,6 +200,9 @@ def _dress(application: "QApplication", tokens: "Tokens") -> None:
 
     from daq_app.qt.tokens import palette, style_sheet, tick_palette
 
+    sheet = style_sheet(tokens)
+    if application.styleSheet() == sheet:  # Qt would lay out every widget anew
+        return
     application.setApplicationName("daq-app")
     application.setDesktopFileName("daq-app")
     application.setWindowIcon(QIcon(str(ICON)))
@@ -208,7 +211,7 @@ def _dress(application: "QApplication", tokens: "Tokens") -> None:
     application.setPalette(palette(tokens))
     for kind in ("QCheckBox", "QRadioButton"):
         application.setPalette(tick_palette(tokens), kind)  # pyright: ignore[reportArgumentType]  its stub asks for bytes
-    application.setStyleSheet(style_sheet(tokens))
+    application.setStyleSheet(sheet)
 
 
 def _fail(sentence: str, code: int = FAILED) -> int:
