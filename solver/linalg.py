@@ -38,9 +38,9 @@ def _bisect(centres: Array, most: int) -> _Tree:
     order, count = np.arange(len(centres)), len(centres)
     low, high = np.array([0]), np.array([count])
     lows, highs, levels = [low], [high], [np.zeros(1, np.int64)]
-    joints = [np.empty(0, np.int64)]  # parts that are bisected, numbered level by level
+    branches = [np.empty(0, np.int64)]  # parts that are bisected, numbered level by level
     while (large := high - low > most).any():
-        joints.append(sum(map(len, lows)) - len(low) + np.flatnonzero(large))
+        branches.append(sum(map(len, lows)) - len(low) + np.flatnonzero(large))
         low, high = low[large], high[large]
         size = high - low
         begins = np.cumsum(size) - size
@@ -64,9 +64,9 @@ def _bisect(centres: Array, most: int) -> _Tree:
     children_first = np.lexsort((-low, high))
     number = np.argsort(children_first)
     children = np.full((len(low), 2), -1)
-    children[joint := number[np.concatenate(joints)]] = number[1:].reshape(-1, 2)
+    children[branch := number[np.concatenate(branches)]] = number[1:].reshape(-1, 2)
     parent = np.zeros(len(low), np.int64)
-    parent[number[1:]] = np.repeat(joint, 2)
+    parent[number[1:]] = np.repeat(branch, 2)
     low, high, level = low[children_first], high[children_first], np.concatenate(levels)[children_first]
     leaf = np.flatnonzero(children[:, 0] < 0)
     return _Tree(order, low, high, children, level, parent, np.repeat(leaf, (high - low)[leaf]))
