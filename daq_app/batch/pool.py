@@ -279,8 +279,9 @@ def visits(
     try:
         for count, (name, answer) in enumerate(answers, 1):
             if isinstance(answer, str | Lost):
-                failures.append((name, answer if isinstance(answer, str) else answer.why))
-                console.note(": ".join(failures[-1]))
+                why = answer if isinstance(answer, str) else answer.why
+                failures.append((name, why))
+                console.note(f"{name}: {why}".replace(f"{name}/", f"{jobs[name][0]}/"))  # commands hold from here
             else:
                 if address is not None:
                     refuse_unlike(answer["made_by"], address, "a worker")

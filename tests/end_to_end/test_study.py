@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -50,6 +51,16 @@ def rows(pool, subject):
 def test_the_damaged_session_is_named_and_stops_nothing(pool):
     assert [name for name, _ in pool["failed"]] == ["S11"]
     assert [visit["session"] for visit in pool["visits"]] == ["S01", "S02"]
+
+
+def test_a_command_that_mends_a_session_holds_from_the_current_folder(study, tmp_path, capsys, monkeypatch):
+    session = shutil.copytree(study / "S01", tmp_path / "damaged" / "S01")
+    (session / "session.sqlite").chmod(0o600)
+    (session / "session.sqlite").write_bytes(b"torn")
+    monkeypatch.chdir(tmp_path)
+    assert run(["study", "damaged"]) == 3
+    (copy,) = re.findall("'daq-app import (.*?)'", capsys.readouterr().err)
+    assert Path(copy).is_file()
 
 
 def test_a_session_that_nobody_may_read_is_named_and_left_out(study, tmp_path, capsys):
