@@ -182,7 +182,7 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     place = np.zeros(len(keys), np.int32)
     place[joined] = position(tree.parent[owner[joined]], entry[joined])
     unknown = number[raw]
-    own = unknown[tree.order]
+    of_leaves = unknown[tree.order]
     sizes = inner * (inner + border)
     wait_at, waiting = _waiting(tree, border)
     return SymbolicFactorization(
@@ -200,7 +200,7 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
         wait_at=wait_at,
         leaf=_narrow(np.where(tree.children[:, :1] < 0, np.stack([tree.low, tree.high], axis=1), 0)),
         order=_narrow(tree.order),
-        at=_narrow(np.where(own < 0, -1, position(tree.leaf[:, None], own))),
+        at=_narrow(np.where(of_leaves < 0, -1, position(tree.leaf[:, None], of_leaves))),
         factors=int(sizes.sum()),
         waiting=waiting,
     )
