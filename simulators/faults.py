@@ -56,7 +56,7 @@ class Faults:
         self._repeat = repeat
         self._clock = _device_clock(self._timetable, repeat)
         self._swap: bytes | None = None
-        self._delays: list[tuple[float, bytes]] = []  # when each leaves
+        self._delays: list[tuple[float, bytes]] = []  # times at which they are sent [s], and their bytes
 
     def put(self, *timetable: Fault) -> None:
         """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""

@@ -127,7 +127,7 @@ def places(elements: Indices) -> Array:
             continue
         place[seed] = 0, 0
         connected = [seed]
-        for element in connected:  # grows on the way
+        for element in connected:  # neighbours are appended meanwhile
             row, column = place[element]
             for (down, right), neighbour in zip(_SIDES, neighbours[element], strict=True):
                 if neighbour >= 0 and neighbour not in place:
@@ -166,7 +166,7 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     sequence = np.concatenate([eliminated, skin])
     number[sequence] = np.arange(len(sequence))
     owner, passed_on = np.divmod(unknowns.border, len(free))
-    keys = np.sort(owner * len(sequence) + number[passed_on])  # each border by number
+    keys = np.sort(owner * len(sequence) + number[passed_on])  # borders part by part, each in ascending order
     owner, entry = np.divmod(keys, len(sequence))
     border = np.bincount(owner, minlength=parts)
     border_at = np.cumsum(border) - border

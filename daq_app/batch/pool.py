@@ -270,7 +270,7 @@ def visits(
     if rest:
         console.progress(0.0, f"0 of {len(rest)} sessions")
     jobs = {folder.name: (folder, options) for folder in rest}
-    address = scheduler if rest else None  # it is not asked for nothing
+    address = scheduler if rest else None  # no scheduler is asked where all is computed
     answers = (
         by_processes(compute_visit, jobs, workers)
         if address is None
@@ -281,7 +281,7 @@ def visits(
             if isinstance(answer, str | Lost):
                 why = answer if isinstance(answer, str) else answer.why
                 failures.append((name, why))
-                console.note(f"{name}: {why}".replace(f"{name}/", f"{jobs[name][0]}/"))  # commands hold from here
+                console.note(f"{name}: {why}".replace(f"{name}/", f"{jobs[name][0]}/"))  # paths from the current folder
             else:
                 if address is not None:
                     refuse_unlike(answer["made_by"], address, "a worker")

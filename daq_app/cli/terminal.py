@@ -186,7 +186,7 @@ def open_device(recorder: Recorder, uri: str) -> m.Device:
                 if isinstance(report, m.Device):
                     return report
                 _raise_failure(report)
-            if interrupted.has_come:
+            if interrupted.pending:
                 recorder.send(m.Stop())
                 raise KeyboardInterrupt
 
@@ -219,8 +219,8 @@ class _Attendance:
             for report in self._recorder.poll(_LOOK):
                 if (outcome := self._take(report)) is not None:
                     return outcome
-            if self._interrupted.has_come:
-                self._interrupted.has_come = False
+            if self._interrupted.pending:
+                self._interrupted.pending = False
                 if self._end is not None:
                     self._console.note("the recorder goes on sealing the session by itself")
                     return Outcome(self._folder, self._end, sealed=False)
@@ -246,7 +246,7 @@ class _Attendance:
 
     def _watch_silence(self) -> None:
         """Say so once where the recorder does not answer, and once when it does again."""
-        running = self._start is not None and self._end is None  # it is silent while it starts, and while it seals
+        running = self._start is not None and self._end is None  # it reports nothing while it starts or seals
         silent = running and self._recorder.silence > SILENCE
         if silent != self._silent:
             self._silent = silent

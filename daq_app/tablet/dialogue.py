@@ -100,7 +100,7 @@ class Force(Struct, frozen=True, tag="force"):
 
 ToTablet = Welcome | Refused | Page | Stored | Force
 
-decode = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError for what no tablet says
+decode = msgspec.json.Decoder(FromTablet).decode  # raises msgspec.DecodeError for other messages
 
 
 def encode(message: ToTablet) -> str:

@@ -20,7 +20,7 @@ from solver.quantities import NAMES, QUANTITIES, SED
 
 _STEP = 1e-3  # [s]
 ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"
-_THINNING = 10  # every so many steps the rate is kept
+_THINNING = 10  # steps of the integration for one stored rate
 
 
 _EDIN_2004 = "Edin 2004, J. Neurophysiol. 92:3233"
@@ -155,7 +155,7 @@ def session_firing(
         time, rate = firing_rate(row.history.time, course, reference, settings)
         spikes = spike_times(time, rate, np.random.default_rng([settings.seed, number]), settings)
         peak = settled_ends = None
-        friction = row.interval if settings.quantity == SED.name else None  # which the SED alone has an interval of
+        friction = row.interval if settings.quantity == SED.name else None  # the SED alone has one
         if friction is not None and friction.low is not None and friction.high is not None:
             ends = friction.low, friction.high
             # The whole course moves with its end: friction is what is uncertain, and presses nothing.

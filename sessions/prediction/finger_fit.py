@@ -206,9 +206,10 @@ class Likelihood:
         )
         step = np.concatenate([np.full(len(one.mean), one.step) for one in grids])
         log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
-        slack = CHI_SQUARED - 2.0 * (fits.max() - fits)  # of the likelihood's fall, for the mean beside its best
-        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(slack, 0.0) / self.free))
-        half = np.where(slack >= 0.0, wide, -np.inf)
+        # Likelihood-ratio interval: the deviance may exceed its minimum by CHI_SQUARED, at each contrast by the rest.
+        margin = CHI_SQUARED - 2.0 * (fits.max() - fits)
+        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(margin, 0.0) / self.free))
+        half = np.where(margin >= 0.0, wide, -np.inf)
         ends = [int((log - half).argmin()), int((log + half).argmax())]
         rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
         low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])

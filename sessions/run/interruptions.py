@@ -1,4 +1,4 @@
-"""Ctrl-C and a request to terminate, taken as a wish that is answered at a safe moment."""
+"""SIGINT and SIGTERM, deferred until the program can stop safely."""
 
 import signal
 import threading
@@ -8,21 +8,21 @@ from types import FrameType
 
 
 class Interruptions:
-    """Whether somebody wants the program to stop."""
+    """Whether a signal has asked the program to stop."""
 
-    has_come = False
+    pending = False
     _at_once = False
 
-    def hear(self, _signal: int, _frame: FrameType | None) -> None:
-        """Be the signal handler."""
-        self.has_come = True
+    def handle(self, _signal: int, _frame: FrameType | None) -> None:
+        """Handle a signal."""
+        self.pending = True
         if self._at_once:
             self._at_once = False  # once: a second signal must not break the clearing up after the first
             raise KeyboardInterrupt
 
     @contextmanager
     def raise_at_once(self) -> Generator[None]:
-        """Let a signal raise KeyboardInterrupt at once inside; for work that leaves nothing half written."""
+        """Let a signal raise KeyboardInterrupt at once inside, for work that may be cut short anywhere."""
         self._at_once = True
         try:
             yield
@@ -32,14 +32,14 @@ class Interruptions:
 
 @contextmanager
 def interruptions() -> Generator[Interruptions]:
-    """Listen while inside. Signals reach the main thread only: elsewhere nothing is ever heard."""
-    listening = Interruptions()
+    """Defer SIGINT and SIGTERM inside. Python delivers signals to the main thread only: other threads see none."""
+    interruption = Interruptions()
     if threading.current_thread() is not threading.main_thread():
-        yield listening
+        yield interruption
         return
-    before = {number: signal.signal(number, listening.hear) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, interruption.handle) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield listening
+        yield interruption
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -135,9 +135,9 @@ class _Run:
         try:
             self._write_beginning()
             if self.transducer is not None:
-                with interruption.raise_at_once():  # a device that does not answer may take its time
+                with interruption.raise_at_once():  # a device may answer late
                     self.transducer.start()
-            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interruption.has_come else stop())
+            cause, reason = self._go_round(lambda: ("stopped", STOPPED_BY_USER) if interruption.pending else stop())
         except (LinkLost, DeviceFault, SetupError) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:
