@@ -1,6 +1,7 @@
 """The top of the experimenter's window: whose session, the recording lamp, the banner, and what to do now."""
 
 from collections.abc import Callable
+from time import monotonic
 
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
@@ -18,6 +19,7 @@ from daq_app.wording import tr
 _ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
 _LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
+LEGIBLE = 4.0  # s: some twenty words, read at five a second
 _MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 
@@ -74,7 +76,8 @@ class Notice(Panel):
         self._send, self._collapsible = send, False
         self._banner: Banner | None = None
         self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
-        self._topic: object = None
+        self._legible_until = 0.0  # of the monotonic clock
+        self._topic, self._step = (True, ""), ""
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
@@ -83,9 +86,9 @@ class Notice(Panel):
 
     def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
         """Show a banner and a warning of this step of the session, or else the last message."""
-        topic = (banner is None, notice, step)
-        if topic != self._topic:
-            self.warning, self._topic = "", topic
+        topic = (banner is None, notice)
+        if topic != self._topic or (step != self._step and monotonic() >= self._legible_until):
+            self.warning, self._topic, self._step = "", topic, step
         self._show(banner, notice)
 
     def _show(self, banner: Banner | None, notice: str) -> None:
@@ -110,7 +113,9 @@ class Notice(Panel):
         self.setVisible(not collapsible or bool(self._words.text()))
 
     def warn(self, sentence: str) -> None:
+        """Answer somebody; a sentence stays long enough to be read, also where a simulated subject goes on at once."""
         self.warning = sentence
+        self._legible_until = monotonic() + LEGIBLE if sentence else 0.0
         self._show(self._banner, sentence)
 
     def _do(self) -> None:

@@ -181,6 +181,7 @@ def driver(application, one_window, tmp_path):
     one_window.page.people_score.setChecked(True)
     one_window.page.subject.clear()
     one_window.page.study.clear()
+    one_window.notice.warn("")
     one_window.page.subject.setFocus()
     yield driver
     one_window.resize(1440, 900)

@@ -12,6 +12,8 @@ from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from daq_app.qt import header
+from daq_app.qt.header import Notice
 from daq_app.window.view import Banner
 from sessions.plan.protocols import protocol_file
 from sessions.plan.study import create_study
@@ -152,7 +154,7 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
     assert window.isVisible()
     assert "close once more" in window.notice._words.text()
     driver.go_on("scoring")
-    assert window.notice._words.text() == ""  # the session has gone on: the question is not asked any more
+    driver.until(lambda: window.notice._words.text() == "", "the session goes on: nothing is asked any more")
     monkeypatch.setattr(window.bridge, "end", lambda: None)
     monkeypatch.setattr(QGuiApplication, "quit", lambda: None)
     for leaves in (False, True):
@@ -160,6 +162,20 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
         window.closeEvent(event)
         assert event.isAccepted() is leaves
         assert "close once more" in window.notice._words.text()
+
+
+@pytest.mark.usefixtures("application")
+def test_a_question_stays_long_enough_to_be_read_while_a_pilot_goes_on(monkeypatch):
+    time = [100.0]
+    monkeypatch.setattr(header, "monotonic", lambda: time[0])
+    notice = Notice(print)
+    notice.show_view(None, "", "stroke")
+    notice.warn("close once more")
+    notice.show_view(None, "", "score")
+    assert notice.warning == "close once more"
+    time[0] += header.LEGIBLE
+    notice.show_view(None, "", "score")
+    assert notice.warning == ""
 
 
 def test_the_warning_of_a_tablet_gives_way_to_others_and_goes_when_it_answers_again(driver, monkeypatch):
