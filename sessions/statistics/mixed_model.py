@@ -21,7 +21,9 @@ from sessions.statistics.scores import sd_interval
 
 _STARTS = (0.3, 3.0)  # spreads relative to what is left: the search starts from each pair, and the best end is kept
 _WIDEST = 1e3  # such a spread: scores have three figures, and a step of the search may not go beyond
-_TO_ROUND_OFF = 1e-9  # gradient of the deviance: an error of a spread enters the deviance squared
+_NEARBY = (
+    1e-5  # gradient of the deviance at which Newton's method takes over: a tenth or tenfold moves no number by 1e-10
+)
 _SINGULAR = 1e-4  # of the factor's diagonal, as lme4 has it
 _NOTHING = 1e-9  # of the factor: it enters by its square, which is then below round-off
 _STEPS = 6  # of Newton's method, after which nothing moves
@@ -82,7 +84,7 @@ class _Likelihood:
                 jac=True,
                 method="L-BFGS-B",
                 bounds=[(-_WIDEST, _WIDEST)] * len(self.patterns),
-                options={"ftol": 0.0, "gtol": _TO_ROUND_OFF},
+                options={"ftol": 0.0, "gtol": _NEARBY},
             )
             for start in starts
         ]
