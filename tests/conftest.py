@@ -1,5 +1,6 @@
 """What holds for every test."""
 
+import gc
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program has it; read when NumPy is loaded
@@ -12,3 +13,12 @@ shared = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("fresh examples", shared)
 settings.register_profile("same examples", shared, derandomize=True)
 settings.load_profile("same examples")
+
+
+def pytest_sessionstart():
+    gc.disable()  # what is collected stays: to look through it again and again takes a tenth of the time
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()

@@ -12,8 +12,6 @@ import pytest
 
 from daq_app.batch import pool
 
-distributed = pytest.importorskip("distributed")
-dask = pytest.importorskip("dask")
 OPENSSL = shutil.which("openssl")
 
 
@@ -47,6 +45,7 @@ def address(tmp_path, certificate):
 @pytest.mark.slow
 @pytest.mark.skipif(OPENSSL is None, reason="no openssl to make a certificate")
 def test_a_scheduler_with_certificates_answers_who_has_them_and_refuses_others(certificate, address, monkeypatch):
+    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
     cert, key = map(str, certificate)
     tls = "distributed.comm.tls."
     with dask.config.set({f"{tls}ca-file": cert, f"{tls}client.cert": cert, f"{tls}client.key": key}):
