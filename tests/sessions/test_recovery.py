@@ -24,10 +24,11 @@ def test_a_quantity_that_scores_follow_closely_is_preferred_in_every_study(quant
     assert (result.preferred, result.family, result.twins, result.surfaces) == (1.0, 1.0, (), 4)
 
 
-def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often():
+@pytest.mark.parametrize("studies", [15, pytest.param(45, marks=pytest.mark.slow)])
+def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often(studies):
     nothing = AssumedEffects(0.0, noise=4.0, level_sd=10.0, slope_sd=0.0)
-    result = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, 45, np.random.default_rng(2))
-    assert result.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # 45 studies: three standard errors
+    result = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, studies, np.random.default_rng(2))
+    assert result.preferred == pytest.approx(1.0 / 3.0, abs=0.2)  # three standard errors of 45 studies
 
 
 def test_a_twin_is_what_goes_with_the_true_quantity_in_either_sense():

@@ -294,7 +294,10 @@ def test_a_mean_of_white_noise_lies_in_its_interval_as_often_as_it_says():
     assert 0.90 <= np.mean([low <= 0.5 <= high for low, high in ends]) <= 0.98
 
 
-@pytest.mark.parametrize("correlation_time", [0.05, 0.1, 0.2, 0.4])  # [s]
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("correlation_time", [0.2, *(pytest.param(one, marks=SLOW) for one in (0.05, 0.1, 0.4))])  # [s]
 def test_a_mean_of_a_ratio_that_wanders_lies_in_its_interval_as_often_as_it_says(correlation_time):
     draw, memory = np.random.default_rng(2), np.exp(-1 / (200.0 * correlation_time))
     steps = draw.standard_normal((400, 800)) * np.sqrt(1.0 - memory**2)
