@@ -1,7 +1,13 @@
-"""Events that QTest does not make."""
+"""What a mouse does, in one call."""
 
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+
+
+def click(widget):
+    """Press and release the left button in the middle of a widget."""
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=widget.rect().center())
 
 
 def wheel(application, widget, at, notches):

@@ -25,7 +25,9 @@ from daq_app.window.state import Dismissed, NewSession
 from sessions.recording import Recording
 from sessions.run import steps
 
-PACE = 8.0  # simulated seconds in a real one; the drawing of twice as many readings costs more than waiting
+PACE = 20.0  # simulated seconds in a real one
+RATE = 100.0  # of readings, by the simulated clock [Hz]: enough for a stroke, and a fifth of it for a bench at rest
+FRAME = 50  # between two looks of the window at the recorder [ms]: drawing 60 pictures a second would take half a core
 PATIENCE = 60.0  # far beyond what anything takes [s]
 
 
@@ -112,6 +114,7 @@ def no_window_stays(application):
     application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.unfreeze()  # an opening window keeps all there is from collection
     gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture
@@ -154,15 +157,17 @@ def subject_page(application, type_size):
 def one_window(application, request):
     """One window for all tests of a file: a session that is over leaves it as it was.
 
-    A file without a session sets its own PACE of 1: readings that come 8 times as fast keep a core half busy.
+    A file without a session sets its own PACE of 1: readings that come 20 times as fast keep a core a third busy.
 
     Its live model does not start by itself, for with time running so fast it would keep a core busy all along.
     """
     settings().clear()  # what the window of another file remembers
+    pace = getattr(request.module, "PACE", PACE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LiveModel, "prepare", lambda _: None)
-        patch.setattr("daq_app.qt.start.SIMULATED_BENCH", "sim:?rate=100")  # half the readings to take and draw
-        window = open_window(application, lambda: Recorder.start(pace=getattr(request.module, "PACE", PACE)))
+        patch.setattr("daq_app.qt.bridge._FRAME", FRAME)
+        patch.setattr("daq_app.qt.start.SIMULATED_BENCH", f"sim:?rate={RATE if pace > 1.0 else RATE / 5.0:g}")
+        window = open_window(application, lambda: Recorder.start(pace=pace))
     window.resize(1440, 900)
     window.show()
     yield window

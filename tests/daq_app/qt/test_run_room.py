@@ -1,4 +1,4 @@
-"""The Run room in the real window: tiles that are pressed, a stroke that is inspected, and the drawer."""
+"""The Run room in the real window: its tiles, a trial that is inspected, its pictures, and the drawer."""
 
 from types import SimpleNamespace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from qt_events import click
 
 from daq_app.qt import preferences, tokens
 from daq_app.qt.live_panel import LivePanel
@@ -15,17 +16,13 @@ from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.state import NewSession
 from daq_app.window.view_course import Inspection, Tile
-from tests.daq_app.qt.test_session_by_keyboard import one_trial
 from tests.daq_app.qt.written_text import cut_off
 from tests.daq_app.session_messages import stroke_at
 
 pytestmark = pytest.mark.qt
+PACE = 1.0  # no test here waits for a stroke
 
 LEFT = Qt.MouseButton.LeftButton
-
-
-def click(widget):
-    QTest.mouseClick(widget, LEFT, pos=widget.rect().center())
 
 
 @pytest.fixture
@@ -44,41 +41,6 @@ def own_panel(driver):
 
     yield feed, panel, feed_readings
     panel.hide()
-
-
-def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
-    window, middle = driver.window, driver.window.middle
-    assert not middle.strip.isVisible()
-    driver.begin("P30")
-    assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
-    one_trial(driver, stays=False)
-    stroke = driver.session.of(1).quality.stroke
-    first = middle.strip.tiles[0]
-    click(first)
-    assert middle.trial.isVisible()
-    assert not window.live.isVisible()
-    assert first.isChecked()
-    code = driver.session.trials[0].trial.stimulus.code
-    assert middle.trial.heading.text().startswith(f"Trial 1, {code}: done")
-    assert middle.trial.cells["mu"].accessibleName() == f"Friction coefficient {stroke.mu_dynamic:.2f}"
-    steady = (stroke.curve.time >= stroke.steady[0]) & (stroke.curve.time <= stroke.steady[1])
-    assert np.mean(stroke.curve.normal[steady]) == pytest.approx(stroke.normal_force, rel=0.02)
-    driver.application.processEvents()
-    still, newest = middle.trial.grab().toImage(), window.bridge.feed.trace.newest
-    driver.until(lambda: window.bridge.feed.trace.newest > newest + 1.0, "further readings")
-    assert middle.trial.grab().toImage() == still
-    click(middle.strip.tiles[2])
-    assert middle.trial.verdict.text() == "Its stroke is still to come."
-    QTest.keyClick(window, Qt.Key.Key_Escape)
-    assert window.live.isVisible()
-    QTest.keyClick(window, Qt.Key.Key_I)
-    assert middle.inspected == 1
-    QTest.keyClick(window, Qt.Key.Key_Space)  # the course goes on behind it
-    driver.until(lambda: middle.inspected is None, "the next onset")
-    assert not middle.trial.isVisible()
-    driver.abort()
-    click(first)
-    assert middle.trial.isVisible()  # a session that is over can be looked through
 
 
 def at_size(driver, *size):
@@ -239,27 +201,6 @@ def test_a_transducer_that_sends_nothing_now_has_no_number_now(own_panel):
     assert panel.finger.toolTip() == "Nothing is measured that the model could follow."
     feed_readings(2.5, 3.0)
     assert panel.plots[0]._end == "now"
-
-
-def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
-    window, mirror = driver.window, driver.window.course.mirror
-    mirror.open.set_room(room=True)
-    driver.begin("P37")
-    assert mirror.open
-    driver.go_on("scoring")
-    assert mirror.picture.isVisible()
-    assert mirror.picture.page._question.text() == window.subject._question.text()
-    before = mirror.picture.grab().toImage()
-    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
-    QTest.keyClick(window.subject.line, Qt.Key.Key_PageUp)
-    driver.application.processEvents()
-    assert window.subject.line.answered
-    assert not mirror.picture.page.line.answered
-    assert mirror.picture.grab().toImage() == before
-    click(mirror.tab)
-    assert not mirror.picture.isVisible()
-    QTest.keyClick(window, Qt.Key.Key_V)
-    assert mirror.picture.isVisible()
 
 
 def test_a_visit_of_scores_only_has_no_force_plots_that_stay_empty(driver):

@@ -1,4 +1,4 @@
-"""A whole session in the real window, with the keyboard alone, against the recorded session."""
+"""Sessions in the real window, from the first key to the last, against the recorded session."""
 
 import os
 import signal
@@ -6,11 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QRect, Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
+from qt_events import click
 
 from daq_app.qt import header
 from daq_app.qt.header import Notice
@@ -297,3 +299,59 @@ def test_on_one_screen_the_experimenters_window_comes_back_when_a_question_is_ta
     driver.phase("mounting")
     driver.until(window.isActiveWindow, "the experimenter's window")
     assert not window.subject.isVisible()
+
+
+def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
+    window, middle = driver.window, driver.window.middle
+    assert not middle.strip.isVisible()
+    driver.begin("P30")
+    assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
+    one_trial(driver, stays=False)
+    stroke = driver.session.of(1).quality.stroke
+    first = middle.strip.tiles[0]
+    click(first)
+    assert middle.trial.isVisible()
+    assert not window.live.isVisible()
+    assert first.isChecked()
+    code = driver.session.trials[0].trial.stimulus.code
+    assert middle.trial.heading.text().startswith(f"Trial 1, {code}: done")
+    assert middle.trial.cells["mu"].accessibleName() == f"Friction coefficient {stroke.mu_dynamic:.2f}"
+    steady = (stroke.curve.time >= stroke.steady[0]) & (stroke.curve.time <= stroke.steady[1])
+    assert np.mean(stroke.curve.normal[steady]) == pytest.approx(stroke.normal_force, rel=0.02)
+    driver.application.processEvents()
+    still, newest = middle.trial.grab().toImage(), window.bridge.feed.trace.newest
+    driver.until(lambda: window.bridge.feed.trace.newest > newest + 1.0, "further readings")
+    assert middle.trial.grab().toImage() == still
+    click(middle.strip.tiles[2])
+    assert middle.trial.verdict.text() == "Its stroke is still to come."
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert window.live.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_I)
+    assert middle.inspected == 1
+    QTest.keyClick(window, Qt.Key.Key_Space)  # the course goes on behind it
+    driver.until(lambda: middle.inspected is None, "the next onset")
+    assert not middle.trial.isVisible()
+    driver.abort()
+    click(first)
+    assert middle.trial.isVisible()  # a session that is over can be looked through
+
+
+def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
+    window, mirror = driver.window, driver.window.course.mirror
+    mirror.open.set_room(room=True)
+    driver.begin("P37")
+    assert mirror.open
+    driver.go_on("scoring")
+    assert mirror.picture.isVisible()
+    assert mirror.picture.page._question.text() == window.subject._question.text()
+    before = mirror.picture.grab().toImage()
+    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    QTest.keyClick(window.subject.line, Qt.Key.Key_PageUp)
+    driver.application.processEvents()
+    assert window.subject.line.answered
+    assert not mirror.picture.page.line.answered
+    assert mirror.picture.grab().toImage() == before
+    click(mirror.tab)
+    assert not mirror.picture.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_V)
+    assert mirror.picture.isVisible()
