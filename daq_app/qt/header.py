@@ -77,7 +77,8 @@ class Notice(Panel):
         self._banner: Banner | None = None
         self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
         self._legible_until = 0.0  # of the monotonic clock
-        self._topic, self._step = (True, ""), ""
+        self._topic: object = None
+        self._step = ""
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
