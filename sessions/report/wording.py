@@ -45,12 +45,21 @@ def between(low: float, high: float, as_text: Callable[[float], str], unit: floa
     >>> between(0.001, 0.003, correlation)
     '+0.001 to +0.003'
     """
-    if as_text(low) == as_text(high) and low != high:
-        decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
-        sign = "+" if as_text(1.0).startswith("+") else ""
-        low_text, high_text = (f"{unit * end:{sign}.{decimals}f}".replace("-", "−") for end in (low, high))
-        return f"{low_text} to {high_text}"
+    as_text = finer(low, high, as_text, unit)
     return f"{as_text(low)} to {as_text(high)}"
+
+
+def finer(low: float, high: float, as_text: Callable[[float], str], unit: float = 1.0) -> Callable[[float], str]:
+    """Return `as_text`, or what shows as many decimals as tell the ends of a range apart.
+
+    >>> finer(0.001, 0.003, correlation)(0.0021)
+    '+0.002'
+    """
+    if as_text(low) != as_text(high) or low == high:
+        return as_text
+    decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
+    sign = "+" if as_text(1.0).startswith("+") else ""
+    return lambda value: f"{unit * value:{sign}.{decimals}f}".replace("-", "−")
 
 
 def places(n: int) -> Callable[[float], str]:

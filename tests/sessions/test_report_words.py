@@ -15,11 +15,13 @@ from sessions.report.contents import Fact
 from sessions.report.figures.relation import paths_panel, relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import doubts, question, summary
+from sessions.report.tables import estimate_cell
 from sessions.report.tables import predictions as of_predictions
 from sessions.report.tables.session import ground_truth_table, paths_sentence, relation_table
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.trials import omissions
+from sessions.report.wording import correlation
 
 FORCE = Variant("small", "computed", "force")
 DOUBT = "Tissue is turned inside out somewhere."
@@ -174,6 +176,13 @@ def test_the_error_bars_of_prediction_against_score_hold_what_the_uncertainty_of
     assert [row[high] for row in panel.rows] == pytest.approx(1.005 * seds)
     doubtful = relation_panel(report.experiments[0], [replace(p, doubt=DOUBT) for p in own])
     assert {row[low] for row in doubtful.rows} == {None}
+
+
+@pytest.mark.parametrize(("value", "ends"), [(0.0042, (0.0038, 0.0046)), (-0.0014, (-0.0017, -0.0011))])
+def test_a_number_is_written_as_finely_as_its_interval_and_never_outside_it(value, ends):
+    cell = estimate_cell(value, correlation, None, ends)
+    low, high = (float(end.replace("−", "-")) for end in cell.interval.split(" to "))
+    assert low <= float(cell.text.replace("−", "-")) <= high
 
 
 def test_one_session_of_a_study_is_no_each():

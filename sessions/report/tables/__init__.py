@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from sessions.report.contents import Report
-from sessions.report.wording import NONE, between
+from sessions.report.wording import NONE, between, finer
 
 Thing = TypeVar("Thing")
 CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under the table
@@ -78,7 +78,8 @@ def estimate_cell(
         return number_cell(None, as_text, reason)
     if ends is None:
         return Cell(as_text(value), f"no interval: {without or 'not computed'}")
-    return Cell(as_text(value), interval=between(*ends, of_ends or as_text, unit))
+    number = as_text if of_ends else finer(*ends, as_text, unit)
+    return Cell(number(value), interval=between(*ends, of_ends or as_text, unit))
 
 
 def range_cell(low: float | None, high: float | None, as_text: Format, reason: str | None = None) -> Cell:
