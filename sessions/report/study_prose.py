@@ -155,6 +155,12 @@ def remarks(study: StudyFindings) -> list[str]:
         for visit in study.visits
         if (choices := sum(row.choice is not None for row in visit.rows))
     ]
+    sessions = by_key((v.subject, v.session) for v in study.visits if any(row.score is not None for row in v.rows))
+    several = [f"{subject} in {', '.join(names)}" for subject, names in sessions.items() if len(names) > 1]
+    sentences += [
+        f"Scored in more than one session: {_first_few(several)}. In means a surface has the subject's mean score; "
+        "within subjects every trial counts. Two people under one code would look the same."
+    ] * bool(several)
     for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
         sentences += [f"{words}: {_first_few(places)}."] if places else []

@@ -233,6 +233,13 @@ def test_trials_that_the_session_did_not_come_to_are_not_done_and_nothing_was_ex
     assert any(sentence.startswith("Not done: S01 trial 1, S01 trial 2") for sentence in sentences)
 
 
+def test_a_subject_who_scored_in_two_sessions_is_named_for_it_may_be_two_people_under_one_code():
+    again = replace(VISITS[0], session="again")
+    (sentence,) = (one for one in remarks(pool_visits([*VISITS, again])) if "more than one session" in one)
+    assert f"{again.subject} in {VISITS[0].session}, again." in sentence
+    assert not any("more than one session" in one for one in remarks(pool_visits(VISITS)))
+
+
 def test_a_recording_without_trials_is_told_to_count_nothing_and_not_to_have_ended_early():
     foreign = replace(VISITS[0], session="foreign", rows=(), complete=False)
     (sentence,) = (one for one in remarks(pool_visits([foreign, *VISITS[1:]])) if "foreign" in one)
