@@ -212,9 +212,20 @@ def reveal(recording: Recording) -> Recording:
 
 
 def session_folders(folder: Path) -> tuple[Path, ...]:
-    """Return the session folders in a folder, by name, and those that nobody may look into. Raises OSError."""
-    inside = (path for path in folder.iterdir() if path.is_dir())
-    return tuple(sorted(p for p in inside if not os.access(p, os.R_OK | os.X_OK) or (p / LIVE_FILE).is_file()))
+    """Return the session folders in a folder, by name, those without their recording or out of reach too, to be named.
+
+    Raises OSError.
+    """
+    return tuple(sorted(path for path in folder.iterdir() if _may_hold_session(path)))
+
+
+def _may_hold_session(path: Path) -> bool:
+    """Return whether a path is a session folder, or one that lost its recording or cannot be looked into."""
+    if not path.is_dir():
+        return path.is_symlink() and not path.exists() and not path.name.startswith(".")  # to a disk that is not there
+    if not os.access(path, os.R_OK | os.X_OK):
+        return True
+    return any(os.path.lexists(path / name) for name in (LIVE_FILE, SEALED_FILE, MANIFEST_FILE))
 
 
 def sessions_of(folder: Path) -> tuple[tuple[Recording, ...], tuple[str, ...]]:

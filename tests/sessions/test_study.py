@@ -323,6 +323,17 @@ def test_after_a_study_was_unblinded_its_later_sessions_are_open(blind):
 # ---- visits
 
 
+def test_a_session_that_lost_its_recording_or_whose_disk_is_not_there_is_named_and_other_folders_are_not(tmp_path):
+    for name, file in (("S01", "session.h5"), ("S02", "MANIFEST.json"), ("an-export", "session.json")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / file).touch()
+    (tmp_path / "S03" / "session.sqlite").mkdir(parents=True)
+    (tmp_path / "S04").symlink_to(tmp_path / "disk" / "S04")
+    (tmp_path / ".#notes").symlink_to("somebody@elsewhere")
+    names = [sentence.split(" holds no recording")[0][-3:] for sentence in sessions_of(tmp_path)[1]]
+    assert names == ["S01", "S02", "S03", "S04"]
+
+
 def test_the_sessions_of_a_study_come_by_name_each_with_its_subject(blind):
     for subject in ("P01", "P02"):
         enrol(blind, subject, Body())
