@@ -91,7 +91,7 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
 def _other_response(state: AnalystState, prediction: PredictionFinding) -> list[tuple[str, str]]:
     """Return the chosen quantity with its errors; nothing where it is the SED, which always stands."""
     kind = shown_response(state.response)
-    response = kind.of(prediction)
+    response = kind.numbers(prediction)
     if kind.name == SED.name or not response:
         return []
     value, *error = response
@@ -118,7 +118,7 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
     The mesh's error is the greatest of all trials, and unknown where that of one is.
     """
     kind = shown_response(response)
-    pairs = [(prediction, kind.of(prediction)) for prediction in (() if report is None else report.predictions)]
+    pairs = [(prediction, kind.numbers(prediction)) for prediction in (() if report is None else report.predictions)]
     answers = [(prediction, value) for prediction, value in pairs if value]
     if not answers:
         return ""
@@ -194,7 +194,7 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     points: list[Point] = []
     for number, row in enumerate(rows(state)):
         prediction = row.prediction
-        response = None if prediction is None else kind.of(prediction)
+        response = None if prediction is None else kind.numbers(prediction)
         if prediction is None or prediction.index is None or not response:
             continue
         stimulus = prediction.experiment, prediction.index

@@ -46,8 +46,8 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress = l
     if holds_something(folder):
         raise ExportError(f"{folder} is not empty; give a new folder, for nothing is written over")
     try:
-        with whole_folder(folder) as part:
-            importlib.import_module(FORMATS[name]).write(source, part, progress)
+        with whole_folder(folder) as unfinished:
+            importlib.import_module(FORMATS[name]).write(source, unfinished, progress)
     except OSError as error:
         raise ExportError(
             f"{folder} cannot be written ({error.strerror or error}); {remedy(error, new=True)}, or give another folder"

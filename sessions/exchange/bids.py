@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
@@ -87,8 +88,8 @@ def read(path: Path) -> ExportedSession:
         {name: "" if cell == NOT_AVAILABLE else cell for name, cell in zip(header, line, strict=True)} for line in lines
     )
     events = tuple(logged_event(row, "trial_type") for row in rows_read)
-    parts = sorted(event_file.parent.glob("*_physio.tsv.gz"), key=lambda part: float(_sidecar(part)["StartTime"]))
-    return ExportedSession("bids", path, head, events, lambda: _blocks(parts), side_files(path / SOURCE))
+    files = sorted(event_file.parent.glob("*_physio.tsv.gz"), key=lambda file: float(_sidecar(file)["StartTime"]))
+    return ExportedSession("bids", path, head, events, lambda: _blocks(files), side_files(path / SOURCE))
 
 
 class _Names:
@@ -109,21 +110,21 @@ def _label(text: str) -> str:
     return re.sub(r"[^0-9A-Za-z]", "", text) or "unknown"
 
 
-def _dataset(recording: Recording, kind: str, software: Mapping[str, str]) -> dict[str, Any]:
-    by = {
+def _dataset(recording: Recording, dataset_type: str, software: Mapping[str, str]) -> dict[str, Any]:
+    generator = {
         "Name": PIPELINE,
         "Version": software.get("daq-app", "unknown"),
         "Description": "; ".join(f"{name} {version}" for name, version in software.items()),
     }
-    what = "Recording" if kind == "raw" else "Strokes, friction and predictions"
-    name = f"{what} of {recording.plan.subject}, protocol {recording.plan.protocol}"
+    subject = "Recording" if dataset_type == "raw" else "Strokes, friction and predictions"
+    name = f"{subject} of {recording.plan.subject}, protocol {recording.plan.protocol}"
     return {
         **recording.mark,
         "Name": f"SIMULATED: {name}" if recording.simulated else name,
         "BIDSVersion": _VERSION,
-        "DatasetType": kind,
-        "GeneratedBy": [by],
-        **({"SourceDatasets": [{"URL": "../.."}]} if kind == "derivative" else {}),
+        "DatasetType": dataset_type,
+        "GeneratedBy": [generator],
+        **({"SourceDatasets": [{"URL": "../.."}]} if dataset_type == "derivative" else {}),
     }
 
 
@@ -142,12 +143,12 @@ def _participants(recording: Recording, names: _Names) -> Table:
 
 def _events(recording: Recording) -> Table:
     events = recording.events
-    first = events[0].time_ns if events else 0
+    first_ns = events[0].time_ns if events else 0
     number, time, kind, trial, readings, data = event_columns(events)
-    onset = Column("onset", "", "s from the first event", tuple((e.time_ns - first) * 1e-9 for e in events))
-    lasts = Column("duration", "", "s; n/a: an event is an instant, or its end is an event", (None,) * len(events))
+    onset = Column("onset", "", "s from the first event", tuple((e.time_ns - first_ns) * 1e-9 for e in events))
+    duration = Column("duration", "", "s; n/a: an event is an instant, or its end is an event", (None,) * len(events))
     kind = Column("trial_type", "", "what happened, see Levels of the program's manual", kind.values)
-    return Table("events", EACH_EVENT, (onset, lasts, kind, trial, number, time, readings, data))
+    return Table("events", EACH_EVENT, (onset, duration, kind, trial, number, time, readings, data))
 
 
 # ---- readings
@@ -160,14 +161,14 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
     mark = (1,) if recording.simulated else ()
     first_ns = recording.events[0].time_ns if recording.events else 0
     total = recording.expected_readings or 1
-    several = any(part > 1 for part, _ in _stretches(recording))
+    several = any(stretch > 1 for stretch, _ in _stretches(recording))
     count = 0
-    for part, blocks in groupby(_stretches(recording), itemgetter(0)):
-        stem = f"{names.stem}{f'_recording-{part}' if several else ''}_physio"
-        last: int | None = None
+    for stretch, blocks in groupby(_stretches(recording), itemgetter(0)):
+        stem = f"{names.stem}{f'_recording-{stretch}' if several else ''}_physio"
+        last_number: int | None = None
         with _open_gzip(folder / f"{stem}.tsv.gz") as file:
             for _, block in blocks:
-                if last is None:
+                if last_number is None:
                     sidecar = {
                         **recording.mark,
                         "SamplingFrequency": _sampling_frequency(recording.info.rate, block),
@@ -181,8 +182,9 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                         **{column.heading: _describe(column) for column in table_columns},
                     }
                     write_json(folder / f"{stem}.json", sidecar)
-                write_rows(file, _rows_with_gaps(block, last, rows(block, calibration), len(table_columns), mark), "\t")
-                last = int(block.sequence[-1])
+                complete_rows = _rows_with_gaps(block, last_number, rows(block, calibration), len(table_columns), mark)
+                write_rows(file, complete_rows, "\t")
+                last_number = int(block.sequence[-1])
                 count += len(block)
                 progress(min(count / total, 1.0))
 
@@ -197,30 +199,30 @@ def _sampling_frequency(rate: float, block: ReadingBlock) -> float | None:
 
 def _stretches(recording: Recording) -> Iterator[tuple[int, ReadingBlock]]:
     """Yield the readings in order, each block with the number of its stretch without a break, from 1."""
-    last: float | None = None
-    previous: int | None = None
-    part = 0
+    last_time: float | None = None
+    last_number: int | None = None
+    stretch = 0
     rate = recording.info.rate if recording.info is not None else math.nan
-    most = BREAK * rate if math.isfinite(rate) else math.inf
+    largest_gap = BREAK * rate if math.isfinite(rate) else math.inf
     for block in recording.blocks():
         if not len(block):
             continue
-        steps = np.diff(block.time, prepend=np.nan if last is None else last)
-        gaps = np.diff(block.sequence, prepend=block.sequence[0] if previous is None else previous) - 1
-        breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (gaps > most))]
+        steps = np.diff(block.time, prepend=np.nan if last_time is None else last_time)
+        gaps = np.diff(block.sequence, prepend=block.sequence[0] if last_number is None else last_number) - 1
+        breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (gaps > largest_gap))]
         cuts = [0, *(i for i in breaks if i), len(block)]
         for start, stop in pairwise(cuts):
-            part += start in breaks
-            yield part, block.between(start, stop)
-        last, previous = float(block.time[-1]), int(block.sequence[-1])
+            stretch += start in breaks
+            yield stretch, block.between(start, stop)
+        last_time, last_number = float(block.time[-1]), int(block.sequence[-1])
 
 
 def _rows_with_gaps(
-    block: ReadingBlock, last: int | None, cells: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
+    block: ReadingBlock, last_number: int | None, cells: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the rows, and a row of n/a for each reading that never arrived; NaN and infinity are written as n/a too."""
     finite = bool(np.isfinite(block.raw).all())
-    next_number = None if last is None else last + 1
+    next_number = None if last_number is None else last_number + 1
     for row in cells:
         if next_number is not None:
             for _ in range(row[0] - next_number):
@@ -240,32 +242,29 @@ def _open_gzip(path: Path) -> Generator[TextIO]:
         yield text
 
 
-def _sidecar(part: Path) -> dict[str, Any]:
-    return json_object(read_within_limit(part.parent / part.name.replace(".tsv.gz", ".json")))
+def _sidecar(file: Path) -> dict[str, Any]:
+    return json_object(read_within_limit(file.with_name(file.name.replace(".tsv.gz", ".json"))))
 
 
-def _blocks(parts: Iterable[Path]) -> Iterator[ReadingBlock]:
-    for part in parts:
-        yield from read_rows(gzip_lines(part), _sidecar(part)["Columns"], "\t")
+def _blocks(files: Iterable[Path]) -> Iterator[ReadingBlock]:
+    for file in files:
+        yield from read_rows(gzip_lines(file), _sidecar(file)["Columns"], "\t")
 
 
 # ---- files
 
 
-def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[str, Any] | None = None) -> None:
-    columns_written = table.columns
+def _write_table(stem: Path, table: Table, recording: Recording, extra: Mapping[str, Any] | None = None) -> None:
+    table_columns = table.columns
     if recording.simulated:
-        count = len(columns_written[0].values) if columns_written else 0
-        columns_written = (*columns_written, Column(_MARK.name, "", _MARK.meaning, (1,) * count))
+        table_columns = (*table_columns, replace(_MARK, values=(1,) * len(table.rows)))
     with stem.with_name(f"{stem.name}.tsv").open("w", encoding="utf-8", newline="") as file:
-        for row in ([column.heading for column in columns_written], *Table("", "", columns_written).rows):
+        for row in ([column.heading for column in table_columns], *Table("", "", table_columns).rows):
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
             texts = ("" if cell is None else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
-            cells = (text or NOT_AVAILABLE for text in texts)
-            file.write("\t".join(cells) + "\n")
-    ours = [column for column in columns_written if column.heading not in _BIDS_COLUMNS]
-    descriptions = {column.heading: _describe(column) for column in ours}
-    sidecar = {**recording.mark, "Description": table.meaning, **(more or {}), **descriptions}
+            file.write("\t".join(text or NOT_AVAILABLE for text in texts) + "\n")
+    headings = {column.heading: _describe(column) for column in table_columns if column.heading not in _BIDS_COLUMNS}
+    sidecar = {**recording.mark, "Description": table.meaning, **(extra or {}), **headings}
     write_json(stem.with_name(f"{stem.name}.json"), sidecar)
 
 

@@ -153,8 +153,8 @@ def rows(block: ReadingBlock, calibration: Calibration) -> Iterator[tuple[Any, .
     """Yield the row of each reading, in the order of `columns`."""
     with np.errstate(invalid="ignore", over="ignore"):  # what the device sent is written, whatever it is
         wrench = calibration.wrench(block.raw, np.zeros(6))
-    singles = (block.sequence, block.counter, block.status, block.time, block.received_ns)
-    return zip(*(single.tolist() for single in singles), *block.raw.T.tolist(), *wrench.T.tolist(), strict=True)
+    columns = (block.sequence, block.counter, block.status, block.time, block.received_ns)
+    return zip(*(column.tolist() for column in columns), *block.raw.T.tolist(), *wrench.T.tolist(), strict=True)
 
 
 def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Iterator[ReadingBlock]:
@@ -162,20 +162,20 @@ def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Ite
 
     Rows without a sequence number, of readings that never arrived, are left out; n/a is a NaN. Raises ValueError.
     """
-    places = [_place(name, names) for name in STORED]
+    positions = [_place(name, names) for name in STORED]
     present = (line.replace(NOT_AVAILABLE, "nan") for line in lines if not line.startswith(NOT_AVAILABLE))
-    while part := list(islice(present, _PART)):
+    while chunk := list(islice(present, _PART)):
         # usecols picks the columns in the order given, whatever their order in the file.
-        table: Any = np.atleast_1d(np.loadtxt(part, _EXACT, delimiter=delimiter, usecols=places, comments=None))
+        table: Any = np.atleast_1d(np.loadtxt(chunk, _EXACT, delimiter=delimiter, usecols=positions, comments=None))
         raw = np.column_stack([table[name] for name in RAW])
         sequence, counter, status, time, received = (np.ascontiguousarray(table[name]) for name in STORED[:5])
         yield ReadingBlock(sequence, counter, status, time, received, raw)
 
 
 def _place(name: str, names: Sequence[str]) -> int:
-    for place, heading in enumerate(names):
+    for position, heading in enumerate(names):
         if heading == name or heading.startswith(f"{name}_"):
-            return place
+            return position
     raise ValueError(f"there is no column {name}")
 
 
@@ -195,25 +195,25 @@ def displacement_log(path: Path) -> DisplacementLog:
             f"{path} needs a header with {_DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
             f"calls them; it has {', '.join(map(cell_text, names)) or 'none'}"
         )
-    places = [names.index(name) for name in (clock, _DISPLACEMENT)]
-    of_width = names.index(_WIDTH) if _WIDTH in names else None
+    positions = [names.index(name) for name in (clock, _DISPLACEMENT)]
+    width_position = names.index(_WIDTH) if _WIDTH in names else None
     values: list[tuple[float, float, float]] = []
     for line, cells in rows:
-        at, displacement = (_number(cells, place) for place in places)
-        if not np.isfinite([at, displacement]).all():
-            words = f"{clock} or {_DISPLACEMENT} is no number; {mend_row(*cells)}"
-            raise ImportRefused(f"{path}, line {line}: {words}")
-        if values and at <= values[-1][0]:
+        time, displacement = (_number(cells, position) for position in positions)
+        if not np.isfinite([time, displacement]).all():
+            problem = f"{clock} or {_DISPLACEMENT} is no number; {mend_row(*cells)}"
+            raise ImportRefused(f"{path}, line {line}: {problem}")
+        if values and time <= values[-1][0]:
             raise ImportRefused(f"{path}, line {line}: {clock} does not grow; mend or remove the row")
-        width = np.nan if of_width is None else _number(cells, of_width)
+        width = np.nan if width_position is None else _number(cells, width_position)
         if width <= 0.0:
             raise ImportRefused(f"{path}, line {line}: {_WIDTH} is not above 0; leave the cell empty without a contact")
-        values.append((at, displacement, width))
+        values.append((time, displacement, width))
     if len(values) < 2:
         raise ImportRefused(f"{path} holds {len(values)} rows: give a log with at least 2")
     return DisplacementLog(clock, *np.array(values).T)
 
 
-def _number(cells: Sequence[str], place: int) -> float:
-    value = number_in(cells[place]) if place < len(cells) else None
-    return np.nan if value is None else value
+def _number(cells: Sequence[str], position: int) -> float:
+    number = number_in(cells[position]) if position < len(cells) else None
+    return np.nan if number is None else number

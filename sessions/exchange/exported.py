@@ -166,8 +166,8 @@ def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
     try:
         with ExitStack() as stack:
             with name_failure(RecordingError, f"{folder} cannot be made"):
-                part = stack.enter_context(whole_folder(folder))
-            differences = restore(source, part)
+                unfinished = stack.enter_context(whole_folder(folder))
+            differences = restore(source, unfinished)
     except FileExistsError as error:
         raise NotEmpty(folder) from error
     except _DAMAGED as error:

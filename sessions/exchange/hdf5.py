@@ -35,15 +35,16 @@ IN_THE_COPY = "trials"  # the table that the sealed copy holds itself
 
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the file into an empty folder."""
-    more = [_data_set(table.name, c) for table in tables(source) if table.name != IN_THE_COPY for c in table.columns]
+    further = (table for table in tables(source) if table.name != IN_THE_COPY)
+    data_sets = [_data_set(table.name, column) for table in further for column in table.columns]
     for name, document in (("analysis", source.analysis), ("prediction", source.prediction)):
         if document is not None:
-            text = json.dumps(document, allow_nan=False)
-            more.append(DataSet(f"derived/{name}", texts([text]), "", f"{name}.json, made by the versions in made_by"))
+            text, meaning = json.dumps(document, allow_nan=False), f"{name}.json, made by the versions in made_by"
+            data_sets.append(DataSet(f"derived/{name}", texts([text]), "", meaning))
     for name, content in side_files(source.recording.folder).items():
         data_set, meaning = SIDE_FILES[name]
-        more.append(DataSet(data_set, texts([content.decode(errors="replace")]), "", meaning))
-    write_copy(source.recording, folder / SEALED_FILE, more, progress)
+        data_sets.append(DataSet(data_set, texts([content.decode(errors="replace")]), "", meaning))
+    write_copy(source.recording, folder / SEALED_FILE, data_sets, progress)
 
 
 def find(path: Path) -> Path | None:
@@ -65,7 +66,7 @@ def read(path: Path) -> ExportedSession:
             digest=None,  # the file's own check sums guard it
         )
         columns = [_array(file, f"events/{name}").tolist() for name in ("number", "time_ns", "trial", "readings")]
-        side = {
+        files = {
             name: _text(_array(file, data_set)[0]).encode()
             for name, (data_set, _) in SIDE_FILES.items()
             if data_set in file
@@ -77,7 +78,7 @@ def read(path: Path) -> ExportedSession:
                 *columns, kinds, read_texts(file, "events/data"), strict=True
             )
         )
-    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), side)
+    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), files)
 
 
 def _array(file: h5py.File, name: str) -> Any:  # noqa: ANN401  h5py brings no types
@@ -92,8 +93,8 @@ def _blocks(path: Path) -> Iterator[ReadingBlock]:
         count = len(file["readings/sequence"])
         for start in range(0, count, _PART):
             arrays: Any = {
-                name: np.asarray(file[f"readings/{name}"][start : start + _PART], kind)
-                for name, kind in COLUMNS.items()
+                name: np.asarray(file[f"readings/{name}"][start : start + _PART], dtype)
+                for name, dtype in COLUMNS.items()
             }
             yield ReadingBlock(**arrays)
 

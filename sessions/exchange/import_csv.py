@@ -60,8 +60,8 @@ class Columns:
     @property
     def extra(self) -> tuple[str, ...]:
         """Names of the columns that are neither time nor axis."""
-        places = {self.time, *self.axes}
-        return tuple(name for position, name in enumerate(self.names) if position not in places)
+        identified = {self.time, *self.axes}
+        return tuple(name for position, name in enumerate(self.names) if position not in identified)
 
 
 def columns(
@@ -75,23 +75,23 @@ def columns(
     headings = [_heading(cell) for cell in header or ()]
     if axes is not None and len(axes) > width:
         raise ColumnsUnknown(f"--axes names {len(axes)} columns, but the file has {width}")
-    places: dict[str, int] = {}
+    positions: dict[str, int] = {}
     for position, name in enumerate([axis for axis, _ in headings] if axes is None else axes):
         if name == SKIPPED:
             continue
         if name not in {TIME, *AXES}:
             raise ColumnsUnknown(f'--axes names "{name}", which is none of t, {", ".join(AXES)} or -')
-        if name in places:
-            twice = f"two columns are headed {name}: give --axes, with - for the one to leave out"
-            raise ColumnsUnknown(twice if axes is None else f"--axes names {name} twice")
-        places[name] = position
-    missing_axes = [axis for axis in AXES if axis not in places]
+        if name in positions:
+            problem = f"two columns are headed {name}: give --axes, with - for the one to leave out"
+            raise ColumnsUnknown(problem if axes is None else f"--axes names {name} twice")
+        positions[name] = position
+    missing_axes = [axis for axis in AXES if axis not in positions]
     if missing_axes:
         raise ColumnsUnknown(
             f"no column for {', '.join(missing_axes)} is named: give --axes, such as --axes t,Fx,Fy,Fz,Tx,Ty,Tz, "
             "with - for a column that is none of these"
         )
-    header_units = {axis: headings[place][1] for axis, place in places.items()} if headings else {}
+    header_units = {axis: headings[position][1] for axis, position in positions.items()} if headings else {}
     of_force, of_torque = units or (None, None)
     force = _common_unit("forces", {header_units.get(axis) for axis in AXES[:3]}, of_force, FORCE_UNITS)
     torque = _common_unit("torques", {header_units.get(axis) for axis in AXES[3:]}, of_torque, TORQUE_UNITS)
@@ -104,9 +104,9 @@ def columns(
     by_user = units is not None or axes is not None
     return Columns(
         tuple(stated_names if header is None else header),
-        places.get(TIME),
+        positions.get(TIME),
         time_unit,
-        tuple(places[axis] for axis in AXES),
+        tuple(positions[axis] for axis in AXES),
         (force, torque),
         "set" if by_user else "header",
     )
@@ -126,20 +126,21 @@ def _heading(cell: str) -> tuple[str, str | None]:
     return axis, re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
 
 
-def _common_unit(what: str, header_units: set[str | None], option: str | None, factors: Mapping[str, float]) -> str:
+def _common_unit(quantity: str, header_units: set[str | None], option: str | None, factors: Mapping[str, float]) -> str:
     """Return the one unit in which the forces, or the torques, are."""
     names = header_units - {None}
     units = ", ".join(factors)
     if len(names) > 1 or (names and None in header_units and option is None):
-        raise ColumnsUnknown(f"the header does not name one unit for all {what}: make the file's columns agree")
+        raise ColumnsUnknown(f"the header does not name one unit for all {quantity}: make the file's columns agree")
     (headed_unit,) = names or (None,)
     unit = headed_unit or option
     if unit is None:
-        raise ColumnsUnknown(f"nothing says in which unit the {what} are: give --units, such as --units N,Nmm")
+        raise ColumnsUnknown(f"nothing says in which unit the {quantity} are: give --units, such as --units N,Nmm")
     if unit not in factors:
-        raise ColumnsUnknown(f'the {what} are in "{unit}", which is none of {units}')
+        raise ColumnsUnknown(f'the {quantity} are in "{unit}", which is none of {units}')
     if option is not None and option != unit:
-        raise ColumnsUnknown(f"the header has the {what} in {unit}, but --units says {option}: give one of the two up")
+        difference = f"the header has the {quantity} in {unit}, but --units says {option}"
+        raise ColumnsUnknown(f"{difference}: give one of the two up")
     return unit
 
 
@@ -247,19 +248,19 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
 
 def _table(path: Path, content: bytes, options: ImportOptions) -> tuple[Columns, Array, list[int]]:
     """Return the columns, the numbers (n, columns; nan in extra ones) and the line each row stands on."""
-    rest = records(path, content)
-    first = next(rest, None)
-    if first is None:
+    following = records(path, content)
+    first_record = next(following, None)
+    if first_record is None:
         raise ImportRefused(f"{path} is empty: give a CSV file with a row for each reading")
-    line, cells = first
+    line, cells = first_record
     header = None if all(number_in(cell) is not None for cell in cells) else [cell.strip() for cell in cells]
     try:
         layout = columns(header, options.axes, options.units, len(cells))
     except ColumnsUnknown as unknown:
         raise SettingsError(f"{path}, line {line}: {unknown}") from unknown
-    body = rest if header is not None else itertools.chain([first], rest)
-    places = (*layout.axes, layout.time)
-    column_names = {place: layout.names[place] for place in places if place is not None}
+    body = following if header is not None else itertools.chain([first_record], following)
+    identified = (*layout.axes, layout.time)
+    column_names = {position: layout.names[position] for position in identified if position is not None}
     rows: list[list[float]] = []
     lines: list[int] = []
     for number, record in body:
@@ -281,8 +282,8 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, column_names: 
         value = number_in(cells[position])
         if value is None or not abs(value) <= GREATEST:
             cell = cell_text(cells[position])
-            words = f'{name} is "{cell}", which is no number that a device gives'
-            raise ImportRefused(f"{path}, line {line}: {words}; {mend_row(cell)}")
+            problem = f'{name} is "{cell}", which is no number that a device gives'
+            raise ImportRefused(f"{path}, line {line}: {problem}; {mend_row(cell)}")
         row[position] = value
     return row
 
@@ -298,10 +299,10 @@ def _times(
     time = rows[:, layout.time] * TIME_UNITS[layout.time_unit]
     steps = np.diff(time)
     if (steps <= 0.0).any():
-        wrong = int(np.argmax(steps <= 0.0)) + 1
-        how = "repeats" if steps[wrong - 1] == 0.0 else "lies before"
+        row = int(np.argmax(steps <= 0.0)) + 1
+        relation = "repeats" if steps[row - 1] == 0.0 else "lies before"
         raise ImportRefused(
-            f"{path}, line {lines[wrong]}: the time {how} that of the row before; mend or remove the row"
+            f"{path}, line {lines[row]}: the time {relation} that of the row before; mend or remove the row"
         )
     rate = 1.0 / float(np.median(steps))
     if options.rate is not None:
@@ -321,8 +322,8 @@ def _times(
 
 def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
     """Say whether a comment at the file's head, or a column, says that it came from a simulator."""
-    head = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(COMMENT)]
-    return any(_SIMULATED in layout for layout in (*head, *names))
+    comments = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(COMMENT)]
+    return any(_SIMULATED in text for text in (*comments, *names))
 
 
 def _block(time: Array, raw: Array) -> ReadingBlock:

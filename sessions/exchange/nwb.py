@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 FILE = "session.nwb"
 _INSTALL_ADVICE = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
-_WHOLE = (
+_READING_FIELDS = (
     ("sequence", "n/a", "Record number given by the device; missing numbers are readings that never arrived."),
     ("counter", "ticks", "The device's own clock."),
     ("status", "n/a", "Status word as the device sent it; 0 is healthy."),
@@ -130,11 +130,11 @@ def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: st
     file.add_acquisition(raw)
     timing = clock if "rate" in clock else {"timestamps": raw}
     for name, axes, unit in (("forces", slice(0, 3), "newtons"), ("torques", slice(3, 6), "N mm")):
-        what = f"{mark}{name.capitalize()} of the finger on the stimulus (x y z), nothing subtracted."
-        file.add_acquisition(TimeSeries(name=name, data=wrench[:, axes], unit=unit, description=what, **timing))
-    for name, unit, what in _WHOLE:
+        meaning = f"{mark}{name.capitalize()} of the finger on the stimulus (x y z), nothing subtracted."
+        file.add_acquisition(TimeSeries(name=name, data=wrench[:, axes], unit=unit, description=meaning, **timing))
+    for name, unit, meaning in _READING_FIELDS:
         data = getattr(block, name)
-        file.add_acquisition(TimeSeries(name=name, data=data, unit=unit, description=f"{mark}{what}", **timing))
+        file.add_acquisition(TimeSeries(name=name, data=data, unit=unit, description=f"{mark}{meaning}", **timing))
 
 
 def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
@@ -142,14 +142,14 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
     records = [record for record in recording.trials if record.take is not None and record.take.stop_ns is not None]
     if not records:
         return
-    for name, what in (
+    for name, meaning in (
         ("number", "of the trial"),
         ("descriptor", "what was judged"),
         ("index", "the maker's number of the stimulus; -1: sealed"),
         ("outcome", "scored or not answered"),
         ("score", "the subject's answer, 0 to 100; NaN: none"),
     ):
-        file.add_trial_column(name, what)
+        file.add_trial_column(name, meaning)
     for record in records:
         start, stop = record.start_ns or 0, record.stop_ns or 0
         file.add_trial(

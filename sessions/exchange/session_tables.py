@@ -61,9 +61,9 @@ def _columns(record: type, name: str) -> dict[str, tuple[str, str]]:
     for field, (unit, meaning) in meanings(record).items():
         columns[field] = unit, meaning
         if name == "stroke" and field == "flaws":
-            own = meanings(record)
-            columns |= {f"{one}_bootstrap": (own[one].unit, f"95 % bootstrap interval of {one}") for one in NUMBERS}
-        columns |= {column: (unit, words) for column, (unit, words) in further.get(field, {}).items()}
+            units = {name: unit for name, (unit, _) in meanings(record).items()}
+            columns |= {f"{name}_bootstrap": (units[name], f"95 % bootstrap interval of {name}") for name in NUMBERS}
+        columns |= {column: (unit, text) for column, (unit, text) in further.get(field, {}).items()}
     return columns
 
 
@@ -146,7 +146,7 @@ class Table:
 def tables(source: ExportSource) -> tuple[Table, ...]:
     """Return every table of a session but those of events and readings; predictions only where they were stored."""
     analysis = source.analysis
-    flaws = [{"flaw": row["name"], **{k: v for k, v in row.items() if k != "name"}} for row in analysis["flaws"]]
+    flaws = [{"flaw": row["name"], **_without(row, "name")} for row in analysis["flaws"]]
     of_session = (
         trials(source.recording),
         answers(source.recording),
@@ -167,7 +167,7 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
     """Yield the predictions, the quantities at the ending, and the same trials predicted otherwise, where these are."""
     rows = [
         {
-            **{name: cell for name, cell in row.items() if name not in _SUBTABLES},
+            **_without(row, *_SUBTABLES),
             **_sed_interval("sed", row.get("interval")),
             **_sed_interval("opposite_sed", row.get("opposite_interval")),
             **_force_intervals(row.get("interval")),
@@ -180,20 +180,25 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
     variants = [
         {
             "trial": row["trial"],
-            **one["variant"],
-            **{k: v for k, v in one.items() if k not in ("variant", "interval")},
-            **_sed_interval("sed", one.get("interval")),
-            **_force_intervals(one.get("interval")),
-            "indentation_interval": None if one.get("interval") is None else one["interval"].get("indentation"),
+            **alternative["variant"],
+            **_without(alternative, "variant", "interval"),
+            **_sed_interval("sed", interval),
+            **_force_intervals(interval),
+            "indentation_interval": None if interval is None else interval.get("indentation"),
         }
         for row in prediction["trials"]
-        for one in row.get("alternatives", ())
+        for alternative in row.get("alternatives", ())
+        for interval in [alternative.get("interval")]
     ]
     if variants:
         meaning = (
             "the same trials predicted otherwise: another reading of tau_max, another strain, by the measured force"
         )
         yield _table("alternatives", meaning, variants, ALTERNATIVE)
+
+
+def _without(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if name not in names}
 
 
 def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
@@ -211,8 +216,8 @@ def _sed_interval(name: str, interval: Mapping[str, Any] | None) -> dict[str, An
     """Return the columns of an interval, where one was asked for: its ends, how it was found, or why it is none."""
     if interval is None:
         return {}
-    ends = None if interval["low"] is None else (interval["low"], interval["high"])
-    return {f"{name}_interval": ends, f"{name}_interval_by": interval["method"] or interval["reason"]}
+    limits = None if interval["low"] is None else (interval["low"], interval["high"])
+    return {f"{name}_interval": limits, f"{name}_interval_by": interval["method"] or interval["reason"]}
 
 
 def _force_intervals(interval: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -257,22 +262,17 @@ def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column
     )
 
 
-def logged_event(cells: Mapping[str, str], kind: str) -> LoggedEvent:
-    """Return the event in a row's cells, by heading; `kind` heads what happened. Raises LookupError, ValueError."""
-    data = event_data(cells[kind], cells["data"])
-    trial = int(cells["trial"]) if cells["trial"] else None
-    return LoggedEvent(int(cells["number"]), int(cells["time_ns"]), cells[kind], trial, int(cells["readings"]), data)
+def logged_event(cells: Mapping[str, str], kind_column: str) -> LoggedEvent:
+    """Return the event in a row's cells, whose kind is in `kind_column`. Raises LookupError, ValueError."""
+    kind, trial = cells[kind_column], int(cells["trial"]) if cells["trial"] else None
+    number, time_ns, readings = (int(cells[name]) for name in ("number", "time_ns", "readings"))
+    return LoggedEvent(number, time_ns, kind, trial, readings, event_data(kind, cells["data"]))
 
 
 def answers(recording: Recording) -> Table:
     """Return a row for each answer a subject gave, with all that was recorded of it but its positions."""
     rows = [
-        {
-            "trial": event.trial,
-            "time": event.time_ns,
-            "kind": event.kind,
-            **{k: v for k, v in event.data.items() if k != "positions"},
-        }
+        {"trial": event.trial, "time": event.time_ns, "kind": event.kind, **_without(event.data, "positions")}
         for event in recording.events
         if event.kind in ANSWERS
     ]
@@ -294,8 +294,8 @@ def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float
     """Return the wrench of the last unloaded stretch measured in the take that counts; None for each where none was."""
     zero: tuple[float | None, ...] = (None,) * 6
     for event in recording.events:
-        after = start_ns is not None and event.time_ns >= start_ns
-        if event.kind == "zeroed" and event.trial == trial and after and recording.info is not None:
+        in_take = start_ns is not None and event.time_ns >= start_ns
+        if event.kind == "zeroed" and event.trial == trial and in_take and recording.info is not None:
             zero = tuple((recording.info.calibration.matrix @ event.data["mean"]).tolist())
     return zero
 
@@ -329,10 +329,12 @@ def _friction(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
         row = dict(friction)
         if strokes:
             intervals = strokes[int(row["stroke"])]
-            kind = f"{100 * bootstrap['settings']['confidence']:g} % block bootstrap"
-            for name, of in (("mu", "mu_max" if row["rule"] == "maximum" else "mu_dynamic"), ("tau_max", "tau_max")):
-                ends: Any = None if row[name] is None else intervals[of]
-                row |= {f"{name}_interval": ends, f"{name}_interval_by": None if ends is None else f"{kind} of {of}"}
+            interval_kind = f"{100 * bootstrap['settings']['confidence']:g} % block bootstrap"
+            mu_measure = "mu_max" if row["rule"] == "maximum" else "mu_dynamic"
+            for name, measure in (("mu", mu_measure), ("tau_max", "tau_max")):
+                limits: Any = None if row[name] is None else intervals[measure]
+                row[f"{name}_interval"] = limits
+                row[f"{name}_interval_by"] = None if limits is None else f"{interval_kind} of {measure}"
         else:
             row["mu_interval_by"] = None if row["mu_interval"] is None else analysis["interval"]
         rows.append(row)
@@ -344,20 +346,20 @@ def _table(
 ) -> Table:
     """Return plain data as a table: the columns with a known meaning first, then any others the rows hold."""
     flat = [dict(_flat(row)) for row in rows]
-    names = dict.fromkeys(name for pair in map(_names, meanings) for name in pair)
+    names = dict.fromkeys(name for parts in map(_names, meanings) for name in parts)
     names.update(dict.fromkeys(name for row in flat for name in row))
     columns: list[Column] = []
     for column in names:
         description = meanings.get(column) or meanings.get(column.rsplit("_", 1)[0])
-        unit, what = description or ("", "see docs/session-format.md")
-        columns.append(Column(column, unit, what, tuple(row.get(column) for row in flat)))
+        unit, text = description or ("", "see docs/session-format.md")
+        columns.append(Column(column, unit, text, tuple(row.get(column) for row in flat)))
     if flat:  # what is in no row of this session is left out
-        columns = [one for one in columns if one.name in flat[0] or any(v is not None for v in one.values)]
+        columns = [c for c in columns if c.name in flat[0] or any(value is not None for value in c.values)]
     return Table(name, meaning, tuple(columns))
 
 
 def _names(column: str) -> tuple[str, ...]:
-    return tuple(f"{column}_{end}" for end in _PAIRS[column]) if column in _PAIRS else (column,)
+    return tuple(f"{column}_{suffix}" for suffix in _PAIRS[column]) if column in _PAIRS else (column,)
 
 
 def _flat(row: Mapping[str, Any]) -> Iterable[tuple[str, Cell]]:
@@ -365,12 +367,12 @@ def _flat(row: Mapping[str, Any]) -> Iterable[tuple[str, Cell]]:
     for name, value in row.items():
         if name in _PAIRS:
             yield from zip(_names(name), value or (None, None), strict=True)
-        elif isinstance(value, list | tuple) and all(isinstance(part, str) for part in cast("Sequence[Any]", value)):
+        elif isinstance(value, list | tuple) and all(isinstance(item, str) for item in cast("Sequence[Any]", value)):
             yield name, "; ".join(cast("Sequence[str]", value)) or None
         elif isinstance(value, Mapping) and name == "stimulus":
-            yield from ((f"{name}_{part}", cell) for part, cell in cast("Mapping[str, Cell]", value).items())
+            yield from ((f"{name}_{item}", cell) for item, cell in cast("Mapping[str, Cell]", value).items())
         elif isinstance(value, Mapping):
-            yield name, "; ".join(f"{part}: {why}" for part, why in cast("Mapping[str, Any]", value).items()) or None
+            yield name, "; ".join(f"{key}: {item}" for key, item in cast("Mapping[str, Any]", value).items()) or None
         elif isinstance(value, list | tuple):
             yield name, json.dumps(value, ensure_ascii=False) if value else None
         elif isinstance(value, bool):

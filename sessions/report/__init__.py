@@ -54,76 +54,72 @@ def findings(
     `further` is what took more solves, or was asked for.
     """
     plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
-    more = further or Further()
-    alone = numbers_alone(recording, analysis, prediction, more)
+    extras = further or Further()
+    unscored = numbers_alone(recording, analysis, prediction, extras)
     other_sessions = [Path(table.session).name for table in tables[1:]]
-    visit = visit_from(recording, analysis, prediction, more.paths or {}, {})
+    visit = visit_from(recording, analysis, prediction, extras.paths or {}, {})
     scored = any(table.scores for table in tables)
     return replace(
-        alone,
+        unscored,
         title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
-        head=_head(recording, tables),
+        head=_simulation_notice(recording, tables),
         versions=facts.versions(),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
         excluded=(
-            *map(full_stop, more.unreadable),
-            *facts.exclusion_sentences(recording, analysis, alone.strokes),
+            *map(full_stop, extras.unreadable),
+            *facts.exclusion_sentences(recording, analysis, unscored.strokes),
         ),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
-        experiments=experiments(plan, tables, visit, analysis.settings.area, more.response),
+        experiments=experiments(plan, tables, visit, analysis.settings.area, extras.response),
         course=course(recording),
         fields=fields(prediction),
         ground_truth=tuple(ground_truth or ()),
-        sealed=visit.sealed if scored and alone.predictions else "",
+        sealed=visit.sealed if scored and unscored.predictions else "",
         modelled=tuple(Fact(*fact) for fact in model_facts(prediction)),
         left_out=omissions(prediction),
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
-        again=facts.again(recording, analysis),
+        reproduction=facts.reproduction_facts(recording, analysis),
         commands=session_commands(
-            recording, analysis, prediction, more.firing_settings, more.paths, other_sessions, more.response
+            recording, analysis, prediction, extras.firing_settings, extras.paths, other_sessions, extras.response
         ),
         scene=scene_file(recording, prediction),
     )
 
 
 def numbers_alone(
-    recording: Recording, analysis: Analysis, prediction: SessionPrediction | None, more: Further
+    recording: Recording, analysis: Analysis, prediction: SessionPrediction | None, extras: Further
 ) -> Report:
     """Return a report of strokes and predictions alone: nothing is held against scores, so it may be blinded."""
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     return Report(
         session=recording.folder.name,
         strokes=strokes(recording, analysis),
-        predictions=predictions(prediction, more.firing, undone),
+        predictions=predictions(prediction, extras.firing, undone),
         answers=answers(recording),
-        response=more.response,
+        response=extras.response,
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         width=None if prediction is None else prediction.width,
         width_origin="" if prediction is None else prediction.width_origin,
         interval_kind=analysis.bootstrap.kind,
         interval_kinds=dict(analysis.bootstrap.kinds),
-        afferent=more.afferent,
-        afferent_quantity=SED.name if more.firing_settings is None else more.firing_settings.quantity,
+        afferent=extras.afferent,
+        afferent_quantity=SED.name if extras.firing_settings is None else extras.firing_settings.quantity,
     )
 
 
-def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:
+def _simulation_notice(recording: Recording, tables: Sequence[ScoreTable]) -> str:
     """Return the first line of everything made of this session when any of it was simulated, else ""."""
     if recording.simulated_sentence is not None:
         return recording.simulated_sentence
     simulated = sum(table.simulated for table in tables)
-    are = "is" if simulated == 1 else "are"
-    return f"SIMULATED: {simulated} of the sessions whose scores are used here {are} simulated" if simulated else ""
+    verb = "is" if simulated == 1 else "are"
+    return f"SIMULATED: {simulated} of the sessions whose scores are used here {verb} simulated" if simulated else ""
 
 
 def experiments(
-    plan: SessionPlan,
-    tables: Sequence[ScoreTable],
-    visit: Visit,
-    law: AreaLaw = FIXED,
-    response: str = SED.name,
+    plan: SessionPlan, tables: Sequence[ScoreTable], visit: Visit, law: AreaLaw = FIXED, response: str = SED.name
 ) -> tuple[Experiment, ...]:
     """Return one experiment a block; `visit` holds its trials with what was measured and predicted.
 
@@ -138,10 +134,10 @@ def experiments(
         trials = [row for row in visit.rows if row.block == block.name]
         descriptor = trials[0].descriptor
         indices = tuple(sorted({row.index for row in trials}))
-        means = tuple(one for one in mean_scores(tables) if one.descriptor == descriptor and one.index in indices)
+        means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == descriptor and mean.index in indices)
         score_of = {mean.index: mean.mean for mean in means}
         rows = score_matrix(tables, descriptor)
-        own = {i: score for i, score in rows.get(plan.subject, {}).items() if len(rows) > 1 and i in indices}
+        own_scores = {i: score for i, score in rows.get(plan.subject, {}).items() if len(rows) > 1 and i in indices}
         series = _surface_series(trials)
         responses = series.get(label, {})
         along = [PathTrial("", row.index, score_of.get(row.index), row.rule, row.paths) for row in trials]
@@ -155,8 +151,8 @@ def experiments(
                 answers={subject: tuple(map(row.get, indices)) for subject, row in rows.items()},
                 score_relation=_relation(score_of, responses),
                 index_relation=_relation({index: float(index) for index in indices}, responses),
-                own_relation=_relation(own, responses),
-                own_scores=own,
+                own_relation=_relation(own_scores, responses),
+                own_scores=own_scores,
                 rivals=rivals_of_means(score_of, series, label) if responses and score_of else (),
                 response=response,
                 paths=path_findings(along, "small", law, within=False),

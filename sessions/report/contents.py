@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 Numbers = tuple[float, ...]
 
 
-def same_fields(source: "DataclassInstance", kind: "type[DataclassInstance]") -> dict[str, Any]:
+def same_fields(source: "DataclassInstance", target: "type[DataclassInstance]") -> dict[str, Any]:
     """Return what a record holds in the fields that another kind of record has too, by name."""
-    names = {field.name for field in fields(kind)}
-    return {field.name: getattr(source, field.name) for field in fields(source) if field.name in names}
+    names = {field.name for field in fields(source)} & {field.name for field in fields(target)}
+    return {name: getattr(source, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ class Report:
     ground_truth: tuple[GroundTruth, ...] = ()
     modelled: tuple[Fact, ...] = ()
     left_out: tuple[Fact, ...] = ()
-    again: tuple[Fact, ...] = ()  # everything needed to do it again ...
+    reproduction: tuple[Fact, ...] = ()  # everything needed to do it again ...
     commands: tuple[str, ...] = ()  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
     width_origin: str = ""  # "set" or "assumed"

@@ -8,7 +8,7 @@ from dataclasses import asdict, fields, replace
 from typing import Any
 
 from sessions.file_access import leaves
-from sessions.plan.plan import PROXIMAL_TO_DISTAL, Block, Origin
+from sessions.plan.plan import Block, Origin
 from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings, usual_settings
 from sessions.recording.head import calibration_hash, software_versions
@@ -16,7 +16,7 @@ from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding, TextFile
-from sessions.report.wording import full_stop
+from sessions.report.wording import direction, full_stop
 from sessions.statistics.multiverse import PATHS, Values
 from sessions.statistics.scores import ScoreTable, grades_of, reversed_subjects
 from sessions.strokes.analysis import Analysis
@@ -41,7 +41,7 @@ def session_commands(
 ) -> tuple[str, ...]:
     """Return the commands, to be typed where the session folders lie; `scores` are the names of further visits."""
     name = shlex.quote(recording.folder.name)
-    settings = (*area_words(analysis.settings.area), *calibration_words(analysis.settings.gain_error))
+    settings = (*area_arguments(analysis.settings.area), *calibration_arguments(analysis.settings.gain_error))
     seed = analysis.settings.bootstrap_seed
     seed_option = ["--bootstrap-seed", str(seed)] if seed else []  # later verbs read it from the first one's results
     lines = [["verify", name], ["analyse", name, *settings, *seed_option]]
@@ -51,8 +51,14 @@ def session_commands(
         scene = [] if file is None else ["--scene", shlex.quote(file.name)]
         variants = prediction.options.variants
         variant_option = ["--variants", "both"] if variants == "both" else []
-        words = [*model_words(prediction.options), *scene, *variant_option, *_afferent_words(afferent), *settings]
-        lines.append(["predict", name, *words])
+        arguments = [
+            *model_arguments(prediction.options),
+            *scene,
+            *variant_option,
+            *_afferent_arguments(afferent),
+            *settings,
+        ]
+        lines.append(["predict", name, *arguments])
     if paths is not None:
         small = sum(path.kinematics == "small" for path in PATHS)
         finite = any(len(values) > small for values in paths.values())
@@ -61,7 +67,7 @@ def session_commands(
         report += ["--quantity", response]
     if scores:
         report += ["--scores", *map(shlex.quote, scores)]
-    return tuple(" ".join(["daq-app", *words]) for words in (*lines, report))
+    return tuple(" ".join(["daq-app", *arguments]) for arguments in (*lines, report))
 
 
 def scene_file(recording: Recording, prediction: SessionPrediction | None) -> TextFile | None:
@@ -74,10 +80,10 @@ def scene_file(recording: Recording, prediction: SessionPrediction | None) -> Te
     return TextFile(f"{recording.folder.name}-scene.toml", text, hashlib.sha256(text.encode()).hexdigest())
 
 
-def model_words(options: PredictionOptions) -> list[str]:
+def model_arguments(options: PredictionOptions) -> list[str]:
     """Return what asks 'daq-app predict' for a model, but for its finger.
 
-    >>> model_words(PredictionOptions(kinematics="finite", indentation=1.0))
+    >>> model_arguments(PredictionOptions(kinematics="finite", indentation=1.0))
     ['--kinematics', 'finite', '--indentation', '1.0']
     """
     return [
@@ -88,10 +94,10 @@ def model_words(options: PredictionOptions) -> list[str]:
     ]
 
 
-def area_words(law: AreaLaw) -> list[str]:
+def area_arguments(law: AreaLaw) -> list[str]:
     """Return what asks for a law of the contact area.
 
-    >>> area_words(AreaLaw("power", 0.5, 3.0))
+    >>> area_arguments(AreaLaw("power", 0.5, 3.0))
     ['--area', '0.5', '--area-force', '3.0']
     """
     if law.law == "fixed":
@@ -100,27 +106,27 @@ def area_words(law: AreaLaw) -> list[str]:
     return ["--area", "hertz" if law.law == "hertz" else repr(float(law.exponent)), *force]
 
 
-def calibration_words(gain_error: float | None) -> list[str]:
+def calibration_arguments(gain_error: float | None) -> list[str]:
     """Return what asks for a calibration error, in per cent as the option takes it.
 
-    >>> calibration_words(0.003)
+    >>> calibration_arguments(0.003)
     ['--calibration-error', '0.3']
     """
     return [] if gain_error is None else ["--calibration-error", f"{100.0 * gain_error:.12g}"]
 
 
-def _afferent_words(settings: AfferentSettings | None) -> list[str]:
+def _afferent_arguments(settings: AfferentSettings | None) -> list[str]:
     if settings is None:
         return []
-    words, usual = ["--afferent"], usual_settings(settings.quantity)
+    arguments, usual = ["--afferent"], usual_settings(settings.quantity)
     for field in fields(settings):
         value = getattr(settings, field.name)
         if field.name == "quantity":
-            words += ["--quantity", value] if value != SED.name else []
+            arguments += ["--quantity", value] if value != SED.name else []
         elif value != getattr(usual, field.name):
-            seed = field.name == "seed"
-            words += ["--afferent-seed", str(value)] if seed else ["--afferent-set", f"{field.name}={value!r}"]
-    return words
+            is_seed = field.name == "seed"
+            arguments += ["--afferent-seed", str(value)] if is_seed else ["--afferent-set", f"{field.name}={value!r}"]
+    return arguments
 
 
 _ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "default: nobody set it"}
@@ -133,14 +139,14 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
     facts = [Fact("subject", plan.subject)] if plan.subject else []
     if subjects:
         sessions = sum(bool(table.scores) for table in tables)
-        where = "in one session" if sessions == 1 else f"in {sessions} sessions"
-        facts.append(Fact("subjects who scored", f"{len(subjects)}: {', '.join(subjects)}", where))
+        count_text = "in one session" if sessions == 1 else f"in {sessions} sessions"
+        facts.append(Fact("subjects who scored", f"{len(subjects)}: {', '.join(subjects)}", count_text))
     if plan.blocks:
         facts.append(Fact("protocol", plan.protocol))
         facts.append(Fact("stimulus order", plan.order_rule, f"seed {plan.seed}"))
     facts += [Fact(block.name, _block(block)) for block in plan.blocks]
-    own = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
-    facts += [Fact(f"the subject's finger: {name}", f"{mm:g} mm", "measured") for name, mm in own.items() if mm]
+    lengths = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
+    facts += [Fact(f"the subject's finger: {name}", f"{mm:g} mm", "measured") for name, mm in lengths.items() if mm]
     if plan.contact_angle_origin == "measured":
         facts.append(Fact("contact angle", f"{plan.contact_angle:g}°", "measured"))
     grades = grades_of(recording.trials)
@@ -151,14 +157,13 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
 
 
 def _block(block: Block) -> str:
-    way = "proximal to distal" if block.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
     indices = sorted({trial.stimulus.known_index for trial in block.trials})
     stimuli = f"{'Stimulus' if len(indices) == 1 else 'Stimuli'} {', '.join(map(str, indices))}"
     low, high = block.scale_ends
     ticks = f", {block.ticks} marks" if block.ticks else ""
     task = f"scale: 0 “{low}”, 100 “{high}”{ticks}" if low else f"asked: “{block.question}”"
     depth = f"; depth {block.indentation:g} mm, measured" if block.indentation_origin == "measured" else ""
-    return f"{block.instruction} {stimuli}, stroked {way}; {task}{depth}."
+    return f"{block.instruction} {stimuli}, stroked {direction(block.direction)}; {task}{depth}."
 
 
 def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
@@ -182,8 +187,8 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     ]
     factor = clock.get("factor", 1.0)
     if factor != 1.0:
-        words = f"{factor:g} times as fast as the wall clock" if factor else "which moves when it is waited on"
-        facts.append(Fact("clock", f"simulated time, {words}"))
+        speed_text = f"{factor:g} times as fast as the wall clock" if factor else "which moves when it is waited on"
+        facts.append(Fact("clock", f"simulated time, {speed_text}"))
     return tuple(fact for fact in facts if fact.value)
 
 
@@ -201,32 +206,32 @@ def _tilt(analysis: Analysis) -> tuple[str, str]:
 
 def exclusion_sentences(recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding]) -> tuple[str, ...]:
     """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
-    sentences = [full_stop(f"By {one.sentence}") for one in analysis.decisions if one.leaves_out]
+    sentences = [full_stop(f"By {decision.sentence}") for decision in analysis.decisions if decision.leaves_out]
     for record in recording.trials:
         number = record.trial.number
         for take in record.other_takes:
             reason = take.discard_reason
-            why = "the recording ended in it" if reason is None else f"discarded: {reason}"
-            sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
+            cause = "the recording ended in it" if reason is None else f"discarded: {reason}"
+            sentences.append(f"Take {take.number} of trial {number} does not count ({cause}); its readings are kept.")
         sentences += [f"Trial {number} was skipped."] if record.outcome == "skipped" else []
-    for name, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):
+    for name, quantity in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):
         without = [str(stroke.number) for stroke in strokes if getattr(stroke, name) is None]
         if without:
-            which = f"stroke{'s' if len(without) > 1 else ''} {', '.join(without)}"
-            sentences.append(f"No {words} is given for {which}: the flaws below and the tables say why.")
+            stroke_names = f"stroke{'s' if len(without) > 1 else ''} {', '.join(without)}"
+            sentences.append(f"No {quantity} is given for {stroke_names}: the flaws below and the tables say why.")
     return tuple(sentences)
 
 
 def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTable]) -> tuple[str, ...]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
-    sentences += [full_stop(f"By {one.sentence}") for one in analysis.decisions if not one.leaves_out]
+    sentences += [full_stop(f"By {decision.sentence}") for decision in analysis.decisions if not decision.leaves_out]
     sentences += [table.other_answers for table in tables if table.other_answers]
     for record in recording.trials:
         number = record.trial.number
         if record.outcome == "not answered":
-            what = "score" if record.trial.answer == "line" else "answer"
-            sentences.append(f"Trial {number} has no {what}: the subject did not answer.")
+            answer_noun = "score" if record.trial.answer == "line" else "answer"
+            sentences.append(f"Trial {number} has no {answer_noun}: the subject did not answer.")
         elif record.outcome == "open":
             sentences.append(f"Trial {number} was not done: the session ended before.")
     sentences += [
@@ -237,7 +242,7 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
     return tuple(sentences)
 
 
-def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
+def reproduction_facts(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     """Return all that shaped the numbers; values nobody set are marked."""
     provenance, info = recording.provenance, recording.info
     facts = [
@@ -256,8 +261,8 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         facts += [Fact(f"transducer: {name}", value) for name, value in sorted(info.settings.items())]
     settings: Mapping[str, Mapping[str, Any]] = provenance.get("settings", {})
     facts += [
-        Fact(name, f"{words.get('value')} {words.get('unit', '')}".strip(), _ORIGIN.get(words.get("origin", "set"), ""))
-        for name, words in settings.items()
+        Fact(name, f"{entry.get('value')} {entry.get('unit', '')}".strip(), _ORIGIN.get(entry.get("origin", "set"), ""))
+        for name, entry in settings.items()
     ]
     if info is not None:
         facts.append(Fact("analysis", "; ".join(_describe_settings(analysis.settings))))

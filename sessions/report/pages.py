@@ -47,7 +47,7 @@ def template(name: str, package: str = "sessions.report") -> Template:
     return environment.get_template(name)
 
 
-_HEAD = "<!DOCTYPE html>"
+_DOCTYPE = "<!DOCTYPE html>"
 BODY = {"table-relation", "table-strokes", "table-predictions", "table-rivals"}  # all others stand in the appendix
 
 
@@ -72,7 +72,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
     )
 
 
-def _page(file: str, drawings: Iterable[Plate], head: str, **values: object) -> str:
+def _page(file: str, drawings: Iterable[Plate], notice: str, **values: object) -> str:
     """Return a page of a template; figures and tables are numbered in the order in which they stand on it."""
     return template(file).render(
         figures={plate.name: plate for plate in drawings},
@@ -81,7 +81,7 @@ def _page(file: str, drawings: Iterable[Plate], head: str, **values: object) -> 
         headings=partial(re.findall, r'<h2 id="(\w+)">([^<]*)</h2>'),
         drawing=embed,
         text_address=text_address,
-        csv_of=partial(panel_csv, head=head),
+        csv_of=partial(panel_csv, notice=notice),
         **values,
     )
 
@@ -102,10 +102,10 @@ def check_replaceable(path: Path) -> None:
         return
     try:
         with path.open("rb") as file:
-            start = file.read(len(_HEAD))
+            start = file.read(len(_DOCTYPE))
     except OSError as error:
         raise ReportError(f"{path} cannot be written over ({error.strerror}): choose another file") from error
-    if start not in (b"", _HEAD.encode()):
+    if start not in (b"", _DOCTYPE.encode()):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
 
 
@@ -126,14 +126,14 @@ def embed(panel: Panel) -> Markup:
     return Markup(panel.svg[panel.svg.index("<svg") :])
 
 
-def text_address(text: str, kind: str = "text/csv") -> str:
+def text_address(text: str, media_type: str = "text/csv") -> str:
     """Return an address that holds a text file, CSV unless another media type is given, so that a page stands alone."""
-    return f"data:{kind};charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
+    return f"data:{media_type};charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
 
 
-def panel_csv(panel: Panel, head: str) -> str:
-    """Return the numbers of a picture, empty where there is none; `head` comes first where something is simulated."""
-    return (f"# {head}\n" if head else "") + _csv([panel.header, *panel.rows])
+def panel_csv(panel: Panel, notice: str) -> str:
+    """Return the numbers of a picture, empty where there is none; `notice` comes first where something is simulated."""
+    return (f"# {notice}\n" if notice else "") + _csv([panel.header, *panel.rows])
 
 
 def make_place(folder: Path) -> None:
@@ -143,8 +143,8 @@ def make_place(folder: Path) -> None:
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
-        why = f"{folder} cannot be written into ({error.strerror}): {remedy(error, new=True)}, or choose another folder"
-        raise ReportError(why) from error
+        advice = f"{remedy(error, new=True)}, or choose another folder"
+        raise ReportError(f"{folder} cannot be written into ({error.strerror}): {advice}") from error
 
 
 def swap_in(path: Path, text: str) -> None:
@@ -153,8 +153,8 @@ def swap_in(path: Path, text: str) -> None:
         make_place(path.parent)
         write_whole(path, text.encode())
     except OSError as error:
-        why = f"{path} cannot be written ({error.strerror}): {remedy(error, new=True)}, or choose another folder"
-        raise ReportError(why) from error
+        advice = f"{remedy(error, new=True)}, or choose another folder"
+        raise ReportError(f"{path} cannot be written ({error.strerror}): {advice}") from error
 
 
 # Tables that are no appendix; that of the trials stands under a heading of its own behind it.
@@ -186,18 +186,18 @@ _SIMULATED = "SIMULATED"
 TRIALS, TRIAL_COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
 _MEANING = meanings(TrialRow)  # of each column of the table of trials: all fields of a row but its paths
 _RESPONSES: Mapping[str, tuple[str, str]] = {
-    one.name: ("" if one.unit == "-" else one.unit, f"of the model, averaged over the ending: {one.meaning}")
-    for one in QUANTITIES
-    if one is not SED
+    quantity.name: (quantity.unit.strip("-"), f"of the model, averaged over the ending: {quantity.meaning}")
+    for quantity in QUANTITIES
+    if quantity is not SED
 }
 
 
 def _columns(study: StudyFindings) -> Mapping[str, tuple[str, str]]:
     """Return unit and meaning of each column of `trials_csv`, by its name."""
     simulated = {_SIMULATED: ("", "yes where transducer or subject were simulated")} if study.simulated else {}
-    own = {"session": ("", "folder of the session"), "subject": ("", "code of the subject")}
+    session_columns = {"session": ("", "folder of the session"), "subject": ("", "code of the subject")}
     excluded = {"excluded": ("", "why the trial is left out of every number of the study; empty where it counts")}
-    return {**simulated, **own, **_MEANING, **_RESPONSES, **excluded}
+    return {**simulated, **session_columns, **_MEANING, **_RESPONSES, **excluded}
 
 
 def columns_csv(study: StudyFindings) -> str:
@@ -208,27 +208,27 @@ def columns_csv(study: StudyFindings) -> str:
 
 def paths_csv(study: StudyFindings) -> str:
     """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
-    heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
-    rows: list[list[object]] = [["descriptor", *CHOICES, *heads]]
-    for one in study.descriptors:
-        for path in one.paths:
+    columns = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
+    rows: list[list[object]] = [["descriptor", *CHOICES, *columns]]
+    for descriptor in study.descriptors:
+        for path in descriptor.paths:
             numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
             choices = (getattr(path.path, choice) for choice in CHOICES)
-            rows.append([one.descriptor, *choices, "yes" if path.usual else "no", *numbers])
+            rows.append([descriptor.descriptor, *choices, "yes" if path.usual else "no", *numbers])
     return _csv(rows, simulated=bool(study.simulated))
 
 
 def rivals_csv(study: StudyFindings) -> str:
     """Return a row for each quantity that may follow the scores, of means and within subjects, for R and pandas."""
-    names = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
-    heads = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
-    rows: list[list[object]] = [["descriptor", "kind", *names, *heads]]
-    for one in study.descriptors:
-        for kind, rivals in (("means", one.rivals_of_means), ("within", one.rivals)):
+    columns = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
+    contrast_columns = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
+    rows: list[list[object]] = [["descriptor", "kind", *columns, *contrast_columns]]
+    for descriptor in study.descriptors:
+        for level, rivals in (("means", descriptor.rivals_of_means), ("within", descriptor.rivals)):
             for rival in rivals:
-                less = [getattr(rival.contrast, name, None) for name in ("difference", "low", "high", "z", "p")]
-                numbers = [*(getattr(rival, name) for name in names), *less]
-                rows.append([one.descriptor, kind, *numbers])
+                contrast = [getattr(rival.contrast, name, None) for name in ("difference", "low", "high", "z", "p")]
+                numbers = [*(getattr(rival, name) for name in columns), *contrast]
+                rows.append([descriptor.descriptor, level, *numbers])
     return _csv(rows, simulated=bool(study.simulated))
 
 
@@ -242,11 +242,11 @@ def trials_csv(study: StudyFindings) -> str:
     for visit in study.visits:
         for row in visit.rows:
             decision = exclusion_of(study.excluded, visit.subject, row.descriptor)
-            why = "" if decision is None else decision.why
-            why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
+            reason = "" if decision is None else decision.why
+            reason = f"the same recording as {copies[visit.session]}" if visit.session in copies else reason
             cells = ["yes" if visit.simulated else "no"] if study.simulated else []
-            own = (" ".join(row.flaws) if name == "flaws" else getattr(row, name) for name in _MEANING)
-            rows.append([*cells, visit.session, visit.subject, *own, *map(row.responses.get, _RESPONSES), why])
+            measures = (" ".join(row.flaws) if name == "flaws" else getattr(row, name) for name in _MEANING)
+            rows.append([*cells, visit.session, visit.subject, *measures, *map(row.responses.get, _RESPONSES), reason])
     return _csv(rows)
 
 
@@ -254,6 +254,6 @@ def _csv(rows: Sequence[Sequence[object]], *, simulated: bool = False) -> str:
     """Return rows as CSV; a first column says of each of a simulated study that it is."""
     if simulated:
         rows = [[_SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
-    out = io.StringIO()
-    write_rows(out, rows)
-    return out.getvalue()
+    buffer = io.StringIO()
+    write_rows(buffer, rows)
+    return buffer.getvalue()

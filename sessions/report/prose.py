@@ -27,7 +27,7 @@ from sessions.statistics.scores import by_key
 
 _REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
 OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."
-_Value = Callable[[PredictionFinding], float | None]
+_NumberOf = Callable[[PredictionFinding], float | None]
 
 
 def doubts(report: Report) -> tuple[str, ...]:
@@ -37,11 +37,11 @@ def doubts(report: Report) -> tuple[str, ...]:
     """
     if all(p.sed is None for p in report.predictions) or not report.scored:
         return ()
-    kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
-    other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
-    by_force = Variant(kind, "computed", "force")
+    strain: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
+    other_strain: Literal["small", "finite"] = "finite" if strain == "small" else "small"
+    by_force = Variant(strain, "computed", "force")
     return (
-        _in_variant(report, Variant(other, "computed", "depth"), f"At {other} strain"),
+        _in_variant(report, Variant(other_strain, "computed", "depth"), f"At {other_strain} strain"),
         _by_place(report),
         _in_variant(report, by_force, "Under the measured normal force in place of a given depth"),
         OTHER_FINGERS,
@@ -49,38 +49,38 @@ def doubts(report: Report) -> tuple[str, ...]:
     )
 
 
-def _in_variant(report: Report, variant: Variant, where: str) -> str:
+def _in_variant(report: Report, variant: Variant, condition: str) -> str:
     """Return r of the scores with the SED in a variant, for each experiment."""
 
-    def sed(one: PredictionFinding) -> float | None:
-        return next((alternative.sed for alternative in one.alternatives if alternative.variant == variant), None)
+    def sed(prediction: PredictionFinding) -> float | None:
+        return next((a.sed for a in prediction.alternatives if a.variant == variant), None)
 
-    names = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
+    names = {p.experiment for p in report.predictions if any(a.variant == variant for a in p.alternatives)}
     in_doubt = by_key(
-        (p.experiment, any(one.doubt for one in p.alternatives if one.variant == variant)) for p in report.predictions
+        (p.experiment, any(a.doubt for a in p.alternatives if a.variant == variant)) for p in report.predictions
     )
-    parts = [
-        f"{experiment.name} {words}, n = {plural(fit.n, 'stimulus', 'stimuli')}{_doubt(in_doubt[experiment.name])}"
+    clauses = [
+        f"{experiment.name} {text}, n = {plural(fit.n, 'stimulus', 'stimuli')}{_doubt(in_doubt[experiment.name])}"
         for experiment in report.experiments
         if experiment.name in names
         for fit in [_relation(report, experiment, sed)]
         for r in [fit.pearson]
-        for words in [fit.reason if r is None else f"r = {correlation(r)}{ends_of(fit)}"]
+        for text in [fit.reason if r is None else f"r = {correlation(r)}{ends_of(fit)}"]
     ]
-    if not parts:
-        sizes = [fact.value for fact in report.left_out if where.endswith(fact.name) and fact.value != NO_ESTIMATE]
+    if not clauses:
+        sizes = [fact.value for fact in report.left_out if condition.endswith(fact.name) and fact.value != NO_ESTIMATE]
         change = f": the change is estimated at {sizes[0]}" if sizes else ""
-        return f"{where}, which was not tried here, the sign of r may differ{change}."
-    return f"{where}, r of the SED with the mean scores: {'; '.join(parts)}."
+        return f"{condition}, which was not tried here, the sign of r may differ{change}."
+    return f"{condition}, r of the SED with the mean scores: {'; '.join(clauses)}."
 
 
 def _doubt(in_doubt: Sequence[bool]) -> str:
     """Return how many trials are in a state that no finger can be in, as the end of a sentence; "" where none is."""
-    of = f"{sum(in_doubt)} of {plural(len(in_doubt), 'trial')}"
-    return f" ({of} in a state that no finger can be in)" if any(in_doubt) else ""
+    count_text = f"{sum(in_doubt)} of {plural(len(in_doubt), 'trial')}"
+    return f" ({count_text} in a state that no finger can be in)" if any(in_doubt) else ""
 
 
-def _relation(report: Report, experiment: Experiment, value: _Value) -> Relation:
+def _relation(report: Report, experiment: Experiment, value: _NumberOf) -> Relation:
     """Return how a number goes with mean scores, over the stimuli that have both; repetitions are averaged."""
     means = {mean.index: mean.mean for mean in experiment.scores}
     by_index = by_key(
@@ -98,9 +98,9 @@ def _by_place(report: Report) -> str:
     for experiment in report.experiments:
         rows = [p.row for p in report.predictions if p.experiment == experiment.name and p.row]
         arcs = rows[0] if rows else ()
-        places = sorted(arc for arc in arcs if abs(arc) <= _REACH and all(arc in row for row in rows))
-        by_place = {arc: _relation(report, experiment, lambda p, arc=arc: p.row.get(arc)) for arc in places}
-        r_by_arc = {arc: fit.pearson for arc, fit in by_place.items() if fit.pearson is not None}
+        positions = sorted(arc for arc in arcs if abs(arc) <= _REACH and all(arc in row for row in rows))
+        fits = {arc: _relation(report, experiment, lambda p, arc=arc: p.row.get(arc)) for arc in positions}
+        r_by_arc = {arc: fit.pearson for arc, fit in fits.items() if fit.pearson is not None}
         if 0.0 in r_by_arc:
             low, high = _alike(r_by_arc)
             ranges.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
@@ -118,11 +118,11 @@ def _alike(r_by_arc: Mapping[float, float]) -> tuple[float, float]:
     >>> _alike({-0.5: -0.9, -0.25: 0.3, 0.0: 0.9, 0.25: 0.8})
     (-0.25, 0.25)
     """
-    ends: list[float] = []
+    limits: list[float] = []
     for side in (-1.0, 1.0):
         outwards = sorted((arc for arc in r_by_arc if side * arc >= 0.0), key=abs)
-        ends.append(list(takewhile(lambda arc: r_by_arc[arc] * r_by_arc[0.0] > 0.0, outwards))[-1])
-    return ends[0], ends[1]
+        limits.append(list(takewhile(lambda arc: r_by_arc[arc] * r_by_arc[0.0] > 0.0, outwards))[-1])
+    return limits[0], limits[1]
 
 
 def question(report: Report) -> str:
@@ -131,8 +131,8 @@ def question(report: Report) -> str:
     if not report.experiments:
         return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
     if not any(e.scale_ends[0] for e in report.experiments):
-        what = shown_response(report.response).in_full if report.predictions else ""
-        return f"People judge the {descriptors} of surfaces they stroke. {friction_question(what)}"
+        quantity = shown_response(report.response).in_full if report.predictions else ""
+        return f"People judge the {descriptors} of surfaces they stroke. {friction_question(quantity)}"
     if not report.predictions:
         stroked = report.course is not None or report.strokes
         friction = ", and with what friction do fingers stroke the same surfaces" if stroked else ""
@@ -146,8 +146,8 @@ def question(report: Report) -> str:
 
 def friction_question(quantity: str) -> str:
     """Return what a session without scores asks; `quantity` is what the model predicts, "" for none."""
-    more = f", and what {quantity} does a finger model predict at a receptor" if quantity else ""
-    return f"With what µ do they stroke them{more}?"
+    model_clause = f", and what {quantity} does a finger model predict at a receptor" if quantity else ""
+    return f"With what µ do they stroke them{model_clause}?"
 
 
 def summary(report: Report) -> tuple[str, ...]:
@@ -163,8 +163,8 @@ def summary(report: Report) -> tuple[str, ...]:
         sentences += psychometric_sentences(results)
     for experiment in report.experiments:
         quantity = shown_response(report.response)
-        responses = [quantity.of(p) for p in report.predictions if p.experiment == experiment.name]
-        values = [quantity.factor * one[0] for one in responses if one is not None]
+        responses = [quantity.numbers(p) for p in report.predictions if p.experiment == experiment.name]
+        values = [quantity.factor * numbers[0] for numbers in responses if numbers is not None]
         if values:
             sentences.append(
                 _prediction_sentence(experiment, quantity, (min(values), max(values)), report.model.split(",")[0])
@@ -177,8 +177,8 @@ def summary(report: Report) -> tuple[str, ...]:
         sentences.append(f"{plural(missing_count, noun)} got no prediction; the tables say why.")
     doubtful = sum(bool(p.doubt) for p in report.predictions)
     if doubtful:
-        are = "is" if doubtful == 1 else "are"
-        sentences.append(f"{plural(doubtful, noun)} {are} in a state that no finger can be in; the tables mark each.")
+        verb = "is" if doubtful == 1 else "are"
+        sentences.append(f"{plural(doubtful, noun)} {verb} in a state that no finger can be in; the tables mark each.")
     excluded, flaws = len(report.excluded) or "nothing", len(report.flaws) or "none"
     names = "; the appendix names each" if report.excluded or report.flaws else ""
     sentences.append(f"Excluded: {excluded}; flaws found: {flaws}{names}.")
@@ -191,30 +191,31 @@ def distinctions(report: Report) -> tuple[str, ...]:
 
 
 def _strokes(report: Report) -> str:
-    n = len(report.strokes)
-    if n == 0:
+    count = len(report.strokes)
+    if count == 0:
         return "No stroke was found in the recording; the flaws below say why."
     values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
-    words = f"{plural(n, 'stroke')} {'was' if n == 1 else 'were'} found; {len(values)} gave a dynamic friction"
+    verb = "was" if count == 1 else "were"
+    sentence = f"{plural(count, 'stroke')} {verb} found; {len(values)} gave a dynamic friction"
     if len(values) < 2:
-        return words + (f", µ = {digits(values[0], 2)}." if values else ".")
-    return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
+        return sentence + (f", µ = {digits(values[0], 2)}." if values else ".")
+    return sentence + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
 
 
-def _prediction_sentence(experiment: Experiment, quantity: ShownResponse, ends: Ends, strain: str) -> str:
-    """Return how prediction and score go together in one experiment; `ends` are in the shown unit."""
-    low, high = ends
+def _prediction_sentence(experiment: Experiment, quantity: ShownResponse, limits: Ends, strain: str) -> str:
+    """Return how prediction and score go together in one experiment; `limits` are in the shown unit."""
+    low, high = limits
     decimals, unit = (2, " kPa") if quantity.unit == "kPa" else (quantity.places, "")
-    words = f"{capital(experiment.name)}: the {quantity.label} predicted{f' at {strain}' if strain else ''}"
+    sentence = f"{capital(experiment.name)}: the {quantity.label} predicted{f' at {strain}' if strain else ''}"
     if high > low:
-        words += f" runs from {digits(low, decimals)} to {digits(high, decimals)}{unit}"
-        words += f" (a range of {spread_share(low, high)})"
+        sentence += f" runs from {digits(low, decimals)} to {digits(high, decimals)}{unit}"
+        sentence += f" (a range of {spread_share(low, high)})"
     else:
-        words += f" is {digits(low, decimals)}{unit}"
+        sentence += f" is {digits(low, decimals)}{unit}"
     fit = experiment.score_relation
     if fit is None:
-        return f"{words}; there are no scores to hold it against."
+        return f"{sentence}; there are no scores to hold it against."
     if fit.pearson is None:
-        return f"{words}; no correlation with the scores: {fit.reason}."
+        return f"{sentence}; no correlation with the scores: {fit.reason}."
     r = f"{correlation(fit.pearson)}{ends_of(fit)}"
-    return f"{words}; against the mean scores r = {r}, n = {fit.n} stimuli."
+    return f"{sentence}; against the mean scores r = {r}, n = {fit.n} stimuli."

@@ -10,7 +10,7 @@ from itertools import chain
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import UNKNOWNS
 from sessions.report.contents import Fact
-from sessions.report.facts import area_words, calibration_words, model_words
+from sessions.report.facts import area_arguments, calibration_arguments, model_arguments
 from sessions.report.prose import OTHER_FINGERS, friction_question
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import psychometric_sentences, scale_sentences, study_functions
@@ -20,13 +20,13 @@ from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scores import by_key
 from sessions.statistics.visit import Exclusion
 
-_FEW = 12  # trials named one by one
+_MOST_NAMED = 12  # trials named one by one
 
 
 def question(study: StudyFindings) -> str:
     """Return what the study asks."""
     quantity = shown_response(study.response).in_full
-    if not any(one.scores for one in study.descriptors):
+    if not any(findings.scores for findings in study.descriptors):
         forces = any(visit.forces for visit in study.visits)
         return f"People stroke surfaces and judge what they feel. {friction_question(quantity if forces else '')}"
     return (
@@ -40,22 +40,22 @@ def summary(study: StudyFindings) -> list[str]:
     subjects = {visit.subject for visit in study.visits}
     verb = "was" if len(study.visits) == 1 else "were"
     sentences = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {verb} read."]
-    for one in study.descriptors:
-        sentences += _relation_sentences(one, study)
-        sentences += scale_sentences(one)
-        sentences += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
-    if any(one.repeated is not None for one in study.descriptors):
+    for findings in study.descriptors:
+        sentences += _relation_sentences(findings, study)
+        sentences += scale_sentences(findings)
+        sentences += [paths_sentence(findings.descriptor, findings.paths)] if findings.paths else []
+    if any(findings.repeated is not None for findings in study.descriptors):
         sentences.append(
             "With the receptor elsewhere or under the measured force the sign may differ, too, as the report of each "
             f"session says. {OTHER_FINGERS}"
         )
     sentences += chain.from_iterable(map(psychometric_sentences, study_functions(study)))
-    if (f := study.friction) is not None:
+    if (friction := study.friction) is not None:
         sentences.append(
-            f"The µ of {f.strokes} strokes was estimated with a median error of "
-            f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
-            f"{f.covered} of {f.intervals} intervals hold the true µ, and those of one subject hold or miss together, "
-            "for the error of a transducer's calibration is one for all its strokes."
+            f"The µ of {friction.strokes} strokes was estimated with a median error of "
+            f"{digits(100 * friction.median_error, 2)} %, {digits(100 * friction.worst_error, 2)} % at worst; "
+            f"{friction.covered} of {friction.intervals} intervals hold the true µ, and those of one subject hold or "
+            "miss together, for the error of a transducer's calibration is one for all its strokes."
         )
     return sentences
 
@@ -64,47 +64,50 @@ def distinctions(study: StudyFindings) -> list[str]:
     """Return what scores can and cannot tell apart."""
     return [
         sentence
-        for one in study.descriptors
-        for kind, rivals in (("by means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
-        for sentence in rivals_sentences(f"{one.descriptor}, {kind}", rivals)
+        for findings in study.descriptors
+        for kind, rivals in (("by means over subjects", findings.rivals_of_means), ("within subjects", findings.rivals))
+        for sentence in rivals_sentences(f"{findings.descriptor}, {kind}", rivals)
     ]
 
 
-def _relation_sentences(one: DescriptorFindings, study: StudyFindings) -> list[str]:
-    name, label = capital(one.descriptor), BY_NAME[study.response].label
+def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> list[str]:
+    name, label = capital(findings.descriptor), BY_NAME[study.response].label
     strain = study.options.prediction.kinematics
-    other = "finite" if strain == "small" else "small"
-    if one.repeated is None:
-        trials = Counter(subject for subject, *_ in one.points)
+    other_strain = "finite" if strain == "small" else "small"
+    if findings.repeated is None:
+        trials = Counter(subject for subject, *_ in findings.points)
         if sum(trials.values()) - len(trials) - 1 < 2:
             return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
         return [f"{name}: no correlation within subjects, in none of whom score and {label} both vary."]
-    r = one.repeated
-    interval = f"no interval from {plural(r.subjects, 'subject')} with two trials or more"
-    if r.people is not None:
-        low, high = map(correlation, r.people)
+    repeated = findings.repeated
+    interval = f"no interval from {plural(repeated.subjects, 'subject')} with two trials or more"
+    if repeated.people is not None:
+        low, high = map(correlation, repeated.people)
         interval = f"95 % interval for other people on these surfaces {low} to {high}"
     return [
         f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
-        f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."
+        f"r = {correlation(repeated.r)}, {interval}; {_otherwise(findings, other_strain)}."
     ]
 
 
-def _otherwise(one: DescriptorFindings, other: str) -> str:
+def _otherwise(findings: DescriptorFindings, other_strain: str) -> str:
     """Return what the same trials give at the other strain, as far as the many paths went there."""
-    usual = next((path.path for path in one.paths if path.usual), None)
-    there = None if usual is None else replace(usual, kinematics=other)
-    alternative = next((path for path in one.paths if path.path == there), None)
+    usual = next((path.path for path in findings.paths if path.usual), None)
+    other_path = None if usual is None else replace(usual, kinematics=other_strain)
+    alternative = next((path for path in findings.paths if path.path == other_path), None)
     if alternative is None:
-        return f"at {other} strain, which was not tried here, the sign may differ"
+        return f"at {other_strain} strain, which was not tried here, the sign may differ"
     trials = plural(alternative.trials, "trial")
     if alternative.within is None or alternative.low is None or alternative.high is None:
-        return f"at {other} strain {trials} of {len(one.points)} had a prediction, too few for a correlation"
+        return (
+            f"at {other_strain} strain {trials} of {len(findings.points)} had a prediction, too few for a correlation"
+        )
     interval = f"{correlation(alternative.low)} to {correlation(alternative.high)}"
-    return f"at {other} strain r = {correlation(alternative.within)} ({interval}) of the {trials} that have one there"
+    r = correlation(alternative.within)
+    return f"at {other_strain} strain r = {r} ({interval}) of the {trials} that have one there"
 
 
-def who(study: StudyFindings) -> list[Fact]:
+def subject_facts(study: StudyFindings) -> list[Fact]:
     """Return who took part."""
     subjects = sorted({visit.subject for visit in study.visits})
     strokers = sorted({visit.subject for visit in study.visits if visit.forces})
@@ -118,15 +121,15 @@ def who(study: StudyFindings) -> list[Fact]:
 
 def exclusion_sentences(study: StudyFindings) -> list[str]:
     """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
-    sentences = [f"Session {name} could not be read, and nothing of it counts: {why}." for name, why in study.failed]
+    sentences = [f"Session {name} could not be read, and nothing of it counts: {text}." for name, text in study.failed]
     sentences += [
         f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
         for session, first in study.copies
     ]
     sentences += [
-        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {full_stop(one.why)}"
-        for one in study.excluded
-        if _fits(study, one)
+        f"Subject {exclusion.subject}: {_trials_of(exclusion)} left out by {exclusion.who}: {full_stop(exclusion.why)}"
+        for exclusion in study.excluded
+        if _fits(study, exclusion)
     ]
     return [*sentences, *_decision_sentences(study, leaving_out=True), *_trials_without_sed(study)]
 
@@ -134,7 +137,11 @@ def exclusion_sentences(study: StudyFindings) -> list[str]:
 def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]:
     """Return the decisions about strokes that leave one out, or all others."""
     decisions = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
-    return [f"Session {name}: {full_stop(one)}" for name, one in decisions if (" is left out: " in one) == leaving_out]
+    return [
+        f"Session {name}: {full_stop(decision)}"
+        for name, decision in decisions
+        if (" is left out: " in decision) == leaving_out
+    ]
 
 
 NO_TRIAL = "has no trial of an experiment, as an imported table has none, and counts nothing"
@@ -161,14 +168,14 @@ def remarks(study: StudyFindings) -> list[str]:
         f"Scored in more than one session: {_first_few(several)}. In means a surface has the subject's mean score; "
         "within subjects every trial counts. Two people under one code would look the same."
     ] * bool(several)
-    for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
-        places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
-        sentences += [f"{words}: {_first_few(places)}."] if places else []
+    for outcome, opening in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
+        trials = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
+        sentences += [f"{opening}: {_first_few(trials)}."] if trials else []
     sentences += [
-        f"A decision of {one.who} leaves out {_whats(one)} of subject {one.subject} ({one.why}), and no session read "
-        "has such trials; see exclusions.toml."
-        for one in study.excluded
-        if not _fits(study, one)
+        f"A decision of {exclusion.who} leaves out {_trials_of(exclusion)} of subject {exclusion.subject} "
+        f"({exclusion.why}), and no session read has such trials; see exclusions.toml."
+        for exclusion in study.excluded
+        if not _fits(study, exclusion)
     ]
     sentences += [
         f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); the scale may have been "
@@ -191,10 +198,10 @@ def _meshes(study: StudyFindings) -> list[str]:
         f"differ for its mesh alone by as much as its estimated error, {_range_of(errors)} of it."
     )
     spreads = [
-        s.response.sd / s.response.mean
-        for one in study.descriptors
-        for s in one.surfaces
-        if s.response is not None and s.response.sd and study.response == SED.name  # whose errors these are
+        surface.response.sd / surface.response.mean
+        for findings in study.descriptors
+        for surface in findings.surfaces
+        if surface.response is not None and surface.response.sd and study.response == SED.name  # whose errors these are
     ]
     if spreads:
         sentence += (
@@ -208,13 +215,14 @@ def _range_of(shares: Sequence[float]) -> str:
     return f"{significant(100 * min(shares), 2)} to {significant(100 * max(shares), 2)} %"
 
 
-def _whats(one: Exclusion) -> str:
-    return f"trials on {one.descriptor}" if one.descriptor else "every trial"
+def _trials_of(exclusion: Exclusion) -> str:
+    return f"trials on {exclusion.descriptor}" if exclusion.descriptor else "every trial"
 
 
-def _fits(study: StudyFindings, one: Exclusion) -> bool:
+def _fits(study: StudyFindings, exclusion: Exclusion) -> bool:
     """Say whether some session has a trial that a decision leaves out."""
-    return any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows)
+    rows = chain.from_iterable(visit.rows for visit in study.visits if visit.subject == exclusion.subject)
+    return any(exclusion.descriptor in ("", row.descriptor) for row in rows)
 
 
 def _trials_without_sed(study: StudyFindings) -> list[str]:
@@ -226,15 +234,17 @@ def _trials_without_sed(study: StudyFindings) -> list[str]:
         for row in (visit.rows if visit.forces else ())
         if row.sed is None and row.why and row.outcome != "open"
     )
-    for places in alike.values():
-        names, reasons = _first_few([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
-        why = f"{'' if len(reasons) == 1 else 'of the first: '}{full_stop(reasons[0])}"
-        sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({names}): {why}")
+    for trials in alike.values():
+        names, reasons = _first_few([trial for trial, _ in trials]), list(dict.fromkeys(reason for _, reason in trials))
+        reason = f"{'' if len(reasons) == 1 else 'of the first: '}{full_stop(reasons[0])}"
+        sentences.append(f"The model gives no SED for {plural(len(trials), 'trial')} ({names}): {reason}")
     return sentences
 
 
-def _first_few(places: Sequence[str]) -> str:
-    return ", ".join(places[:_FEW]) + (f" and {len(places) - _FEW} more" if len(places) > _FEW else "")
+def _first_few(names: Sequence[str]) -> str:
+    return ", ".join(names[:_MOST_NAMED]) + (
+        f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    )
 
 
 def seal_sentence(study: StudyFindings) -> str:
@@ -252,13 +262,13 @@ def model_facts(study: StudyFindings) -> list[Fact]:
     facts: list[Fact] = []
     for name, pairs in effects.items():
         values = by_key(((value, remark), session) for (value, remark), session in pairs)
-        for (value, remark), sessions in list(values.items())[:_FEW]:
-            whose = "" if len(values) == 1 else f"in {_first_few(sessions)}"
-            facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))
+        for (value, remark), sessions in list(values.items())[:_MOST_NAMED]:
+            sessions_text = "" if len(values) == 1 else f"in {_first_few(sessions)}"
+            facts.append(Fact(name, value, "; ".join(text for text in (remark, sessions_text) if text)))
     return facts
 
 
-def again(study: StudyFindings) -> list[Fact]:
+def reproduction_facts(study: StudyFindings) -> list[Fact]:
     """Return what the numbers were made with: options, versions, and the hash of each recording."""
     model = study.options.prediction
     facts = [
@@ -279,11 +289,11 @@ def command(study: StudyFindings, name: str) -> str:
     options = study.options
     model = options.prediction
     usual = model.kinematics == "small"  # see 'daq-app study --intervals'
-    words = ["daq-app", "study", shlex.quote(name)]
+    arguments = ["daq-app", "study", shlex.quote(name)]
     if study.synthetic is not None:
-        words = ["daq-app", "study", "--synthetic", str(study.synthetic), "--out", shlex.quote(name)]
-    words += [*model_words(model), *area_words(options.area), *calibration_words(options.gain_error)]
-    words += [] if study.response == SED.name else ["--quantity", study.response]
-    words += [] if model.intervals == usual else ["--intervals" if model.intervals else "--no-intervals"]
-    words += {"none": [], "small": ["--paths"], "finite": ["--paths", "finite"]}[options.paths]
-    return " ".join(words)
+        arguments = ["daq-app", "study", "--synthetic", str(study.synthetic), "--out", shlex.quote(name)]
+    arguments += [*model_arguments(model), *area_arguments(options.area), *calibration_arguments(options.gain_error)]
+    arguments += [] if study.response == SED.name else ["--quantity", study.response]
+    arguments += [] if model.intervals == usual else ["--intervals" if model.intervals else "--no-intervals"]
+    arguments += {"none": [], "small": ["--paths"], "finite": ["--paths", "finite"]}[options.paths]
+    return " ".join(arguments)

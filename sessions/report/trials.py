@@ -62,9 +62,11 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
 def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
     """Return what the subject answered to each trial, in their order."""
     return tuple(
-        AnswerFinding(of.number, of.block, of.stimulus.index, of.stimulus.code, record.outcome, record.answer)
+        AnswerFinding(
+            trial.number, trial.block, trial.stimulus.index, trial.stimulus.code, record.outcome, record.answer
+        )
         for record in recording.trials
-        for of in (record.trial,)
+        for trial in (record.trial,)
         if record.answer is not None
     )
 
@@ -77,7 +79,9 @@ def flaws(analysis: Analysis) -> tuple[Fact, ...]:
             return f"stroke {flaw.stroke + 1}"
         return "whole recording" if flaw.trial is None else f"trial {flaw.trial}"
 
-    return tuple(Fact(one.name.replace("_", " "), one.sentence, f"{where(one)}: {one.grade}") for one in analysis.flaws)
+    return tuple(
+        Fact(flaw.name.replace("_", " "), flaw.sentence, f"{where(flaw)}: {flaw.grade}") for flaw in analysis.flaws
+    )
 
 
 def course(recording: Recording) -> Course | None:
@@ -141,9 +145,9 @@ def _extremes(values: Array) -> Indices:
     edges = np.linspace(0, n, STRETCHES + 1).astype(np.int64)
     positions = {0, n - 1}
     for start, stop in itertools.pairwise(edges.tolist()):
-        piece = values[start:stop]
-        if not np.isnan(piece).all():
-            positions |= {start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))}
+        stretch = values[start:stop]
+        if not np.isnan(stretch).all():
+            positions |= {start + int(np.nanargmin(stretch)), start + int(np.nanargmax(stretch))}
     return np.array(sorted(positions))
 
 
@@ -157,7 +161,7 @@ def predictions(
     """Return a finding for each trial, or stroke where there are none; the session did not come to trials `undone`."""
     if prediction is None:
         return ()
-    rates = {one.trial: one for one in firings}
+    rates = {firing.trial: firing for firing in firings}
     rows = (
         replace(row, reasons=dict.fromkeys(row.reasons, "The trial was not done.")) if row.trial in undone else row
         for row in prediction.trials
@@ -206,7 +210,7 @@ def omissions(session: SessionPrediction | None) -> tuple[Fact, ...]:
     """Return the effects that the model omits, how much each may change the SED, and how that was estimated."""
     rows = () if session is None else session.trials
     solutions = [row.prediction for row in rows if row.prediction is not None]
-    by_effect = by_key(item for prediction in solutions for item in prediction.model.get("left_out", {}).items())
+    by_effect = by_key(effect for prediction in solutions for effect in prediction.model.get("left_out", {}).items())
     # Sentences that differ in their numbers only stand together.
     sentences = (sentence for prediction in solutions for sentence in prediction.warnings)
     warnings = by_key((_NUMBER.sub("#", sentence), sentence) for sentence in sentences)
@@ -215,17 +219,17 @@ def omissions(session: SessionPrediction | None) -> tuple[Fact, ...]:
         *(
             Fact(
                 "warning",
-                max(same, key=lambda sentence: [float(number.group()) for number in _NUMBER.finditer(sentence)]),
-                f"the greatest numbers of {plural(len(same), 'trial')} with this warning",
+                max(variants, key=lambda sentence: [float(number.group()) for number in _NUMBER.finditer(sentence)]),
+                f"the greatest numbers of {plural(len(variants), 'trial')} with this warning",
             )
-            for same in warnings.values()
+            for variants in warnings.values()
         ),
     )
 
 
 def finding_of(row: TrialPrediction, firing: Firing | None = None) -> PredictionFinding:
     """Return the finding of one trial, with the rates of an afferent where it was computed."""
-    reasons = {name: row.reasons[other] for name, other in _FROM_ROW.items() if other in row.reasons}
+    reasons = {name: row.reasons[origin] for name, origin in _FROM_ROW.items() if origin in row.reasons}
     numbers: dict[str, Any] = {
         "stroke": None if row.stroke is None else row.stroke + 1,
         "experiment": row.block or "",
@@ -268,8 +272,8 @@ def _share(entries: Sequence[Mapping[str, Any]]) -> str:
     percentages = [100 * entry["estimate"] for entry in entries if entry["estimate"] is not None]
     if not percentages:
         return NO_ESTIMATE
-    ends = dict.fromkeys((_plain(min(percentages)), _plain(max(percentages))))
-    return f"{' to '.join(ends)} % of the SED"
+    limits = dict.fromkeys((_plain(min(percentages)), _plain(max(percentages))))
+    return f"{' to '.join(limits)} % of the SED"
 
 
 def _plain(value: float) -> str:

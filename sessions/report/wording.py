@@ -138,9 +138,9 @@ def plural(n: int, noun: str, several: str = "") -> str:
     return f"{n} {noun if n == 1 else several or noun + 's'}"
 
 
-def capital(words: str) -> str:
+def capital(text: str) -> str:
     """Return words as they begin a sentence."""
-    return words[:1].upper() + words[1:]
+    return text[:1].upper() + text[1:]
 
 
 def full_stop(sentence: str) -> str:
@@ -196,7 +196,7 @@ class ShownResponse:
         """
         return digits(number, self.places) + ("" if self.unit == "1" else f" {self.unit}")
 
-    def of(self, prediction: PredictionFinding) -> Numbers | None:
+    def numbers(self, prediction: PredictionFinding) -> Numbers | None:
         """Return a prediction's number in the kept unit, and its error where it has one; None without one."""
         if self.name == SED.name:
             error = prediction.error_estimate
@@ -208,17 +208,17 @@ class ShownResponse:
         value, error = prediction.responses[self.name]
         return (value, error) if math.isfinite(error) else (value,)
 
-    def ends(self, prediction: PredictionFinding) -> Ends | None:
+    def interval(self, prediction: PredictionFinding) -> Ends | None:
         """Return the 95 % interval that friction makes of a prediction, in the kept unit; None where there is none."""
-        interval = prediction.interval
-        if self.name != SED.name or interval is None or prediction.doubt:
+        sed_interval = prediction.interval
+        if self.name != SED.name or sed_interval is None or prediction.doubt:
             return None
-        return bounds(interval.low, interval.high)
+        return bounds(sed_interval.low, sed_interval.high)
 
 
 def shown_response(name: str) -> ShownResponse:
     """Return how texts describe the quantity of that name; the names are those of `solver.quantities`."""
-    one = BY_NAME[name]
-    unit, factor = one.shown_unit
+    quantity = BY_NAME[name]
+    unit, factor = quantity.shown_unit
     places, step = (3, "Pa") if unit == "kPa" else (4, "10⁻⁶")
-    return ShownResponse(one.name, one.label, one.unit, unit, factor, places, step)
+    return ShownResponse(quantity.name, quantity.label, quantity.unit, unit, factor, places, step)

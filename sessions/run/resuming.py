@@ -176,8 +176,7 @@ class Seam:
             return Seam(0, 0.0)
         gap_s = max(int(after.received_ns[0]) - int(before.received_ns[-1]), LEAST_GAP_NS) * 1e-9
         return Seam(
-            int(before.sequence[-1]) + 1 - int(after.sequence[0]),
-            float(before.time[-1]) + gap_s - float(after.time[0]),
+            int(before.sequence[-1]) + 1 - int(after.sequence[0]), float(before.time[-1]) + gap_s - float(after.time[0])
         )
 
     def join(self, block: ReadingBlock) -> ReadingBlock:

@@ -295,7 +295,7 @@ def _contents():
         ),
         "modelled": (Fact("plane strain", "unit thickness"),),
         "left_out": (Fact("viscosity", "no constants are known"),),
-        "again": (Fact("seed", "7"),),
+        "reproduction": (Fact("seed", "7"),),
         "commands": ("daq-app analyse P01-forces", "daq-app report P01-forces -o report.html"),
         "width": 15.0,
         "interval_kind": "95 % percentile interval of made-up repeats",
@@ -305,8 +305,6 @@ def _contents():
 
 def bare(**changes):
     """A report without pictures, which is quick to write."""
-    empty = {
-        name: ()
-        for name in ("experiments", "strokes", "predictions", "fields", "ground_truth", "flaws", "excluded", "again")
-    }
+    lists = ("experiments", "strokes", "predictions", "fields", "ground_truth", "flaws", "excluded", "reproduction")
+    empty = dict.fromkeys(lists, ())
     return example(**{**empty, "course": None, **changes})

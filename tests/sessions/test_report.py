@@ -205,7 +205,7 @@ def test_another_quantity_than_the_sed_is_held_against_scores_in_figure_table_an
     assert slippery.index_relation.pearson <= -0.8
     shear = {row.trial: row.prediction.responses["shear_along_skin"].value for row in prediction.trials}
     response = shown_response("shear_along_skin")
-    assert [response.of(p)[0] for p in report.predictions] == [shear[p.trial] for p in report.predictions]
+    assert [response.numbers(p)[0] for p in report.predictions] == [shear[p.trial] for p in report.predictions]
     assert any("shear along the skin predicted" in sentence for sentence in summary(report))
     assert "shear along the skin" in relation_table(report).caption
     assert any("--quantity shear_along_skin" in line for line in report.commands)

@@ -46,8 +46,8 @@ def picture(report: Report, plate: str, experiment: str | None = None) -> Panel 
 
 def _plate(report: Report, name: str) -> Plate:
     model = f" Model: {report.model}." if report.model and name in _OF_THE_MODEL else ""
-    words = caption(f"figure-{name}", label=shown_response(report.response).label)
-    return plate(name, words + model, _PANELS[name](report))
+    caption_text = caption(f"figure-{name}", label=shown_response(report.response).label)
+    return plate(name, caption_text + model, _PANELS[name](report))
 
 
 def _of_strokes(*quantities: StrokeQuantity) -> Callable[[Report], Panels]:

@@ -34,48 +34,48 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...]) -> Panel:
     """Return both forces against time; strokes are grey bands with their number."""
     picture = sheet(672, 270, (1.0, 1.0), share_x=True)
     upper, lower = picture.axes
-    first, last = (float(course.time[0]), float(course.time[-1])) if len(course.time) else (0.0, 1.0)
+    begin, end = (float(course.time[0]), float(course.time[-1])) if len(course.time) else (0.0, 1.0)
     for axes, values, colour, name in (
         (upper, course.normal, SKY, "normal force"),
         (lower, course.tangential, VERMILLION, "tangential force"),
     ):
         for stroke in strokes:
-            begin, end = _ends(stroke, first, last)
-            text = f"stroke {stroke.number}: {begin:.3f} s to {end:.3f} s"
-            axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=picture.note(text))
+            onset, lift = _ends(stroke, begin, end)
+            text = f"stroke {stroke.number}: {onset:.3f} s to {lift:.3f} s"
+            axes.axvspan(onset, lift, color=PALE, alpha=0.6, linewidth=0, gid=picture.note(text))
         axes.plot(course.time, values, color=colour, linewidth=0.8)
         axes.axhline(0.0, color=GREY, linewidth=0.4)
-        axes.set(ylabel=f"{name}\n[N]", xlim=(first, last if last > first else first + 1.0))
+        axes.set(ylabel=f"{name}\n[N]", xlim=(begin, end if end > begin else begin + 1.0))
         axes.margins(y=0.08)
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time on the device's clock [s]")
-    for stroke, middle in _strokes_with_room(strokes, first, last):
+    for stroke, middle in _strokes_with_room(strokes, begin, end):
         _mark(upper, str(stroke.number), (middle, 1.0), (0, 2), ha="center", va="bottom", color=INK, fontsize=7.5)
     header = ("time [s]", "normal force [N]", "tangential force [N]")
     rows = rows_of(course.time, course.normal, course.tangential)
     return picture.panel("course", "Normal and tangential force over the whole recording", header, rows)
 
 
-def _mark(axes: Axes, text: str, at: tuple[float, float], off: tuple[float, float], **look: Any) -> None:  # noqa: ANN401 - matplotlib's
+def _mark(axes: Axes, text: str, position: tuple[float, float], off: tuple[float, float], **look: Any) -> None:  # noqa: ANN401 - matplotlib's
     """Write beside an instant and a share of the axes' height, `off` in points."""
-    axes.annotate(text, at, off, ("data", "axes fraction"), "offset points", **look)
+    axes.annotate(text, position, off, ("data", "axes fraction"), "offset points", **look)
 
 
 def _strokes_with_room(
-    strokes: tuple[StrokeFinding, ...], first: float, last: float
+    strokes: tuple[StrokeFinding, ...], begin: float, end: float
 ) -> list[tuple[StrokeFinding, float]]:
     """Return the strokes whose number has room in the figure, each with its middle [s]."""
-    room = 0.025 * (last - first)
+    room = 0.025 * (end - begin)
     with_room: list[tuple[StrokeFinding, float]] = []
     for stroke in strokes:
-        middle = sum(_ends(stroke, first, last)) / 2
+        middle = sum(_ends(stroke, begin, end)) / 2
         if not with_room or middle - with_room[-1][1] >= room:
             with_room.append((stroke, middle))
     return with_room
 
 
-def _ends(stroke: StrokeFinding, first: float, last: float) -> tuple[float, float]:
-    return first if stroke.onset is None else stroke.onset, last if stroke.lift is None else stroke.lift
+def _ends(stroke: StrokeFinding, begin: float, end: float) -> tuple[float, float]:
+    return begin if stroke.onset is None else stroke.onset, end if stroke.lift is None else stroke.lift
 
 
 MOST_LABELLED = 12  # more curves in one picture cannot be distinguished by labels
@@ -103,42 +103,42 @@ SPEED_COURSE = StrokeQuantity(
 )
 
 
-def stroke_panel(of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str) -> Panel | None:
+def stroke_panel(quantity: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str) -> Panel | None:
     """Return a quantity of an experiment's strokes since contact, None without curves; refused speeds stay out."""
-    if of is SPEED_COURSE:
+    if quantity is SPEED_COURSE:
         strokes = [stroke for stroke in strokes if stroke.speed is not None]
     picture = sheet(328, 290)
     (axes,) = picture.axes
-    axes.set(title=experiment, ylabel=of.axis)
-    rows = _draw(picture, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
+    axes.set(title=experiment, ylabel=quantity.axis)
+    rows = _draw(picture, quantity, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
     if not rows:
         return None
-    if of is SPEED_COURSE:
+    if quantity is SPEED_COURSE:
         fastest = max(stroke.speed for stroke in strokes if stroke.speed is not None and stroke.trace is not None)
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))
-    name = f"{of.name}-{experiment}" if experiment else of.name
-    title = f"{of.values} against time, {experiment or 'all strokes'}"
-    header = ("stroke", "index", "time since contact [s]", of.column, "in steady window")
+    name = f"{quantity.name}-{experiment}" if experiment else quantity.name
+    title = f"{quantity.values} against time, {experiment or 'all strokes'}"
+    header = ("stroke", "index", "time since contact [s]", quantity.column, "in steady window")
     return picture.panel(name, title, header, rows)
 
 
 Row = tuple[int, int | None, float, float, int]
 
 
-def _draw(picture: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
+def _draw(picture: Sheet, quantity: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
     """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
     (axes,) = picture.axes
     in_order = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
     rows: list[Row] = []
     labels: list[Label] = []
-    for (stroke, trace), shade in zip(in_order, shades(of.colour, max(len(in_order), 1)), strict=False):
-        values: Array = getattr(trace, of.values)
-        first, last = stroke.steady or (math.inf, -math.inf)
-        inside = (first <= trace.origin + trace.time) & (trace.origin + trace.time <= last)
-        level: float | None = getattr(stroke, of.level)
+    for (stroke, trace), shade in zip(in_order, shades(quantity.colour, max(len(in_order), 1)), strict=False):
+        values: Array = getattr(trace, quantity.values)
+        begin, end = stroke.steady or (math.inf, -math.inf)
+        inside = (begin <= trace.origin + trace.time) & (trace.origin + trace.time <= end)
+        level: float | None = getattr(stroke, quantity.level)
         text = f"stroke {stroke.number}" + ("" if stroke.index is None else f", index {stroke.index}")
-        text += f", {of.word} {level:.3g} over the steady window" if level is not None else ""
+        text += f", {quantity.word} {level:.3g} over the steady window" if level is not None else ""
         style = "solid" if level is not None else (0, (3, 2))
         axes.plot(trace.time, values, color=shade, linewidth=0.7, linestyle=style, gid=picture.note(text))
         axes.plot(trace.time, np.where(inside, values, np.nan), color=shade, linewidth=2.2, solid_capstyle="butt")
@@ -147,8 +147,8 @@ def _draw(picture: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFindi
         rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in points]
         if valid.any():
             last_valid = np.flatnonzero(valid & inside if (valid & inside).any() else valid)[-1]
-            at = float(trace.time[last_valid]), float(values[last_valid])
-            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at))
+            point = float(trace.time[last_valid]), float(values[last_valid])
+            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *point))
     axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
     if rows:  # from 0 on where nothing lies below
         greatest = [v for _, _, _, v, _ in rows]
@@ -171,36 +171,36 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str) -> Panel
     if not courses:
         return None
     picture = sheet(328, 420, (1.0, 1.25))
-    whole, sliding = picture.axes
+    complete, sliding = picture.axes
     labels: list[Label] = []
     rows: list[tuple[int | None, int | None, float, float]] = []
     sliding_values: list[float] = []
-    kind = "stroke" if courses[0][0].index is None else "index"
-    end = max(float(history.time[-1]) for _, history in courses)
+    label_kind = "stroke" if courses[0][0].index is None else "index"
+    last_time = max(float(history.time[-1]) for _, history in courses)
     for (prediction, history), shade in zip(courses, shades(GREEN, len(courses)), strict=True):
         kilopascal = 1e3 * history.sed_ending
         label = str(prediction.stroke if prediction.index is None else prediction.index)
-        text = f"{kind} {label}: {kilopascal[-1]:.3f} kPa in the end"
+        text = f"{label_kind} {label}: {kilopascal[-1]:.3f} kPa in the end"
         for axes in picture.axes:
             axes.plot(history.time, kilopascal, color=shade, linewidth=1.2, gid=picture.note(text))
-            if history.time[-1] < end:  # settled: it stays
-                rest = [history.time[-1], end], [kilopascal[-1]] * 2
-                axes.plot(*rest, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
-        labels.append(Label(label, end, float(kilopascal[-1])))
+            if history.time[-1] < last_time:  # settled: it stays
+                plateau = [history.time[-1], last_time], [kilopascal[-1]] * 2
+                axes.plot(*plateau, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
+        labels.append(Label(label, last_time, float(kilopascal[-1])))
         course = zip(history.time.tolist(), history.sed_ending.tolist(), strict=True)
         rows += [(prediction.trial, prediction.index, *instant) for instant in course]
         sliding_values += kilopascal[history.time >= PRESS_DURATION].tolist()
-    whole.axvline(PRESS_DURATION, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
-    whole.set_ylim(0.0, 1.25 * max(row[3] for row in rows) * 1e3)
-    for text, offset, side in (("pressing", -4, "right"), ("sliding", 4, "left")):
-        _mark(whole, text, (PRESS_DURATION, 0.98), (offset, 0), ha=side, va="top", color=GREY)
-    whole.set_title(name)
-    sliding.set_xlim(PRESS_DURATION, end)
+    complete.axvline(PRESS_DURATION, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
+    complete.set_ylim(0.0, 1.25 * max(row[3] for row in rows) * 1e3)
+    for text, offset, alignment in (("pressing", -4, "right"), ("sliding", 4, "left")):
+        _mark(complete, text, (PRESS_DURATION, 0.98), (offset, 0), ha=alignment, va="top", color=GREY)
+    complete.set_title(name)
+    sliding.set_xlim(PRESS_DURATION, last_time)
     low, high = min(sliding_values), max(sliding_values)
     margin = 0.06 * (high - low or high)
     sliding.set(ylim=(low - margin, high + margin), ylabel="SED while sliding [kPa]", xlabel="time [s]")
-    whole.set(xlim=(0.0, end), ylabel="SED [kPa]")
-    label_right(picture, sliding, labels, kind)
+    complete.set(xlim=(0.0, last_time), ylabel="SED [kPa]")
+    label_right(picture, sliding, labels, label_kind)
     title = f"Predicted response in time, {name or 'all strokes'}"
     name = f"response-{name}" if name else "response"
     return picture.panel(name, title, ("trial", "index", "time [s]", "SED [MPa]"), rows)

@@ -27,7 +27,7 @@ _ARROW: dict[str, Any] = {
     **{"width": 0.045, "headwidth": 4.0, "headlength": 5.0, "headaxislength": 4.5},
 }
 _STYLE = {"slip": "solid", "cap": (0, (4, 1.2)), "stick": (0, (1, 1))}
-_WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
+_STATE_LABELS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
 
 
 def finger_panels(field: Field, levels: tuple[float, ...]) -> tuple[Panel, Panel]:
@@ -52,14 +52,14 @@ def finger_panels(field: Field, levels: tuple[float, ...]) -> tuple[Panel, Panel
         picture.axes[0].set(xlabel="along the surface, proximal to distal [mm]", ylabel="above the surface [mm]")
         picture.axes[0].set_title(f"{field.experiment}, index {field.index}")
     stem = f"finger-{field.experiment}-{field.index}"
-    of = f"index {field.index} of {field.experiment}"
+    subject = f"index {field.index} of {field.experiment}"
     skin, header = field.skin, ("x [mm]", "y [mm]", "SED [MPa]")
     contact_rows = zip(rows_of(skin.x, skin.gap, skin.pressure, skin.traction), skin.state, strict=True)
     of_contact = ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state")
     rows = ((*row, state) for row, state in contact_rows)
     return (
-        whole.panel(stem, f"Strain-energy density in the finger, {of}", header, rows_of(x, y, field.finger.sed)),
-        close.panel(f"{stem}-contact", f"Contact and receptor, {of}", of_contact, rows),
+        whole.panel(stem, f"Strain-energy density in the finger, {subject}", header, rows_of(x, y, field.finger.sed)),
+        close.panel(f"{stem}-contact", f"Contact and receptor, {subject}", of_contact, rows),
     )
 
 
@@ -125,8 +125,8 @@ def _name_layers(axes: Axes, field: Field) -> None:
         return  # the outlines have no points in common that would lie across the layers
     line = {"arrowstyle": "-", "color": INK, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
     for row, (name, outer, inner) in enumerate(zip(("epidermis", "dermis", "fat"), lines[:-1], lines[1:], strict=True)):
-        at = int((0.88 - 0.04 * row) * len(outer))
-        middle, text = tuple((outer[at] + inner[at]) / 2), (0.75, 0.95 - 0.1 * row)
+        index = int((0.88 - 0.04 * row) * len(outer))
+        middle, text = tuple((outer[index] + inner[index]) / 2), (0.75, 0.95 - 0.1 * row)
         axes.annotate(name, middle, text, textcoords="axes fraction", ha="left", va="center", arrowprops=line)
 
 
@@ -164,11 +164,18 @@ def _states(axes: Axes, field: Field) -> None:
     for state, run in itertools.groupby(range(len(states)), key=lambda i: states[i]):
         if state == "open":
             continue
-        places = field.skin.x[list(run)].tolist()
+        positions = field.skin.x[list(run)].tolist()
         level = -LONGEST_ARROW - 0.35
-        axes.plot([places[0], places[-1]], [level, level], color=GREY, linewidth=1.6, linestyle=_STYLE[state])
-        if places[-1] - places[0] > 0.16 * len(_WORDS[state]):
-            axes.text((places[0] + places[-1]) / 2, level - 0.12, _WORDS[state], ha="center", va="top", fontsize=7.5)
+        axes.plot([positions[0], positions[-1]], [level, level], color=GREY, linewidth=1.6, linestyle=_STYLE[state])
+        if positions[-1] - positions[0] > 0.16 * len(_STATE_LABELS[state]):
+            axes.text(
+                (positions[0] + positions[-1]) / 2,
+                level - 0.12,
+                _STATE_LABELS[state],
+                ha="center",
+                va="top",
+                fontsize=7.5,
+            )
 
 
 def _nice(value: float) -> float:

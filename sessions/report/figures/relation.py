@@ -28,13 +28,13 @@ from sessions.report.figures.style import (
     plate,
     sheet,
 )
-from sessions.report.tables.rivals import rival_words
+from sessions.report.tables.rivals import rival_title
 from sessions.report.tables.study_models import study_model
 from sessions.report.wording import ShownResponse, caption, correlation, plural, shown_response, spread_share
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.multiverse import CHOICE_LABELS, CHOICES, PathFinding, by_choice, correlations
-from sessions.statistics.scores import MeanScore
+from sessions.statistics.scores import MeanScore, by_key
 
 _TICKS = [0, 20, 40, 60, 80, 100]  # of a scale of scores
 
@@ -47,10 +47,10 @@ def score_panel(findings: Experiment | DescriptorFindings) -> Panel | None:
     picture = sheet(328, 280)
     (axes,) = picture.axes
     axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
-    places = [index - 3.0 for index in findings.indices]
+    positions = [index - 3.0 for index in findings.indices]
     for scores in findings.answers.values():
-        own = [math.nan if score is None else score for score in scores]
-        axes.plot(places, own, "o", ms=2, color=GREY, alpha=0.55, mew=0)
+        subject_scores = [math.nan if score is None else score for score in scores]
+        axes.plot(positions, subject_scores, "o", ms=2, color=GREY, alpha=0.55, mew=0)
     for mean in findings.scores:
         _draw_mean(picture, axes, mean)
     low = min([-4.0, *(m.low - 2 for m in findings.scores if m.low is not None)])
@@ -68,69 +68,70 @@ def _draw_mean(picture: Sheet, axes: Axes, mean: MeanScore) -> None:
     text = f"index {mean.index}: mean {mean.mean:.1f}, {plural(mean.n, 'subject')}"
     if mean.low is not None and mean.high is not None:
         text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
-        ends = [[mean.mean - mean.low], [mean.high - mean.mean]]
-        axes.errorbar(mean.index, mean.mean, yerr=ends, color=INK, linewidth=1.1, capsize=3, capthick=0.8)
+        errors = [[mean.mean - mean.low], [mean.high - mean.mean]]
+        axes.errorbar(mean.index, mean.mean, yerr=errors, color=INK, linewidth=1.1, capsize=3, capthick=0.8)
     axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=picture.note(text))
 
 
 def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     """Return the figures a study has numbers for, in their order."""
     quantity = shown_response(study.response)
-    words = caption("figure-study-relation", label=quantity.label, model=study_model(study))
-    paths = (paths_panel(one.descriptor, one.paths, quantity.label) for one in study.descriptors)
+    caption_text = caption("figure-study-relation", label=quantity.label, model=study_model(study))
+    relations = (_relation(findings, quantity) for findings in study.descriptors if findings.points)
+    paths = (paths_panel(findings.descriptor, findings.paths, quantity.label) for findings in study.descriptors)
     with look(simulated=bool(study.simulated)):
         plates = (
-            plate("relation", words, (_relation(one, quantity) for one in study.descriptors if one.points)),
+            plate("relation", caption_text, relations),
             plate("scores", caption("figure-scores"), map(score_panel, study.descriptors)),
             plate("paths", caption("figure-paths"), paths),
         )
     return tuple(plate for plate in plates if plate.panels)
 
 
-_MOST = 400  # points that tell their values each on their own
+_MOST_HOVERING = 400  # points that tell their values each on their own
 
 
-def _relation(one: DescriptorFindings, quantity: ShownResponse) -> Panel:
+def _relation(findings: DescriptorFindings, quantity: ShownResponse) -> Panel:
     picture = sheet(328, 280)
     (axes,) = picture.axes
-    each = len(one.points) <= _MOST  # of more points only hovering names the subject
-    for subject in dict.fromkeys(point[0] for point in one.points):
-        own = sorted((quantity.factor * value, score, index) for of, index, value, score in one.points if of == subject)
-        axes.plot([x for x, _, _ in own], [y for _, y, _ in own], "-", color=GREY, alpha=0.35, linewidth=0.7)
-        for x, y, index in own if each else ():
-            words = f"subject {subject}, index {index}: {quantity.label} {quantity.text(x)}, score {y:.1f}"
-            axes.plot(x, y, "o", color=GREY, markersize=2, gid=picture.note(words))
-        if not each:
-            dots = [x for x, _, _ in own], [y for _, y, _ in own]
+    separate = len(findings.points) <= _MOST_HOVERING  # of more points only hovering names the subject
+    by_subject = by_key((subject, (quantity.factor * value, y, index)) for subject, index, value, y in findings.points)
+    for subject, points in by_subject.items():
+        dots = [x for x, _, _ in sorted(points)], [y for _, y, _ in sorted(points)]
+        axes.plot(*dots, "-", color=GREY, alpha=0.35, linewidth=0.7)
+        for x, y, index in sorted(points) if separate else ():
+            text = f"subject {subject}, index {index}: {quantity.label} {quantity.text(x)}, score {y:.1f}"
+            axes.plot(x, y, "o", color=GREY, markersize=2, gid=picture.note(text))
+        if not separate:
             axes.plot(*dots, "o", color=GREY, markersize=2, gid=picture.note(f"subject {subject}"))
-    means = {mean.index: mean for mean in one.scores}
-    for surface in one.surfaces:
+    means = {mean.index: mean for mean in findings.scores}
+    for surface in findings.surfaces:
         response, mean = surface.response, means.get(surface.index)
         if response is not None and mean is not None:
             x, y = quantity.factor * response.mean, mean.mean
-            words = f"index {surface.index}: mean {quantity.label} {quantity.text(x)}, mean score {y:.1f}"
-            axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=picture.note(words))
+            text = f"index {surface.index}: mean {quantity.label} {quantity.text(x)}, mean score {y:.1f}"
+            axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=picture.note(text))
             if response.low is not None and response.high is not None:
-                ends = [quantity.factor * response.low, quantity.factor * response.high]
-                axes.plot(ends, [y, y], color=GREEN, linewidth=0.9, zorder=2)
+                limits = [quantity.factor * response.low, quantity.factor * response.high]
+                axes.plot(limits, [y, y], color=GREEN, linewidth=0.9, zorder=2)
             if mean.low is not None and mean.high is not None:
                 axes.plot([x, x], [mean.low, mean.high], color=GREEN, linewidth=0.9, zorder=2)
             axes.annotate(str(surface.index), (x, y), xytext=(5, 4), textcoords="offset points", zorder=4)
     axes.set(ylim=(-4, 109), yticks=_TICKS)
-    axes.set(xlabel=f"predicted {quantity.label} [{quantity.unit}]", ylabel=f"score of {one.descriptor} [0–100]")
-    within = "" if one.repeated is None else f": within subjects r = {correlation(one.repeated.r)}"
-    axes.set_title(f"{one.descriptor}{within}\n{rival_words(one.rivals)}".strip())
-    name, title = f"study-relation-{one.descriptor}", f"Score of {one.descriptor} against predicted {quantity.label}"
+    axes.set(xlabel=f"predicted {quantity.label} [{quantity.unit}]", ylabel=f"score of {findings.descriptor} [0–100]")
+    within = "" if findings.repeated is None else f": within subjects r = {correlation(findings.repeated.r)}"
+    axes.set_title(f"{findings.descriptor}{within}\n{rival_title(findings.rivals)}".strip())
+    title = f"Score of {findings.descriptor} against predicted {quantity.label}"
     header = ("subject", "index", f"{quantity.label} [{quantity.kept_unit}]", "score")
-    return picture.panel(name, title, header, one.points)
+    return picture.panel(f"study-relation-{findings.descriptor}", title, header, findings.points)
 
 
 def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFinding]) -> Panel | None:
     """Return the experiment's response against mean score with both errors, their line, r, its interval and n."""
     means = {mean.index: mean for mean in experiment.scores}
     quantity = shown_response(experiment.response)
-    pairs = [(p, quantity.of(p)) for p in predictions]
-    points = [(means[p.index], n, quantity.ends(p)) for p, n in pairs if n is not None and p.index in means]
+    numbers_of = [(p, quantity.numbers(p)) for p in predictions]
+    points = [(means[p.index], n, quantity.interval(p)) for p, n in numbers_of if n is not None and p.index in means]
     if len(points) < 2:
         return None
     picture = sheet(328, 300, widths=(1.0, 0.18))
@@ -141,24 +142,23 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     for (mean, numbers, friction), value in zip(points, values, strict=True):
         above = relation is None or value >= quantity.factor * _on_line(relation, mean.mean)
         _point(picture, mean, numbers, friction, quantity, above=above, rising=rising)
-        own = experiment.own_scores.get(mean.index)
-        if own is not None:
-            text = f"index {mean.index}: own score {own:.1f}, {quantity.label} {quantity.text(value)}"
-            axes.plot(own, value, "o", color=GREEN, mfc="none", ms=4, gid=picture.note(text))
+        own_score = experiment.own_scores.get(mean.index)
+        if own_score is not None:
+            text = f"index {mean.index}: own score {own_score:.1f}, {quantity.label} {quantity.text(value)}"
+            axes.plot(own_score, value, "o", color=GREEN, mfc="none", ms=4, gid=picture.note(text))
     if relation is not None:
-        ends = [min(m.mean for m, *_ in points), max(m.mean for m, *_ in points)]
-        axes.plot(ends, [quantity.factor * _on_line(relation, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
+        limits = [min(m.mean for m, *_ in points), max(m.mean for m, *_ in points)]
+        heights = [quantity.factor * _on_line(relation, x) for x in limits]
+        axes.plot(limits, heights, color=GREEN, linewidth=1.0, zorder=1)
     low, high = min(values), max(values)
     room = 0.18 * (high - low or abs(high))
-    heights = [low - room, high + room]
-    heights += [
-        quantity.factor * end + side for *_, ends in points if ends for end in ends for side in (-room / 4, room / 4)
-    ]
-    axes.set(xlim=(-6, 106), ylim=(min(heights), max(heights)), xticks=_TICKS)
+    limits = [quantity.factor * limit for *_, friction in points for limit in friction or ()]
+    lowest, highest = min([low - 0.75 * room, *limits]) - room / 4, max([high + 0.75 * room, *limits]) + room / 4
+    axes.set(xlim=(-6, 106), ylim=(lowest, highest), xticks=_TICKS)
     axes.set_xlabel(f"mean score of {experiment.descriptor} [0–100]")
     axes.set_ylabel(f"predicted {quantity.label} [{quantity.unit}]")
     title = f"range of {quantity.label}: {quantity.text(high - low)} ({spread_share(low, high)})"
-    axes.set_title(f"{relation_words(experiment)}\n{title}\n{rival_words(experiment.rivals)}".strip())
+    axes.set_title(f"{relation_title(experiment)}\n{title}\n{rival_title(experiment.rivals)}".strip())
     from_zero.plot([0.0] * len(values), values, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
     from_zero.set(xlim=(-1, 1), ylim=(min(0.0, 1.15 * low), max(0.0, 1.15 * high)), xticks=[])
     from_zero.set_xlabel(f"from 0\n[{quantity.unit}]")
@@ -167,7 +167,7 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     header = ("index", "mean score", "95 % interval low", "95 % interval high", "own score")
     header += (f"{quantity.label} [{quantity.kept_unit}]", f"error estimate of {quantity.label} [-]")
     interval = f"95 % interval of {quantity.label} by friction"
-    header += tuple(f"{interval}, {end} [{quantity.kept_unit}]" for end in ("low", "high"))
+    header += (f"{interval}, low [{quantity.kept_unit}]", f"{interval}, high [{quantity.kept_unit}]")
     relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n, _ in points]
     rows = (
         (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), n[0], error, *(friction or (None, None)))
@@ -176,15 +176,15 @@ def relation_panel(experiment: Experiment, predictions: Sequence[PredictionFindi
     return picture.panel(name, title, header, rows)
 
 
-def relation_words(experiment: Experiment) -> str:
+def relation_title(experiment: Experiment) -> str:
     """Return r with its interval and n, or why there is none, in few words."""
     relation = experiment.score_relation
     if relation is None or relation.pearson is None:
         return "no r: " + (relation.reason if relation is not None and relation.reason else "no scores")
-    words = f"r = {correlation(relation.pearson)}"
+    text = f"r = {correlation(relation.pearson)}"
     if relation.low is not None and relation.high is not None:
-        words += f" ({correlation(relation.low)} to {correlation(relation.high)})"
-    return words + f", n = {relation.n}"
+        text += f" ({correlation(relation.low)} to {correlation(relation.high)})"
+    return text + f", n = {relation.n}"
 
 
 def _on_line(relation: Relation, score: float) -> float:
@@ -212,13 +212,13 @@ def _point(
         axes.plot([mean.low, mean.high], [value, value], color=GREY, linewidth=0.8, zorder=2)
     mesh = [(numbers[0] - error, numbers[0] + error, 2.4) for error in numbers[1:]]
     for low, high, width in [*mesh, *([] if friction is None else [(*friction, 0.8)])]:
-        ends = [quantity.factor * low, quantity.factor * high]
-        axes.plot([mean.mean] * 2, ends, color=GREY, linewidth=width, zorder=2)
+        limits = [quantity.factor * low, quantity.factor * high]
+        axes.plot([mean.mean] * 2, limits, color=GREY, linewidth=width, zorder=2)
     axes.plot(mean.mean, value, "o", color=GREEN, markersize=5, zorder=3, gid=picture.note(text))
-    right = above != rising  # away from the line
-    off = (5 if right else -5, 4 if above else -4)
-    sides: dict[str, Any] = {"ha": "left" if right else "right", "va": "bottom" if above else "top"}
-    axes.annotate(str(mean.index), (mean.mean, value), xytext=off, textcoords="offset points", zorder=4, **sides)
+    on_right = above != rising  # away from the line
+    offset = (5 if on_right else -5, 4 if above else -4)
+    sides: dict[str, Any] = {"ha": "left" if on_right else "right", "va": "bottom" if above else "top"}
+    axes.annotate(str(mean.index), (mean.mean, value), xytext=offset, textcoords="offset points", zorder=4, **sides)
 
 
 _BINS = 24
@@ -231,7 +231,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
     if not numbers:
         return None
     choices = by_choice(findings)
-    usual = next((r for one, r in zip(findings, values, strict=True) if one.usual and r is not None), None)
+    usual = next((r for finding, r in zip(findings, values, strict=True) if finding.usual and r is not None), None)
     picture = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
     above, below = picture.axes
     low, high = _ends(numbers)
@@ -239,20 +239,20 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
     above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
     above.set_ylabel("paths [number]")
     above.set_title(f"{descriptor}: {len(numbers)} paths")
-    for y, (choice, name, of, is_usual) in enumerate(choices):
-        if of is None:
+    for y, (choice, name, spread, is_usual) in enumerate(choices):
+        if spread is None:
             below.text(low, y, "none", fontsize=7, va="center", color=GREY)
         else:
-            words = f"{CHOICE_LABELS[choice]} {name}: median r {correlation(of.median)} of {of.correlated} paths"
-            below.plot([of.least, of.greatest], [y, y], color=GREY, linewidth=1.1)
-            below.plot(of.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=picture.note(words))
+            text = f"{CHOICE_LABELS[choice]} {name}: median r {correlation(spread.median)} of {spread.correlated} paths"
+            below.plot([spread.least, spread.greatest], [y, y], color=GREY, linewidth=1.1)
+            below.plot(spread.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=picture.note(text))
         if is_usual:
             below.plot(low - 0.02 * (high - low), y, "D", color=INK, markersize=2.6, clip_on=False)
     below.set_yticks(range(len(choices)), [name for _, name, _, _ in choices], fontsize=7)
     below.set_ylim(len(choices) - 0.4, -0.6)
-    for before in range(1, len(choices)):
-        if choices[before][0] != choices[before - 1][0]:
-            below.axhline(before - 0.5, color=PALE, linewidth=0.6)
+    for row in range(1, len(choices)):
+        if choices[row][0] != choices[row - 1][0]:
+            below.axhline(row - 0.5, color=PALE, linewidth=0.6)
     below.set_xlabel(f"correlation of {label} with score [–]")
     for axes in picture.axes:
         axes.set_xlim(low - 0.04 * (high - low), high)
@@ -260,7 +260,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
             axes.axvline(usual, color=INK, linewidth=0.9, linestyle=(0, (3, 2)), zorder=0)
     header = (*CHOICES, "usual", "surfaces", "trials", "r of means", "r within subjects", "low", "high")
     numbers_of = attrgetter("surfaces", "trials", "r", "within", "low", "high")
-    rows = ((*map(str, astuple(one.path)), int(one.usual), *numbers_of(one)) for one in findings)
+    rows = ((*map(str, astuple(finding.path)), int(finding.usual), *numbers_of(finding)) for finding in findings)
     title = f"Correlation of {descriptor} along many paths of the analysis"
     return picture.panel(f"paths-{descriptor}", title, header, rows)
 
@@ -278,33 +278,33 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
 
 
 _COLOURS = (PURPLE, GREEN, VERMILLION)
-Value = float | None
+Number = float | None
 
 
 def comparison_panel(
-    names: Sequence[str], sessions: tuple[str, str], rows: Sequence[tuple[str, Sequence[tuple[Value, Value]]]]
+    names: Sequence[str], sessions: tuple[str, str], rows: Sequence[tuple[str, Sequence[tuple[Number, Number]]]]
 ) -> Panel | None:
     """Return the picture of `rows`: stimuli, and both sessions' values of each of `names`; None where none has both."""
     if not any(None not in pair for _, pairs in rows for pair in pairs):
         return None
     picture = sheet(560, 150 * len(names) + 60, tuple(1.0 for _ in names), share_x=True)
-    for at, (name, axes) in enumerate(zip(names, picture.axes, strict=True)):
-        for place, (stimulus, pairs) in enumerate(rows):
-            first, second = pairs[at]
+    for row, (name, axes) in enumerate(zip(names, picture.axes, strict=True)):
+        for column, (stimulus, pairs) in enumerate(rows):
+            first, second = pairs[row]
             if first is not None and second is not None:
-                axes.plot([place, place], [first, second], color=GREY, linewidth=1.0)
+                axes.plot([column, column], [first, second], color=GREY, linewidth=1.0)
             for value, filled, session in ((first, False, sessions[0]), (second, True, sessions[1])):
                 if value is not None:
-                    face = _COLOURS[at % len(_COLOURS)] if filled else "white"
+                    face = _COLOURS[row % len(_COLOURS)] if filled else "white"
                     note = picture.note(f"{stimulus}, {session}: {name} {value:.4g}")
-                    axes.plot([place], [value], "s" if filled else "o", ms=5.0, mfc=face, mec=INK, mew=0.7, gid=note)
+                    axes.plot([column], [value], "s" if filled else "o", ms=5.0, mfc=face, mec=INK, mew=0.7, gid=note)
         axes.set_ylabel(name)
         axes.tick_params(labelbottom=axes is picture.axes[-1])
     picture.axes[0].set_title(f"circle: {sessions[0]}; filled square: {sessions[1]}")
-    last = picture.axes[-1]
-    last.set_xticks(range(len(rows)), [stimulus for stimulus, _ in rows], rotation=60, ha="right")
-    last.set_xlim(-0.6, len(rows) - 0.4)
-    header = ("stimulus", *(f"{name} {part}" for name in names for part in (*sessions, "difference")))
+    lowest = picture.axes[-1]
+    lowest.set_xticks(range(len(rows)), [stimulus for stimulus, _ in rows], rotation=60, ha="right")
+    lowest.set_xlim(-0.6, len(rows) - 0.4)
+    header = ("stimulus", *(f"{name} {suffix}" for name in names for suffix in (*sessions, "difference")))
     table = (
         (stimulus, *(cell for a, b in pairs for cell in (a, b, None if a is None or b is None else b - a)))
         for stimulus, pairs in rows

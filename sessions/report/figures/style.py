@@ -107,7 +107,7 @@ class Sheet:
     figure: Figure
     axes: tuple[Axes, ...]
     hover: dict[str, str] = field(default_factory=dict[str, str])  # artist's gid: what hovering shows
-    then: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])  # once axes have their places
+    after_layout: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
 
     def note(self, text: str) -> str:
         """Return a gid for an artist that shows `text` on hovering."""
@@ -123,12 +123,12 @@ class Sheet:
 @contextmanager
 def look(*, simulated: bool = False) -> Generator[None]:
     """Be the context every picture is drawn in; all in it say so where they show what was `simulated`."""
-    before = _SIMULATED.set(simulated)
+    token = _SIMULATED.set(simulated)
     try:
         with mpl.rc_context(_LOOK):
             yield
     finally:
-        _SIMULATED.reset(before)
+        _SIMULATED.reset(token)
 
 
 def sheet(
@@ -190,8 +190,8 @@ def svg(picture: Sheet, name: str, title: str) -> str:
     engine = picture.figure.get_layout_engine()
     if engine is not None:
         engine.execute(picture.figure)
-    for place in picture.then:
-        place()
+    for draw in picture.after_layout:
+        draw()
     picture.figure.set_layout_engine(None)  # else it would be drawn once more, only to be laid out
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
@@ -208,20 +208,20 @@ def _finish_svg(text: str, name: str, title: str, hover: Mapping[str, str]) -> s
     text = text[text.index("<svg") :]
     name = identifier(name)
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    for gid, words in hover.items():
-        text = text.replace(f'<g id="{gid}">', f'<g id="{gid}"><title>{escape(words)}</title>', 1)
+    for gid, note in hover.items():
+        text = text.replace(f'<g id="{gid}">', f'<g id="{gid}"><title>{escape(note)}</title>', 1)
     text = re.sub(r"'DejaVu Sans'(?:, [^;\"]*)?(?=[;\"])", _FONTS, text)
     text = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', text)
     text = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", text)
     text = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', text)
     text = text.replace("<svg ", f'<svg role="img" aria-label="{escape(title)}" ', 1)
-    head = '<?xml version="1.0" encoding="utf-8"?>\n'
+    declaration = '<?xml version="1.0" encoding="utf-8"?>\n'
     if _SIMULATED.get():
-        head += "<!-- SIMULATED: this picture shows no measurement of a real device or person -->\n"
-    return head + _NOT_XML.sub("\ufffd", text)
+        declaration += "<!-- SIMULATED: this picture shows no measurement of a real device or person -->\n"
+    return declaration + _NOT_XML.sub("\ufffd", text)
 
 
-AT = 1.04  # where labels begin, in widths of the axes
+LABEL_X = 1.04  # where labels begin, in widths of the axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +234,7 @@ class Label:
 
 
 def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Return places at least `gap` apart, in the order of `targets` and near them, inside low..high where they fit.
+    """Return positions at least `gap` apart, in the order of `targets` and near them, inside low..high where they fit.
 
     >>> spread([1.0, 1.0, 5.0], gap=1.0, low=0.0, high=10.0)
     [0.5, 1.5, 5.0]
@@ -246,29 +246,29 @@ def spread(targets: Sequence[float], gap: float, low: float, high: float) -> lis
     steps = gap * np.arange(n)
     # Without the steps, labels at least `gap` apart are numbers that do not fall.
     rising = isotonic_regression(np.asarray(targets)[order] - steps).x
-    places = np.empty(n)
-    places[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps
-    return [float(place) for place in places]
+    positions = np.empty(n)
+    positions[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps
+    return positions.tolist()
 
 
-def label_right(picture: Sheet, axes: Axes, labels: Sequence[Label], head: str = "") -> None:
-    """Write labels under `head` right of the axes, each with a line to its point, once the axes have their heights."""
+def label_right(picture: Sheet, axes: Axes, labels: Sequence[Label], heading: str = "") -> None:
+    """Write labels under a heading right of the axes, with lines to their points, once the axes have their heights."""
     if not labels:
         return
     write = partial(axes.text, transform=axes.get_yaxis_transform(), va="center", ha="left")
-    names = [write(AT, label.y, label.text, color=INK) for label in labels]
-    top = write(AT, labels[0].y, head, color=GREY)
+    names = [write(LABEL_X, label.y, label.text, color=INK) for label in labels]
+    top = write(LABEL_X, labels[0].y, heading, color=GREY)
     lines = [axes.plot([], [], color=GREY, linewidth=0.4, clip_on=False, zorder=1)[0] for _ in labels]
 
     def place() -> None:
         height = axes.get_window_extent().height / picture.figure.dpi * 72  # [pt]
-        (low, high), (left, right) = axes.get_ylim(), axes.get_xlim()
+        (low, high), (low_x, high_x) = axes.get_ylim(), axes.get_xlim()
         gap = 1.3 * _TEXT * (high - low) / height
-        places = spread([label.y for label in labels], gap, low, high - (gap if head else 0.0))
-        end = left + (AT - 0.01) * (right - left)
-        for label, name, line, y in zip(labels, names, lines, places, strict=True):
+        heights = spread([label.y for label in labels], gap, low, high - (gap if heading else 0.0))
+        line_end = low_x + (LABEL_X - 0.01) * (high_x - low_x)
+        for label, name, line, y in zip(labels, names, lines, heights, strict=True):
             name.set_y(y)
-            line.set_data([label.x, end], [label.y, y])
-        top.set_y(max(places) + gap)
+            line.set_data([label.x, line_end], [label.y, y])
+        top.set_y(max(heights) + gap)
 
-    picture.then.append(place)
+    picture.after_layout.append(place)

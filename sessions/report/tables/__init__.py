@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from sessions.report.contents import Report
-from sessions.report.wording import NONE, between, finer
+from sessions.report.wording import NONE, between, caption, finer
 
-Thing = TypeVar("Thing")
+Finding = TypeVar("Finding")
 CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under the table
 TOO_SHORT = "the stroke has too few readings"  # for an interval
 
@@ -64,22 +64,22 @@ def estimate_cell(
     value: float | None,
     as_text: Format,
     reason: str | None,
-    ends: tuple[float, float] | None,
+    interval: tuple[float, float] | None,
     without: str | None = None,
     *,
-    of_ends: Format | None = None,
+    of_limits: Format | None = None,
     unit: float = 1.0,
 ) -> Cell:
     """Return a number over its interval, `without` which it has a note that says why; or a dash with its reason.
 
-    `of_ends` shows an end of the interval where `as_text` shows more than a number; `unit` as for `wording.between`.
+    `of_limits` shows an end of the interval where `as_text` shows more than a number; `unit` as for `wording.between`.
     """
     if value is None:
         return number_cell(None, as_text, reason)
-    if ends is None:
+    if interval is None:
         return Cell(as_text(value), f"no interval: {without or 'not computed'}")
-    number = as_text if of_ends else finer(*ends, as_text, unit)
-    return Cell(number(value), interval=between(*ends, of_ends or as_text, unit))
+    number = as_text if of_limits else finer(*interval, as_text, unit)
+    return Cell(number(value), interval=between(*interval, of_limits or as_text, unit))
 
 
 def range_cell(low: float | None, high: float | None, as_text: Format, reason: str | None = None) -> Cell:
@@ -87,10 +87,10 @@ def range_cell(low: float | None, high: float | None, as_text: Format, reason: s
     return Cell(NONE, reason or "") if low is None or high is None else Cell(f"{as_text(low)} to {as_text(high)}")
 
 
-def table(name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Table | None:
+def table(name: str, caption_name: str, columns: str, groups: Iterable[Rows], **values: object) -> Table | None:
     """Return a table without its empty groups, its notes marked in reading order; None where no group has rows.
 
-    `columns` are its heads with their units, as in "index | SED [kPa]".
+    `columns` are its headings with their units, as in "index | SED [kPa]"; `values` fill the places of its caption.
     """
     marks: dict[str, str] = {}  # by the note
 
@@ -102,51 +102,50 @@ def table(name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Tabl
     non_empty = tuple(Group(name, rows) for name, rows in cells if rows)
     if not non_empty:
         return None
-    short, further = _in_short(caption)
-    heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
-    notes = ((mark, note) for note, mark in marks.items())
-    return Table(name, short, tuple(Column(head, unit) for head, _, unit in heads), non_empty, (*further, *notes))
+    short_caption, further = _shorten(caption(caption_name, **values))
+    headings = (heading.strip().removesuffix("]").partition(" [") for heading in columns.split("|"))
+    notes = (*further, *((mark, note) for note, mark in marks.items()))
+    return Table(name, short_caption, tuple(Column(heading, unit) for heading, _, unit in headings), non_empty, notes)
 
 
 def _letters(n: int) -> str:
     return (chr(ord("a") + n // 26 - 1) if n >= 26 else "") + chr(ord("a") + n % 26)
 
 
-def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
+def _shorten(caption_text: str) -> tuple[str, tuple[tuple[str, str], ...]]:
     """Return a caption of at most `CAPTION_WORDS` words, and the sentences beyond as a note without a mark.
 
     A sentence that names the model stays in the caption, wherever it stands.
     """
-    sentences = re.split(r"(?<=[.;]) (?=\S)", caption)
-    if len(caption.split()) <= CAPTION_WORDS:
-        return caption, ()
-    main = {n for n, sentence in enumerate(sentences) if "Model" in sentence or n == 0}
-    for n in range(len(sentences)):
-        words = sum(len(sentences[k].split()) for k in {*main, n})
-        if words > CAPTION_WORDS and n not in main:
+    if len(caption_text.split()) <= CAPTION_WORDS:
+        return caption_text, ()
+    sentences = re.split(r"(?<=[.;]) (?=\S)", caption_text)
+    main = {0, *(n for n, sentence in enumerate(sentences) if "Model" in sentence)}
+    for n in range(1, len(sentences)):
+        if n not in main and sum(len(sentences[i].split()) for i in (*main, n)) > CAPTION_WORDS:
             break
         main.add(n)
-    short = " ".join(sentence for n, sentence in enumerate(sentences) if n in main)
-    return short, (("", " ".join(sentence for n, sentence in enumerate(sentences) if n not in main)),)
+    rest = " ".join(sentence for n, sentence in enumerate(sentences) if n not in main)
+    return " ".join(sentences[n] for n in sorted(main)), (("", rest),)
 
 
 def sections_of(sections: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
     """Return the tables of each section that have rows."""
-    return {name: tuple(each for each in tables if each is not None) for name, tables in sections.items()}
+    return {name: tuple(table for table in tables if table is not None) for name, tables in sections.items()}
 
 
 def split_off_appendix(
     sections: Mapping[str, tuple[Table, ...]], body: Set[str]
 ) -> tuple[dict[str, tuple[Table, ...]], tuple[Table, ...]]:
     """Return the sections with those tables that are named in `body`, and all others, for the appendix."""
-    main = {section: tuple(each for each in tables if each.name in body) for section, tables in sections.items()}
-    return main, tuple(each for tables in sections.values() for each in tables if each.name not in body)
+    main = {section: tuple(table for table in tables if table.name in body) for section, tables in sections.items()}
+    return main, tuple(table for tables in sections.values() for table in tables if table.name not in body)
 
 
 def group_by_experiment(
-    report: Report, things: Sequence[Thing], experiment: Callable[[Thing], str], row: Callable[[Thing], Row]
+    report: Report, findings: Sequence[Finding], experiment: Callable[[Finding], str], row: Callable[[Finding], Row]
 ) -> list[Rows]:
-    """Return the rows of all things under the names of their experiments, as they come where nothing was judged."""
-    names = [e.name for e in report.experiments] or list(dict.fromkeys(map(experiment, things)))
-    groups: list[Rows] = [(name, [row(t) for t in things if experiment(t) == name]) for name in names]
-    return [*groups, ("", [row(t) for t in things if experiment(t) not in names])]
+    """Return the rows of all findings under the names of their experiments, as they come where nothing was judged."""
+    names = [e.name for e in report.experiments] or list(dict.fromkeys(map(experiment, findings)))
+    groups: list[Rows] = [(name, [row(f) for f in findings if experiment(f) == name]) for name in names]
+    return [*groups, ("", [row(f) for f in findings if experiment(f) not in names])]

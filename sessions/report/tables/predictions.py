@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval, Variant
@@ -19,17 +18,7 @@ from sessions.report.tables import (
     number_cell,
     table,
 )
-from sessions.report.wording import (
-    ShownResponse,
-    caption,
-    direction,
-    places,
-    sed,
-    shown_response,
-    significant,
-    tau,
-    with_error,
-)
+from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
 from sessions.statistics.scores import bounds
 
 
@@ -38,59 +27,66 @@ def prediction_table(report: Report) -> Table | None:
     columns = "µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
-    def row(p: PredictionFinding) -> Row:
-        stroke = strokes.get(p.stroke or 0)  # they are counted from 1
+    def row(prediction: PredictionFinding) -> Row:
+        stroke = strokes.get(prediction.stroke or 0)  # they are counted from 1
         intervals = {} if stroke is None else stroke.bootstrap
-        mu = intervals.get(model_mu(stroke, p)[0])
+        mu = intervals.get(model_mu(stroke, prediction)[0])
         tau_max = intervals.get("tau_max")
-        if tau_max is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
-            tau_max = tau_max[0] * p.tau_max / stroke.tau_max, tau_max[1] * p.tau_max / stroke.tau_max  # as it was read
-        why, error = p.reasons.get("sed"), None if p.doubt else p.error_estimate
+        if tau_max is not None and prediction.tau_max is not None and stroke is not None and stroke.tau_max:
+            reading = prediction.tau_max / stroke.tau_max
+            tau_max = tau_max[0] * reading, tau_max[1] * reading
+        reason, error = prediction.reasons.get("sed"), None if prediction.doubt else prediction.error_estimate
         return (
-            estimate_cell(p.mu, places(3), p.reasons.get("mu") or why, mu, TOO_SHORT),
-            {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
-            estimate_cell(p.tau_max, tau, p.reasons.get("tau_max") or why, tau_max, TOO_SHORT, unit=1e3),
-            _depth(p),
-            _stroke_sed(p),
-            number_cell(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
-            number_cell(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
+            estimate_cell(prediction.mu, places(3), prediction.reasons.get("mu") or reason, mu, TOO_SHORT),
+            {"mean over steady window": "mean"}.get(prediction.mu_rule, prediction.mu_rule),
+            estimate_cell(
+                prediction.tau_max, tau, prediction.reasons.get("tau_max") or reason, tau_max, TOO_SHORT, unit=1e3
+            ),
+            _depth(prediction),
+            _stroke_sed(prediction),
+            number_cell(
+                error, lambda v: significant(100 * v, 2), prediction.doubt or prediction.reasons.get("error_estimate")
+            ),
+            number_cell(prediction.wall_s, lambda v: significant(v, 2), prediction.reasons.get("wall_s")),
         )
 
-    words = caption("predictions", how=_HOW, model=report.model)
-    return _table(report, "table-predictions", words, columns, _rows(report, row))
+    return _table(report, "table-predictions", "predictions", columns, _rows(report, row))
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
+_UNDER_RATES = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
 _SED_ALONE = "the uncertainty of friction goes through to the SED alone"
 
 
-class _Estimate(NamedTuple):
-    """A number of the model, with its relative error and the interval that friction makes, or why it has none."""
+def _cell(
+    value: float | None,
+    error: float | None,
+    reason: str | None,
+    interval: Ends | None,
+    without: str | None,
+    doubt: str,
+    as_text: Format,
+    least: int,
+    unit: float = 1.0,
+) -> Cell:
+    """Return a number ± its relative error, over the interval that friction makes, or why it has none.
 
-    value: float | None
-    error: float | None
-    reason: str | None  # why there is no number
-    ends: Ends | None
-    without: str | None  # why there is no interval
-    doubt: str = ""  # why no finger can be in that state
+    In doubt whether a finger can be in its state it has neither, for they would speak for it.
+    """
+    if doubt and value is not None:
+        return estimate_cell(value, as_text, None, None, doubt)
 
+    def shown_with_error(number: float) -> str:
+        return with_error(unit * number, None if error is None else unit * error * abs(number), least)
 
-def _cell(of: _Estimate, as_text: Format, least: int, unit: float = 1.0) -> Cell:
-    """Return a number ± its error, over its interval; in doubt without both, which would speak for it."""
-    if of.doubt and of.value is not None:
-        return estimate_cell(of.value, as_text, None, None, of.doubt)
-
-    def shown_with_error(value: float) -> str:
-        return with_error(unit * value, None if of.error is None else unit * of.error * abs(value), least)
-
-    return estimate_cell(of.value, shown_with_error, of.reason, of.ends, of.without, of_ends=as_text, unit=unit)
+    return estimate_cell(value, shown_with_error, reason, interval, without, of_limits=as_text, unit=unit)
 
 
 def _sed(
     value: float | None, error: float | None, reason: str | None, interval: SedInterval | None, doubt: str
 ) -> Cell:
     """Return an SED in kPa; an interval for which draws were solved is marked with a star."""
-    cell = _cell(_Estimate(value, error, reason, *_of(interval), doubt), sed, 3, 1e3)
+    cell = _cell(value, error, reason, *_limits(interval), doubt, sed, 3, 1e3)
     star = cell.interval and interval is not None and interval.method == "sampling"
     return replace(cell, interval=f"{cell.interval}*") if star else cell
 
@@ -99,8 +95,8 @@ def _stroke_sed(p: PredictionFinding) -> Cell:
     return _sed(p.sed, p.error_estimate, p.reasons.get("sed"), p.interval, p.doubt)
 
 
-def _of(interval: SedInterval | None) -> tuple[Ends | None, str | None]:
-    """Return the ends of an interval, and why it has none."""
+def _limits(interval: SedInterval | None) -> tuple[Ends | None, str | None]:
+    """Return the limits of an interval, and why it has none."""
     return (None, None) if interval is None else (bounds(interval.low, interval.high), interval.reason or None)
 
 
@@ -112,22 +108,26 @@ def afferent_table(report: Report) -> Table | None:
     published = quantity.name == SED.name
     columns = f"{quantity.label} [{quantity.unit}] | peak rate [imp/s] | settled rate [imp/s]"
 
-    def row(p: PredictionFinding) -> Row:
-        estimates = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
-        why, without = p.reasons.get("sed"), _of(p.interval)[1] if published else _SED_ALONE
-        rates = (estimate_cell(rate, places(1), why, ends, without) for rate, ends in estimates)
-        return (_stroke_sed(p) if published else _response_cell(p, quantity), *rates)
+    def row(prediction: PredictionFinding) -> Row:
+        def cell(rate: float | None, interval: Ends | None) -> Cell:
+            return estimate_cell(rate, places(1), prediction.reasons.get("sed"), interval, without)
 
-    below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
-    words = caption("afferent", label=quantity.label, below=below if published else "", model=report.model)
-    return _table(report, "table-afferent", words, columns, _rows(report, row))
+        without = _limits(prediction.interval)[1] if published else _SED_ALONE
+        return (
+            _stroke_sed(prediction) if published else _response_cell(prediction, quantity),
+            cell(prediction.peak_rate, prediction.peak_rate_interval),
+            cell(prediction.settled_rate, prediction.settled_rate_interval),
+        )
+
+    texts = {"label": quantity.label, "below": _UNDER_RATES if published else ""}
+    return _table(report, "table-afferent", "afferent", columns, _rows(report, row), **texts)
 
 
-def _response_cell(p: PredictionFinding, quantity: ShownResponse) -> Cell:
+def _response_cell(prediction: PredictionFinding, quantity: ShownResponse) -> Cell:
     """Return a quantity at the ending in the unit shown, ± its error from the mesh."""
-    numbers = quantity.of(p)
+    numbers = quantity.numbers(prediction)
     if not numbers:
-        return number_cell(None, str, p.reasons.get("sed"))
+        return number_cell(None, str, prediction.reasons.get("sed"))
     value, error = (quantity.factor * number for number in (*numbers, 0.0)[:2])
     return Cell(with_error(value, error, quantity.places))
 
@@ -135,37 +135,37 @@ def _response_cell(p: PredictionFinding, quantity: ShownResponse) -> Cell:
 def variants_table(report: Report) -> Table | None:
     """Return each trial's SED in every variant it was predicted in, side by side; strains one under another."""
 
-    def cell(one: Alternative) -> Cell:
-        return _sed(one.sed, one.error_estimate, one.reason, one.interval, one.doubt)
+    def cell(variant: Alternative) -> Cell:
+        return _sed(variant.sed, variant.error_estimate, variant.reason, variant.interval, variant.doubt)
 
-    ways = dict.fromkeys(variant.way for variant in _variants(report))
-    legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
-    columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
-    words = caption("variants", legend=legend, how=_HOW)
-    return _table(report, "table-beside", words, columns, _by_strain(report, cell))
+    labels = dict.fromkeys(variant.way for variant in _variants(report))
+    legend = "; ".join(f"({n}) {label}" for n, label in enumerate(labels, 1))
+    columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(labels) + 1))
+    return _table(report, "table-beside", "variants", columns, _by_strain(report, cell), legend=legend)
 
 
 def variant_forces_table(report: Report) -> Table | None:
     """Return the normal force of each variant, or the depth that the measured force presses it to."""
 
-    def cell(one: Alternative) -> Cell:
-        pressed = one.variant.driven == "force"
-        value = one.indentation if pressed else one.normal_force
-        error = one.indentation_error if pressed else one.normal_force_error
-        interval = one.interval
-        ends = None if interval is None else interval.indentation if pressed else interval.normal_force
-        why = None if interval is None else interval.reason
-        estimate = _Estimate(None if one.sed is None else value, error, one.reason, ends, why, one.doubt)
-        return _cell(estimate, places(2), 2)
+    def cell(alternative: Alternative) -> Cell:
+        pressed = alternative.variant.driven == "force"
+        value = alternative.indentation if pressed else alternative.normal_force
+        error = alternative.indentation_error if pressed else alternative.normal_force_error
+        value = None if alternative.sed is None else value
+        intervals = alternative.interval
+        interval = intervals and (intervals.indentation if pressed else intervals.normal_force)
+        without = intervals and intervals.reason
+        return _cell(value, error, alternative.reason, interval, without, alternative.doubt, places(2), 2)
 
     units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
     columns = " | ".join(f"({n}) [{unit}]" for n, unit in enumerate(units.values(), 1))
-    return _table(report, "table-beside-forces", caption("variant-forces"), columns, _by_strain(report, cell))
+    return _table(report, "table-beside-forces", "variant-forces", columns, _by_strain(report, cell))
 
 
 def _variants(report: Report) -> list[Variant]:
     """Return how trials were predicted otherwise, in the same ways at each strain; [] where none was."""
-    return [one.variant for one in next((p.alternatives for p in report.predictions if p.alternatives), ())]
+    alternatives = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    return [alternative.variant for alternative in alternatives]
 
 
 def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows]:
@@ -173,7 +173,7 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows
     for strain in dict.fromkeys(variant.kinematics for variant in _variants(report)):
 
         def row(p: PredictionFinding, strain: str = strain) -> Row:
-            return tuple(cell(one) for one in p.alternatives if one.variant.kinematics == strain)
+            return tuple(map(cell, (a for a in p.alternatives if a.variant.kinematics == strain)))
 
         groups += [(f"{name or 'trials'}, at {strain} strain", rows) for name, rows in _rows(report, row)]
     return groups
@@ -187,33 +187,32 @@ def force_table(report: Report) -> Table | None:
     )
     strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
 
-    def row(p: PredictionFinding) -> Row:
-        intervals = strokes.get(p.stroke or 0, {})
-        normal, tangential = (
-            (None, None) if p.interval is None else (p.interval.normal_force, p.interval.tangential_force)
-        )
+    def row(prediction: PredictionFinding) -> Row:
+        intervals = strokes.get(prediction.stroke or 0, {})
+        interval = prediction.interval
+        normal, tangential = (interval.normal_force, interval.tangential_force) if interval else (None, None)
         per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
+        without = _limits(interval)[1]
 
-        def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
-            doubt = p.doubt if name in _OF_STATE else ""
-            estimate = _Estimate(getattr(p, name), error, p.reasons.get(name), ends, without, doubt)
-            return _cell(estimate, places(decimals), decimals)
+        def cell(name: str, error: float | None, interval: Ends | None, without: str | None, decimals: int = 2) -> Cell:
+            doubt, reason = prediction.doubt if name in _OF_STATE else "", prediction.reasons.get(name)
+            value: float | None = getattr(prediction, name)
+            return _cell(value, error, reason, interval, without, doubt, places(decimals), decimals)
 
-        why = _of(p.interval)[1]
+        matching_interval = prediction.matching_depth_interval
         return (
-            cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
-            cell("normal_force", p.normal_force_error, normal, why),
+            cell("normal_per_mm", prediction.normal_force_error, per_mm, without, 4),
+            cell("normal_force", prediction.normal_force_error, normal, without),
             cell("measured_normal", None, intervals.get("normal_force"), TOO_SHORT),
-            cell("tangential_force", p.tangential_force_error, tangential, why),
+            cell("tangential_force", prediction.tangential_force_error, tangential, without),
             cell("measured_tangential", None, intervals.get("tangential_force"), TOO_SHORT),
-            _depth(p),
-            cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
+            _depth(prediction),
+            cell("matching_depth", prediction.matching_depth_error, matching_interval, without or _ROUGH),
         )
 
     origin = f" ({report.width_origin})" if report.width_origin else ""
     width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm{origin}"
-    words = caption("forces", width=width, model=report.model)
-    return _table(report, "table-forces", words, columns, _rows(report, row))
+    return _table(report, "table-forces", "forces", columns, _rows(report, row), width=width)
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
@@ -226,48 +225,51 @@ def direction_table(report: Report) -> Table | None:
         return None
     columns = "depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
 
-    def row(p: PredictionFinding) -> Row:
-        back, without = _of(p.opposite_interval)
-        why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
-        ratio, ends = _ratio(p, back)
-        doubt = p.doubt or p.opposite_doubt
-        unknown = doubt or without or _of(p.interval)[1]
+    def row(prediction: PredictionFinding) -> Row:
+        opposite, opposite_doubt = prediction.opposite_interval, prediction.opposite_doubt
+        reason = prediction.reasons.get("opposite_sed") or prediction.reasons.get("sed")
+        ratio, interval = _ratio(prediction)
+        doubt = prediction.doubt or opposite_doubt
+        without = doubt or _limits(opposite)[1] or _limits(prediction.interval)[1]
         return (
-            _depth(p),
-            direction(p.direction),
-            _stroke_sed(p),
-            _sed(p.opposite_sed, p.opposite_error, why, p.opposite_interval, p.opposite_doubt),
-            estimate_cell(ratio, places(3), why, None if doubt else ends, unknown),
+            _depth(prediction),
+            direction(prediction.direction),
+            _stroke_sed(prediction),
+            _sed(prediction.opposite_sed, prediction.opposite_error, reason, opposite, opposite_doubt),
+            estimate_cell(ratio, places(3), reason, None if doubt else interval, without),
         )
 
-    words = caption("directions", how=_HOW, model=report.model)
-    return _table(report, "table-directions", words, columns, _rows(report, row))
+    return _table(report, "table-directions", "directions", columns, _rows(report, row))
 
 
-def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
+def _ratio(prediction: PredictionFinding) -> tuple[float | None, Ends | None]:
     """Return the SED slid from distal to proximal over that slid back, with the range that their intervals allow."""
-    if p.sed is None or p.opposite_sed is None or p.direction is None:
+    if prediction.sed is None or prediction.opposite_sed is None or prediction.direction is None:
         return None, None
-    upper, lower = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
-    ahead = _of(p.interval)[0]
-    if back is None or ahead is None:
+    states = (prediction.sed, prediction.interval), (prediction.opposite_sed, prediction.opposite_interval)
+    (upper, upper_interval), (lower, lower_interval) = states if prediction.direction < 0 else states[::-1]
+    numerator, denominator = _limits(upper_interval)[0], _limits(lower_interval)[0]
+    if numerator is None or denominator is None:
         return upper / lower, None
-    over, under = (ahead, back) if p.direction < 0 else (back, ahead)
-    return upper / lower, (over[0] / under[1], over[1] / under[0])
+    return upper / lower, (numerator[0] / denominator[1], numerator[1] / denominator[0])
 
 
-def _table(report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows]) -> Table | None:
+def _table(
+    report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows], **values: str
+) -> Table | None:
     """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
-    return table(name, caption, f"{'trial | index' if planned else 'stroke'} | {columns}", groups)
+    columns = f"{'trial | index' if planned else 'stroke'} | {columns}"
+    return table(name, caption, columns, groups, how=_HOW, model=report.model, **values)
 
 
 def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]:
     """Return the named rows of all trials by experiment; `row` gives the cells after the name."""
 
-    def name_row(p: PredictionFinding) -> Row:
-        name = (str(p.stroke),) if p.trial is None else (p.trial, p.code if p.index is None else str(p.index))
-        return (*name, *row(p))
+    def name_row(prediction: PredictionFinding) -> Row:
+        index = prediction.code if prediction.index is None else str(prediction.index)
+        name: Row = (str(prediction.stroke),) if prediction.trial is None else (prediction.trial, index)
+        return (*name, *row(prediction))
 
     return group_by_experiment(report, report.predictions, lambda p: p.experiment, name_row)
 

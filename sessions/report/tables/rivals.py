@@ -1,10 +1,10 @@
 """Table and sentences of what else follows the scores beside the model's quantity, of a session as of a study."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from textwrap import fill
 
 from sessions.report.tables import Row, Table, estimate_cell, number_cell, table
-from sessions.report.wording import NONE, capital, caption, correlation, digits, p_value, places
+from sessions.report.wording import NONE, capital, correlation, digits, p_value, places
 from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
@@ -12,8 +12,8 @@ from sessions.statistics.within_subjects import holm
 
 _ALPHA = 0.05
 MANY_SURFACES = 10_000  # beyond which nobody asks how many
-MANY = 3  # responses of the model that are no longer named one by one
-_LINE = 44  # characters that a line of a picture's title has room for
+MOST_NAMED = 3  # responses of the model that are no longer named one by one
+_TITLE_WIDTH = 44  # characters that a line of a picture's title has room for
 
 
 RivalGroups = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
@@ -23,37 +23,37 @@ def rival_tables(groups: RivalGroups, quantity: str, model: str) -> tuple[Table 
     """Return what was measured beside a quantity of the `model`, named in short, and the model's other quantities."""
     within = "Steiger (1980), within subjects by the jackknife" if _have_weights(groups) else "Steiger (1980)"
     aic = "AIC: crossed mixed models. " if _have_weights(groups) else ""
-    measured = caption("rivals", label=quantity, model=model, within=within, aic=aic)
-    responses = caption("responses", model=model, label=quantity)
+    texts = {"label": quantity, "model": model, "within": within, "aic": aic}
     return (
-        _table("table-rivals", measured, groups, quantity, lambda name: name == quantity or name not in RESPONSES),
-        _table("table-responses", responses, groups, quantity, lambda name: name != quantity and name in RESPONSES),
+        _table("rivals", groups, texts, lambda name: name == quantity or name not in RESPONSES),
+        _table("responses", groups, texts, lambda name: name != quantity and name in RESPONSES),
     )
 
 
 def _have_weights(groups: RivalGroups) -> bool:
     """Say whether mixed models weigh the rivals, as they do within the subjects of a study."""
-    return any(one.weight is not None or "weight" in one.reasons for _, rivals in groups for one in rivals)
+    return any(rival.weight is not None or "weight" in rival.reasons for _, rivals in groups for rival in rivals)
 
 
-def _table(anchor: str, caption: str, groups: RivalGroups, quantity: str, holds: Callable[[str], bool]) -> Table | None:
+def _table(name: str, groups: RivalGroups, texts: Mapping[str, str], includes: Callable[[str], bool]) -> Table | None:
+    quantity = texts["label"]
     columns = (
         f"quantity | n | r | r of {quantity} minus this | Steiger's Z | p | r given the model's µ | "
         f"left-out error [0–100]{' | AIC weight' if _have_weights(groups) else ''}"
     )
     width = columns.count("|") + 1
-    rows = [
-        (name, tuple(_row(rival, quantity)[:width] for rival in rivals if holds(rival.name))) for name, rivals in groups
-    ]
-    return table(anchor, caption, columns, rows)
+    rows = (
+        (group, [_row(rival, quantity)[:width] for rival in rivals if includes(rival.name)]) for group, rivals in groups
+    )
+    return table(f"table-{name}", name, columns, rows, **texts)
 
 
-def rival_words(rivals: Sequence[Rival]) -> str:
+def rival_title(rivals: Sequence[Rival]) -> str:
     """Return lines with the r of each measured rival for the title of a picture, "" where there is none."""
     measured = [rival for rival in rivals if rival.name not in RESPONSES]
     correlations = [(rival.name, correlation(rival.r)) for rival in measured if rival.r is not None]
     unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in correlations]
-    return fill(f"r of rivals: {', '.join(unbroken)}", _LINE) if correlations else ""
+    return fill(f"r of rivals: {', '.join(unbroken)}", _TITLE_WIDTH) if correlations else ""
 
 
 def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
@@ -61,9 +61,10 @@ def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
     if len(rivals) < 2:
         return []
     contrasts = [rival for rival in rivals if rival.contrast is not None]
-    why = next((one.reasons["contrast"] for one in rivals if "contrast" in one.reasons), "")
-    none = f"Of {name}, the {rivals[0].name} is compared with no rival: {why}."
-    return [*_alike(name, rivals[0].name, rivals), _verdict(name, rivals[0].name, contrasts) if contrasts else none]
+    reason = next((rival.reasons["contrast"] for rival in rivals if "contrast" in rival.reasons), "")
+    model = rivals[0].name
+    no_contrast = f"Of {name}, the {model} is compared with no rival: {reason}."
+    return [*_alike(name, model, rivals), _verdict(name, model, contrasts) if contrasts else no_contrast]
 
 
 def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
@@ -75,17 +76,16 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     names = _rival_names([rival.name for rival in alike])
     counts = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
     figures = {_two_figures(count): name for count, name in (*counts[-1:], *counts[:1])}
-    each = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
+    figure_texts = [f"{figure} ({name})" for figure, name in reversed(figures.items())]
     opening = (
         f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
         f"of scores can tell {them} apart from it; "
     )
-    if not each:
+    if not figure_texts:
         return [f"{opening}at the r seen here, no number of surfaces would."]
-    return [
-        f"{opening}at the r seen here, Steiger's test would need {' to '.join(each)} surfaces for {POWER:.0%} "
-        "power.".replace("%", "\N{NO-BREAK SPACE}%")
-    ]
+    power = f"{POWER:.0%} power".replace("%", "\N{NO-BREAK SPACE}%")
+    counts_text = " to ".join(figure_texts)
+    return [f"{opening}at the r seen here, Steiger's test would need {counts_text} surfaces for {power}."]
 
 
 def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
@@ -109,27 +109,26 @@ def _verdict(name: str, model: str, rivals: Sequence[Rival]) -> str:
 
 
 def _row(rival: Rival, quantity: str) -> Row:
-    why = rival.reasons.get
-    contrast = rival.contrast
-    ends = bounds(rival.low, rival.high)
+    reason, contrast, weight = rival.reasons.get, rival.contrast, rival.weight
+    interval = bounds(rival.low, rival.high)
     partial = bounds(rival.partial_low, rival.partial_high)
-    less: Row = (NONE, NONE, NONE)
+    contrast_cells: Row = (NONE, NONE, NONE)
     if contrast is not None:
-        less = (
+        contrast_cells = (
             estimate_cell(contrast.difference, correlation, None, bounds(contrast.low, contrast.high)),
             NONE if contrast.z is None else digits(contrast.z, 2),
             NONE if contrast.p is None else p_value(contrast.p),
         )
     elif rival.name != quantity:
-        less = (number_cell(None, correlation, why("contrast")), NONE, NONE)
+        contrast_cells = (number_cell(None, correlation, reason("contrast")), NONE, NONE)
     return (
         rival.name,
         rival.n,
-        estimate_cell(rival.r, correlation, why("r"), ends, "too few cases, or a perfect r"),
-        *less,
-        estimate_cell(rival.partial, correlation, why("partial"), partial, "it takes five surfaces"),
-        number_cell(rival.left_out_error, places(1), why("left_out_error")),
-        NONE if rival.weight is None and why("weight") is None else number_cell(rival.weight, places(3), why("weight")),
+        estimate_cell(rival.r, correlation, reason("r"), interval, "too few cases, or a perfect r"),
+        *contrast_cells,
+        estimate_cell(rival.partial, correlation, reason("partial"), partial, "it takes five surfaces"),
+        number_cell(rival.left_out_error, places(1), reason("left_out_error")),
+        NONE if weight is None and reason("weight") is None else number_cell(weight, places(3), reason("weight")),
     )
 
 
@@ -140,16 +139,16 @@ def _rival_names(names: Sequence[str]) -> str:
     ('pressure and T', 'all 9 other responses of the model and T')
     """
     responses = [name for name in names if name in RESPONSES]
-    if len(responses) < MANY:
+    if len(responses) < MOST_NAMED:
         return _join_names(names)
     count = len(RESPONSES) - 1
-    how = "all" if len(responses) == count else f"{len(responses)} of the"
-    rest = [name for name in names if name not in RESPONSES]
-    return _join_names([f"{how} {count} other responses of the model", *rest])
+    quantifier = "all" if len(responses) == count else f"{len(responses)} of the"
+    measured = [name for name in names if name not in RESPONSES]
+    return _join_names([f"{quantifier} {count} other responses of the model", *measured])
 
 
 def _join_names(names: Sequence[str]) -> str:
-    return " and ".join(part for part in (", ".join(names[:-1]), names[-1] if names else "") if part)
+    return " and ".join(text for text in (", ".join(names[:-1]), names[-1] if names else "") if text)
 
 
 def _two_figures(n: int) -> str:

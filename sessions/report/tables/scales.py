@@ -1,5 +1,6 @@
 """Tables and sentences of scales from choices of two, of Stevens' exponent and of psychometric functions."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from sessions.report.contents import Report
 from sessions.report.tables import Cell, Row, Rows, Table, estimate_cell, number_cell, table
-from sessions.report.wording import NONE, capital, caption, digits, p_value, places, plural
+from sessions.report.wording import NONE, capital, digits, p_value, places, plural
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.scales import JUDGEMENTS, Judgement, PairedScale
@@ -18,44 +19,44 @@ CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
 
 def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     """Return the values of each surface by both models, where subjects chose between two."""
-    groups = [(one.descriptor, tuple(_rows(one))) for one in descriptors if one.scales]
-    return table("table-scales", caption("scales"), "surface | Bradley–Terry [logit] | Thurstone V [z]", groups)
+    groups = [(findings.descriptor, tuple(_rows(findings))) for findings in descriptors if findings.scales]
+    return table("table-scales", "scales", "surface | Bradley–Terry [logit] | Thurstone V [z]", groups)
 
 
 def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     """Return the latent values of each surface by every kind of judgement, where there are others than scores."""
-    judgements: list[Judgement] = [kind for kind in JUDGEMENTS if any(kind in one.latent for one in descriptors)]
+    judgements: list[Judgement] = [name for name in JUDGEMENTS if any(name in d.latent for d in descriptors)]
     if judgements in ([], ["scores"]):
         return None
     groups: list[Rows] = []
-    for one in descriptors:
-        means = {mean.index: mean.mean for mean in one.scores}
+    for findings in descriptors:
+        means = {mean.index: mean.mean for mean in findings.scores}
         rows = (
             (
                 index,
                 number_cell(means.get(index), places(1), "no scores were given"),
-                *(_latent(one, kind, index) for kind in judgements),
+                *(_latent(findings, judgement, index) for judgement in judgements),
             )
-            for index in one.indices
+            for index in findings.indices
         )
-        groups.append((one.descriptor, tuple(rows)))
-    heads = " | ".join(f"by {kind} [z]" for kind in judgements)
-    return table("table-latent", caption("latent"), f"surface | mean score [0–100] | {heads}", groups)
+        groups.append((findings.descriptor, tuple(rows)))
+    headings = " | ".join(f"by {judgement} [z]" for judgement in judgements)
+    return table("table-latent", "latent", f"surface | mean score [0–100] | {headings}", groups)
 
 
-def _latent(one: DescriptorFindings, kind: Judgement, index: int) -> Cell:
-    values = one.latent.get(kind)
-    value = None if values is None else values.get(index)
-    if value is None:
-        return number_cell(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
-    return estimate_cell(value.value, places(2), None, value.ends, "too few subjects")
+def _latent(findings: DescriptorFindings, judgement: Judgement, index: int) -> Cell:
+    values = findings.latent.get(judgement)
+    estimate = None if values is None else values.get(index)
+    if estimate is None:
+        return number_cell(None, str, f"no scale by {judgement}: nobody gave them, too few did, or nothing scatters")
+    return estimate_cell(estimate.value, places(2), None, estimate.ends, "too few subjects")
 
 
-def _rows(one: DescriptorFindings) -> Iterable[Row]:
-    indices = sorted({index for scale in one.scales for index in scale.values}) or list(one.indices)
+def _rows(findings: DescriptorFindings) -> Iterable[Row]:
+    indices = sorted({index for scale in findings.scales for index in scale.values}) or list(findings.indices)
     for index in indices:
-        yield (index, *(_value(scale, scale.values.get(index)) for scale in one.scales))
-    yield ("first of two", *(_value(scale, scale.first) for scale in one.scales))
+        yield (index, *(_value(scale, scale.values.get(index)) for scale in findings.scales))
+    yield ("first of two", *(_value(scale, scale.first) for scale in findings.scales))
 
 
 def _value(scale: PairedScale, interval: IntervalEstimate | None) -> Cell:
@@ -64,36 +65,34 @@ def _value(scale: PairedScale, interval: IntervalEstimate | None) -> Cell:
     return estimate_cell(interval.value, places(2), None, interval.ends, scale.interval_reason or None)
 
 
-def scale_sentences(one: DescriptorFindings) -> list[str]:
+def scale_sentences(findings: DescriptorFindings) -> list[str]:
     """Return what choices and estimates of a descriptor say beside their tables."""
     sentences: list[str] = []
-    name = capital(one.descriptor)
-    if one.scales and one.scales[0].p is not None:
+    name = capital(findings.descriptor)
+    if findings.scales and findings.scales[0].p is not None:
         fits = [
             f"{scale.model} {digits(scale.deviance, 1)} on {scale.freedom} degrees of freedom (p {p})"
-            for scale in one.scales
+            for scale in findings.scales
             if scale.deviance is not None and scale.p is not None
             for p in [p_value(scale.p) if scale.p < 0.001 else f"= {p_value(scale.p)}"]
         ]
         sentences.append(f"{name}: deviance of the scales from choices: {', '.join(fits)}.")
-    if one.consistence:
-        zeta = [exponent.zeta for exponent in one.consistence.values()]
+    if findings.consistence:
+        zeta = [exponent.zeta for exponent in findings.consistence.values()]
         orders = sum(value == CONSISTENT for value in zeta)
         sentences.append(
             f"{name}: {orders} of {plural(len(zeta), 'subject')} chose by one order without a circle; mean "
             f"coefficient of consistence {digits(float(np.mean(zeta)), 2)}."
         )
-    exponent = one.exponent
+    exponent = findings.exponent
     if exponent is not None and exponent.plain is not None:
         plain = exponent.plain
-        words = f"{digits(plain.estimate, 2)} ({digits(plain.low, 2)} to {digits(plain.high, 2)}) with µ taken as exact"
+        estimates = f"{digits(plain.estimate, 2)}{_range((plain.low, plain.high), float, 2)} with µ taken as exact"
         if exponent.deming is not None:
             value, low, high = exponent.deming
-            ends = "no interval: all subjects are alike"
-            if low is not None and high is not None:
-                ends = f"{digits(low, 2)} to {digits(high, 2)}"
-            words += f", {digits(value, 2)} ({ends}) with errors in both"
-        sentences.append(f"{name}: if estimates are a power of µ, its exponent is {words}.")
+            interval = _range(bounds(low, high), float, 2) or " (no interval: all subjects are alike)"
+            estimates += f", {digits(value, 2)}{interval} with errors in both"
+        sentences.append(f"{name}: if estimates are a power of µ, its exponent is {estimates}.")
     elif exponent is not None and exponent.reason:
         sentences.append(f"{name}: no exponent of the estimates by µ: {exponent.reason}.")
     return sentences
@@ -107,12 +106,12 @@ PsychometricResults = tuple[str, Mapping[str, Psychometric], Means]  # descripto
 def psychometric_table(judgements: Iterable[PsychometricResults]) -> Table | None:
     """Return PSE, JND, lapses, order and scatter of each subject, under the name of what was judged."""
     groups = [
-        (name, (*(_row(who, one) for who, one in functions.items()), *_mean_row(means)))
+        (name, (*itertools.starmap(_row, functions.items()), *_mean_row(means)))
         for name, functions, means in judgements
         if functions
     ]
     columns = "subject | answers | PSE [times µ] | JND [% of µ] | lapses [%] | order [% of µ] | correlation of answers"
-    return table("table-psychometric", caption("psychometric"), columns, groups)
+    return table("table-psychometric", "psychometric", columns, groups)
 
 
 def session_functions(report: Report) -> list[PsychometricResults]:
@@ -126,18 +125,18 @@ def session_functions(report: Report) -> list[PsychometricResults]:
 
 def study_functions(study: StudyFindings) -> list[PsychometricResults]:
     """Return the psychometric functions of a study: every subject's, and means over them."""
-    pairs = ((one.descriptor, one.constant_stimuli) for one in study.descriptors)
-    return [(name, one.functions, (one.pse, one.jnd)) for name, one in pairs if one is not None]
+    pairs = ((findings.descriptor, findings.constant_stimuli) for findings in study.descriptors)
+    return [(name, fits.functions, (fits.pse, fits.jnd)) for name, fits in pairs if fits is not None]
 
 
 def psychometric_sentences(results: PsychometricResults) -> list[str]:
     """Return what comparisons with a standard say: of one subject, or of subjects at large."""
     name, functions, (pse, jnd) = results
     title = capital(name)
-    fits = [one for one in functions.values() if one.pse is not None and one.jnd is not None]
+    fits = [fit for fit in functions.values() if fit.pse is not None and fit.jnd is not None]
     sentences: list[str] = []
     if len(functions) == 1:
-        sentences += [_of_one(title, one) for one in functions.values()]
+        sentences += [_psychometric_sentence(title, function) for function in functions.values()]
     elif pse is not None and jnd is not None:
         equal = f"{digits(math.exp(pse.mean), 2)}{_range(bounds(pse.low, pse.high), math.exp, 2)}"
         least = f"{digits(_mean_percent(jnd.mean), 0)} % of it{_range(bounds(jnd.low, jnd.high), _mean_percent, 0)}"
@@ -147,32 +146,33 @@ def psychometric_sentences(results: PsychometricResults) -> list[str]:
         )
     elif functions:
         sentences.append(f"{title}: no subject's answers give a psychometric function; the table says why.")
-    falling = sum(not one.rises for one in fits)
+    falling = sum(not fit.rises for fit in fits)
     if falling:
-        of = f"{falling} of {plural(len(fits), 'subject')}"
-        sentences.append(f"{title}: {of} chose the surface of less µ more often.")
+        count_text = f"{falling} of {plural(len(fits), 'subject')}"
+        sentences.append(f"{title}: {count_text} chose the surface of less µ more often.")
     return sentences
 
 
-def _of_one(title: str, one: Psychometric) -> str:
-    if one.pse is None or one.jnd is None or one.lapse is None:
-        return f"{title}: no psychometric function: {one.reason}."
+def _psychometric_sentence(title: str, function: Psychometric) -> str:
+    pse, threshold, lapse = function.pse, function.jnd, function.lapse
+    if pse is None or threshold is None or lapse is None:
+        return f"{title}: no psychometric function: {function.reason}."
     jnd = "bounded on neither side"
-    if one.jnd.high is None and one.jnd.low is not None:
-        jnd = f"above {digits(_percent(one.jnd.low), 0)} % of it"
-    elif one.jnd.value == 0.0 and one.jnd.high is not None:
-        jnd = f"below {digits(_percent(one.jnd.high), 0)} % of it"
-    elif one.jnd.low is not None and one.jnd.high is not None:
-        jnd = f"{digits(_percent(one.jnd.value), 0)} % of it{_range((one.jnd.low, one.jnd.high), _percent, 0)}"
+    if threshold.high is None and threshold.low is not None:
+        jnd = f"above {digits(_percent(threshold.low), 0)} % of it"
+    elif threshold.value == 0.0 and threshold.high is not None:
+        jnd = f"below {digits(_percent(threshold.high), 0)} % of it"
+    elif interval := _range(bounds(threshold.low, threshold.high), _percent, 0):
+        jnd = f"{digits(_percent(threshold.value), 0)} % of it{interval}"
     return (
-        f"{title}: by {one.answers} answers the surface felt equal to the standard has "
-        f"{digits(math.exp(one.pse.value), 2)}{_range(one.pse.ends, math.exp, 2)} times its µ; the just noticeable "
-        f"difference is {jnd}, with {digits(100.0 * one.lapse.value, 0)} % lapses."
+        f"{title}: by {function.answers} answers the surface felt equal to the standard has "
+        f"{digits(math.exp(pse.value), 2)}{_range(pse.ends, math.exp, 2)} times its µ; the just "
+        f"noticeable difference is {jnd}, with {digits(100.0 * lapse.value, 0)} % lapses."
     )
 
 
-def _range(ends: tuple[float, float] | None, unit: Callable[[float], float], after: int) -> str:
-    return "" if ends is None else f" ({digits(unit(ends[0]), after)} to {digits(unit(ends[1]), after)})"
+def _range(interval: tuple[float, float] | None, unit: Callable[[float], float], decimals: int) -> str:
+    return "" if interval is None else " ({} to {})".format(*(digits(unit(limit), decimals) for limit in interval))
 
 
 def _percent(difference: float) -> float:
@@ -190,35 +190,36 @@ def _mean_row(means: Means) -> Iterable[Row]:
     if pse is None or jnd is None or pse.n < LEAST_OF_A_MEAN:
         return
     cells: list[Cell] = []
-    for mean, unit, after in ((pse, math.exp, 2), (jnd, _mean_percent, 0)):
-        ends = None if mean.low is None or mean.high is None else (unit(mean.low), unit(mean.high))
-        cells.append(estimate_cell(unit(mean.mean), places(after), None, ends, "it takes two subjects"))
+    for mean, unit, decimals in ((pse, math.exp, 2), (jnd, _mean_percent, 0)):
+        interval = bounds(mean.low, mean.high)
+        limits = interval and (unit(interval[0]), unit(interval[1]))
+        cells.append(estimate_cell(unit(mean.mean), places(decimals), None, limits, "it takes two subjects"))
     yield ("geometric mean", f"of {pse.n} and {jnd.n}", *cells, NONE, NONE, NONE)
 
 
-def _row(who: str, one: Psychometric) -> Row:
+def _row(subject: str, function: Psychometric) -> Row:
     return (
-        who,
-        one.answers,
-        _cell(one.pse, one, math.exp, 2),
-        _cell(one.jnd, one, _percent, 0),
-        _cell(one.lapse, one, lambda share: 100.0 * share, 1),
-        _cell(one.order, one, _percent, 1),
-        _cell(one.correlation, one, float, 2, "answers to a pair are single, or all one way"),
+        subject,
+        function.answers,
+        _cell(function.pse, function, math.exp, 2),
+        _cell(function.jnd, function, _percent, 0),
+        _cell(function.lapse, function, lambda share: 100.0 * share, 1),
+        _cell(function.order, function, _percent, 1),
+        _cell(function.correlation, function, float, 2, "answers to a pair are single, or all one way"),
     )
 
 
 def _cell(
     profile: IntervalEstimate | None,
-    one: Psychometric,
+    function: Psychometric,
     unit: Callable[[float], float],
-    after: int,
+    decimals: int,
     without_order: str = "orders are not known",
 ) -> Cell:
     if profile is None:
-        return number_cell(None, str, one.reason or without_order)
-    ends = None if profile.ends is None else (unit(profile.ends[0]), unit(profile.ends[1]))
-    sides = [f"above {digits(unit(profile.low), after)}"] if profile.low is not None else []
-    sides += [f"below {digits(unit(profile.high), after)}"] if profile.high is not None else []
+        return number_cell(None, str, function.reason or without_order)
+    interval = None if profile.ends is None else (unit(profile.ends[0]), unit(profile.ends[1]))
+    sides = [f"above {digits(unit(profile.low), decimals)}"] if profile.low is not None else []
+    sides += [f"below {digits(unit(profile.high), decimals)}"] if profile.high is not None else []
     without = f"within what was compared the answers bound it {' and '.join(sides) or 'on neither side'}"
-    return estimate_cell(unit(profile.value), places(after), None, ends, without)
+    return estimate_cell(unit(profile.value), places(decimals), None, interval, without)

@@ -25,7 +25,6 @@ from sessions.report.tables.scales import psychometric_table, session_functions
 from sessions.report.wording import (
     NONE,
     capital,
-    caption,
     correlation,
     digits,
     identifier,
@@ -68,8 +67,8 @@ def stroke_table(report: Report) -> Table | None:
             ", ".join(name.replace("_", " ") for name in stroke.flaws) or "none",
         )
 
-    kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
-    return _table(report, "table-strokes", caption("session-strokes", kind=kind), columns, row)
+    interval_note = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
+    return _table(report, "table-strokes", "session-strokes", columns, row, kind=interval_note)
 
 
 def course_table(report: Report) -> Table | None:
@@ -83,22 +82,24 @@ def course_table(report: Report) -> Table | None:
 
     def row(stroke: StrokeFinding) -> Row:
         cell = partial(_estimate, stroke)
-        why = stroke.reasons.get("direction") or TOO_SHORT
+        reason = stroke.reasons.get("direction") or TOO_SHORT
         return (
             cell("normal_force", places(2)),
             cell("tangential_force", places(2)),
             cell("heading", places(1)),
-            number_cell(stroke.direction_agrees, places(3), why),
+            number_cell(stroke.direction_agrees, places(3), reason),
             cell("onset", places(3)),
             cell("break_away", places(3)),
             cell("slide_onset", places(3)),
         )
 
-    kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
-    return _table(report, "table-courses", caption("session-courses", kinds=kinds), columns, row)
+    kinds = "; ".join(f"{name.replace('_', ' ')}: {kind}" for name, kind in report.interval_kinds.items())
+    return _table(report, "table-courses", "session-courses", columns, row, kinds=kinds)
 
 
-def _table(report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row]) -> Table | None:
+def _table(
+    report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row], **values: str
+) -> Table | None:
     """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
     planned = any(stroke.trial is not None for stroke in report.strokes)
 
@@ -110,14 +111,15 @@ def _table(report: Report, name: str, caption: str, columns: str, row: Callable[
         return (stroke.number, cell(stroke.trial), stroke.code if by_code else cell(stroke.index), *row(stroke))
 
     groups = group_by_experiment(report, report.strokes, lambda s: s.experiment, name_row)
-    return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups)
+    columns = f"{'stroke | trial | index' if planned else 'stroke'} | {columns}"
+    return table(name, caption, columns, groups, **values)
 
 
 def _estimate(stroke: StrokeFinding, name: str, as_text: Format, unit: float = 1.0) -> Cell:
     """Return one number of a stroke over its bootstrap interval, or why it has none."""
     without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, TOO_SHORT)
-    why = stroke.reasons.get(name) or _WHY_MISSING.get(name)
-    return estimate_cell(getattr(stroke, name), as_text, why, stroke.bootstrap.get(name), without, unit=unit)
+    reason = stroke.reasons.get(name) or _WHY_MISSING.get(name)
+    return estimate_cell(getattr(stroke, name), as_text, reason, stroke.bootstrap.get(name), without, unit=unit)
 
 
 def ground_truth_table(report: Report) -> Table | None:
@@ -130,36 +132,37 @@ def ground_truth_table(report: Report) -> Table | None:
         "off by [%] | true speed [mm/s] | estimated speed [mm/s] | off by [%] | direction"
     )
 
-    def row(p: GroundTruth) -> Row:
-        stroke, prediction = strokes_by_trial.get(p.trial), predictions.get(p.trial)
+    def row(trial: GroundTruth) -> Row:
+        stroke, prediction = strokes_by_trial.get(trial.trial), predictions.get(trial.trial)
         first = stroke or prediction
-        cells: list[Cell | str | int] = [p.trial, NONE if first is None or first.index is None else str(first.index)]
+        index = NONE if first is None or first.index is None else str(first.index)
+        cells: list[Cell | str | int] = [trial.trial, index]
         name, mu = of_predictions.model_mu(stroke, prediction)
         quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
-            (name, p.mu, mu, places(3), 1.0),
-            ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
-            ("speed", p.speed, stroke.speed if stroke else None, places(1), 1.0),
+            (name, trial.mu, mu, places(3), 1.0),
+            ("tau_max", trial.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
+            ("speed", trial.speed, stroke.speed if stroke else None, places(1), 1.0),
         )
         for name, truth, value, as_text, unit in quantities:
             reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
-            ends = stroke.bootstrap.get(name) if stroke else None
-            cell = estimate_cell(value, as_text, reason, ends, TOO_SHORT, unit=unit)
-            off = None if value is None else 100 * (value / truth - 1)
-            cells += [as_text(truth), cell, number_cell(off, with_sign, reason)]
-        right = stroke is not None and stroke.direction == p.direction
-        cells.append(Cell("right" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
+            interval = stroke.bootstrap.get(name) if stroke else None
+            cell = estimate_cell(value, as_text, reason, interval, TOO_SHORT, unit=unit)
+            error = None if value is None else 100 * (value / truth - 1)
+            cells += [as_text(truth), cell, number_cell(error, with_sign, reason)]
+        agrees = stroke is not None and stroke.direction == trial.direction
+        cells.append(Cell("right" if agrees else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
 
-    names = {trial: one.experiment for trial, one in {**predictions, **strokes_by_trial}.items()}
-    groups = group_by_experiment(report, report.ground_truth, lambda p: names.get(p.trial, ""), row)
-    return table("table-planted", caption("session-ground-truth"), columns, groups)
+    names = {trial: finding.experiment for trial, finding in {**predictions, **strokes_by_trial}.items()}
+    groups = group_by_experiment(report, report.ground_truth, lambda trial: names.get(trial.trial, ""), row)
+    return table("table-planted", "session-ground-truth", columns, groups)
 
 
 def score_table(report: Report) -> Table | None:
     """Return mean scores with their intervals."""
     groups = [(e.name, [score_cells(m) for m in e.scores]) for e in report.experiments]
     columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
-    return table("table-scores", caption("session-scores"), columns, groups)
+    return table("table-scores", "session-scores", columns, groups)
 
 
 def score_cells(mean: MeanScore) -> Row:
@@ -177,18 +180,19 @@ def spread_cell(sd: float | None, n: int, as_text: Format, reason: str | None) -
 def answer_tables(report: Report) -> tuple[Table | None, ...]:
     """Return every subject's scores, a table an experiment."""
     tables: list[Table | None] = []
-    for e in report.experiments:
-        rows = [(who, *(number_cell(s, places(1), "no score") for s in own)) for who, own in e.answers.items()]
-        columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
-        caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
-        tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)]))
+    for experiment in report.experiments:
+        answers = experiment.answers.items()
+        rows = [(subject, *(number_cell(s, places(1), "no score") for s in scores)) for subject, scores in answers]
+        columns = " | ".join(["subject", *(f"index {index}" for index in experiment.indices)])
+        name, descriptor = f"table-answers-{identifier(experiment.name)}", experiment.descriptor
+        tables.append(table(name, "session-answers", columns, [("", rows)], descriptor=descriptor))
     return tuple(tables)
 
 
 def other_answer_table(report: Report) -> Table | None:
     """Return the numbers and the choices of the session's own subject."""
     groups = [(e.name, list(e.other_answers)) for e in report.experiments]
-    return table("table-other-answers", caption("session-other-answers"), "trial | index | answer", groups)
+    return table("table-other-answers", "session-other-answers", "trial | index | answer", groups)
 
 
 def relation_table(report: Report) -> Table | None:
@@ -196,29 +200,35 @@ def relation_table(report: Report) -> Table | None:
     quantity = shown_response(report.response)
     groups: list[Rows] = []
     for e in report.experiments:
-        relations = (("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation))
-        groups.append((e.name, [_relation_row(name, r) for name, r in relations if r is not None]))
+        relations = {"mean score": e.score_relation, "own score": e.own_relation, "index": e.index_relation}
+        groups.append((e.name, [_relation_row(name, r) for name, r in relations.items() if r is not None]))
     columns = (
         f"{quantity.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
         f"exact p of rho | slope [{quantity.step} a point] | r without one"
     )
-    any_own = any(e.own_relation is not None for e in report.experiments)
-    own = "The forces are those of one subject, whose scores are the own ones. " if any_own else ""
-    scores = "scores and to " if report.scored else ""
-    words = caption("session-relation", label=quantity.label, model=report.model, scores=scores, own=own)
-    return table("table-relation", words, columns, groups)
+    any_own = any(experiment.own_relation is not None for experiment in report.experiments)
+    texts = {
+        "own": "The forces are those of one subject, whose scores are the own ones. " if any_own else "",
+        "scores": "scores and to " if report.scored else "",
+    }
+    model = {"label": quantity.label, "model": report.model}
+    return table("table-relation", "session-relation", columns, groups, **model, **texts)
 
 
 def rank_interval(relation: Relation) -> Cell:
     """Return the interval of Spearman's rho, or why it has none."""
-    alike = "no interval of a perfect rho" if relation.n > 3 else f"no interval of rho from {relation.n} points"
-    why = alike if relation.spearman is not None else relation.reason
-    return range_cell(relation.spearman_low, relation.spearman_high, correlation, why)
+    reason = "no interval of a perfect rho" if relation.n > 3 else f"no interval of rho from {relation.n} points"
+    reason = relation.reason if relation.spearman is None else reason
+    return range_cell(relation.spearman_low, relation.spearman_high, correlation, reason)
 
 
 def _relation_row(name: str, relation: Relation) -> Row:
     without = [(label, NONE if r is None else correlation(r)) for label, r in relation.without]
     no_slope = "no line has one through two points, or through points wholly on it"
+
+    def in_millionths(slope: float) -> str:
+        return significant(1e6 * slope, 3)
+
     return (
         name,
         relation.n,
@@ -227,14 +237,7 @@ def _relation_row(name: str, relation: Relation) -> Row:
         number_cell(relation.spearman, correlation, relation.reason),
         rank_interval(relation),
         number_cell(relation.spearman_p, p_value, relation.reason or "too many orders to count"),
-        estimate_cell(
-            relation.slope,
-            lambda v: significant(1e6 * v, 3),
-            relation.reason,
-            slope_interval(relation),
-            no_slope,
-            unit=1e6,
-        ),
+        estimate_cell(relation.slope, in_millionths, relation.reason, slope_interval(relation), no_slope, unit=1e6),
         ", ".join(f"{label}:\N{NO-BREAK SPACE}{r}" for label, r in without),
     )
 
@@ -248,41 +251,44 @@ def paths_table(path_groups: Iterable[NamedPaths]) -> Table | None:
     columns = (
         "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
     )
-    return table("table-paths", caption("paths", same=SAME), columns, groups)
+    return table("table-paths", "paths", columns, groups, same=SAME)
 
 
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     """Return the distribution in a sentence, and how many paths turn the sign of the usual one."""
     values = correlations(findings)
-    whole, usual = spread(values), next((r for r, one in zip(values, findings, strict=True) if one.usual and r), 0.0)
+    distribution = spread(values)
+    usual = next((r for r, finding in zip(values, findings, strict=True) if finding.usual and r), 0.0)
     start = f"{capital(name)}: of {len(findings)} paths of the analysis"
-    if whole is None:
+    if distribution is None:
         return f"{start} none gives a correlation."
     opposite_count = sum(r is not None and r * usual < 0.0 for r in values)
-    turn = f", {opposite_count} with another sign than the usual path" if opposite_count else ""
-    differ = "all agree within" if whole.distinct == 1 else f"{whole.distinct} of these differ by more than"
+    sign_clause = f", {opposite_count} with another sign than the usual path" if opposite_count else ""
+    distinct = distribution.distinct
+    difference = "all agree within" if distinct == 1 else f"{distinct} of these differ by more than"
+    least, median, greatest = map(correlation, (distribution.least, distribution.median, distribution.greatest))
     return (
-        f"{start} {whole.correlated} give a correlation, from {correlation(whole.least)} to "
-        f"{correlation(whole.greatest)}, median {correlation(whole.median)}{turn}; {differ} {SAME:g}."
+        f"{start} {distribution.correlated} give a correlation, from {least} to {greatest}, "
+        f"median {median}{sign_clause}; {difference} {SAME:g}."
     )
 
 
 def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
     rows = [("all", "", "", *_spread(spread(correlations(findings)), len(findings)))]
-    before = ""
-    for choice, name, of, usual in by_choice(findings):
-        count = sum(getattr(one.path, choice) == name for one in findings)
-        label = CHOICE_LABELS[choice] if choice != before else ""
-        rows.append((label, name, "usual" if usual else "", *_spread(of, count)))
-        before = choice
+    previous = ""
+    for choice, name, distribution, usual in by_choice(findings):
+        count = sum(getattr(finding.path, choice) == name for finding in findings)
+        label = CHOICE_LABELS[choice] if choice != previous else ""
+        rows.append((label, name, "usual" if usual else "", *_spread(distribution, count)))
+        previous = choice
     return tuple(rows)
 
 
-def _spread(of: Spread | None, paths: int) -> Row:
-    if of is None:
+def _spread(distribution: Spread | None, paths: int) -> Row:
+    if distribution is None:
         return (f"0 of {paths}", *(NONE for _ in range(6)))
-    numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
-    return (f"{of.correlated} of {paths}", of.distinct, *(correlation(value) for value in numbers))
+    numbers = (distribution.least, distribution.lower, distribution.median, distribution.upper, distribution.greatest)
+    return (f"{distribution.correlated} of {paths}", distribution.distinct, *(correlation(value) for value in numbers))
 
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:

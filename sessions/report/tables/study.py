@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
+from operator import itemgetter
 
 from sessions.prediction import BY_NAME
 from sessions.report.tables import Cell, Format, Row, Table, number_cell, range_cell, sections_of, table
@@ -11,7 +13,6 @@ from sessions.report.tables.session import paths_table, rank_interval, score_cel
 from sessions.report.tables.study_models import flaws_table, ground_truth_table, models_table, study_model, trials_table
 from sessions.report.wording import (
     NONE,
-    caption,
     correlation,
     digits,
     p_value,
@@ -47,7 +48,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "rivals": _rivals(study),
         "models": (models_table(study),),
         "visits": (_visits(study),),
-        "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
+        "paths": (paths_table((findings.descriptor, findings.paths) for findings in study.descriptors),),
         "ground_truth": (ground_truth_table(study), flaws_table(study)),
         "trials": (trials_table(study),),
     }
@@ -56,8 +57,8 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
 
 def _visits(study: StudyFindings) -> Table | None:
     def row(visit: Visit) -> Row:
-        out = ["nothing"] if visit.session in dict(study.copies) else []
-        out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
+        exclusions = ["nothing"] if visit.session in dict(study.copies) else []
+        exclusions += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
         return (
             visit.session,
             visit.subject,
@@ -65,66 +66,66 @@ def _visits(study: StudyFindings) -> Table | None:
             str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE,
             "yes" if visit.complete else "no",
             sum(bool(row.flaws) for row in visit.rows),
-            "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}"),
+            "yes" if not exclusions else ("no" if "nothing" in exclusions else f"without {', '.join(exclusions)}"),
         )
 
     columns = "session | subject | answers | strokes with SED | ended as planned | flawed trials | counted"
-    return table("table-visits", caption("study-visits"), columns, [("", map(row, study.visits))])
+    return table("table-visits", "study-visits", columns, [("", map(row, study.visits))])
 
 
 def _scores(study: StudyFindings) -> Table | None:
 
-    def rows(one: DescriptorFindings) -> Iterable[Row]:
-        within = {mean.index: mean for mean in one.within}
-        for mean in one.scores:
-            inner = within.get(mean.index)
+    def rows(findings: DescriptorFindings) -> Iterable[Row]:
+        within = {mean.index: mean for mean in findings.within}
+        for mean in findings.scores:
+            within_mean = within.get(mean.index)
             *cells, spread = score_cells(mean)
-            low, high = (None, None) if inner is None else (inner.low, inner.high)
+            low, high = (None, None) if within_mean is None else (within_mean.low, within_mean.high)
             yield (*cells, range_cell(low, high, places(1), _NOT_WITHIN), spread)
 
     columns = (
         "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | "
         "within subjects [0–100] | standard deviation [0–100]"
     )
-    complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
-    words = caption("study-scores", complete=complete or "none")
-    return _table(study, "table-scores", words, columns, rows)
+    complete = ", ".join(f"{d.within[0].n} for {d.descriptor}" for d in study.descriptors if d.within)
+    return _table(study, "table-scores", "study-scores", columns, rows, complete=complete or "none")
 
 
 def _agreement(study: StudyFindings) -> Table | None:
-    rows = tuple(
-        (one.descriptor, of.n, digits(of.kendall_w, 2), p_value(of.friedman_p), p_value(of.page_p))
-        for one in study.descriptors
-        if (of := one.agreement) is not None
-    )
+    agreements = ((findings.descriptor, findings.agreement) for findings in study.descriptors)
+    rows = [
+        (descriptor, fit.n, digits(fit.kendall_w, 2), p_value(fit.friedman_p), p_value(fit.page_p))
+        for descriptor, fit in agreements
+        if fit is not None
+    ]
     columns = "descriptor | subjects | Kendall's W | Friedman's p | Page's p"
-    return table("table-agreement", caption("study-agreement"), columns, [("", rows)])
+    return table("table-agreement", "study-agreement", columns, [("", rows)])
 
 
 def _normalised_scores(study: StudyFindings) -> Table | None:
 
-    def rows(one: DescriptorFindings) -> Iterable[Row]:
-        raw = {mean.index: mean for mean in one.scores}
-        for index, mean in one.normalised.means.items():
+    def rows(findings: DescriptorFindings) -> Iterable[Row]:
+        raw = {mean.index: mean for mean in findings.scores}
+        for index, mean in findings.normalised.means.items():
             plain = raw[index]
-            ends = range_cell(plain.low, plain.high, places(1), plain.reason)
-            yield (index, plain.n, digits(plain.mean, 1), ends, mean.n, *_mean(mean, places(2)))
+            interval = range_cell(plain.low, plain.high, places(1), plain.reason)
+            yield (index, plain.n, digits(plain.mean, 1), interval, mean.n, *_mean(mean, places(2)))
 
     columns = (
         "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
     )
-    return _table(study, "table-normalised", caption("study-normalised"), columns, rows)
+    return _table(study, "table-normalised", "study-normalised", columns, rows)
 
 
 def _differences(study: StudyFindings) -> Table | None:
-    def rows(one: DescriptorFindings) -> Iterable[Row]:
-        for pair in one.differences:
+    def rows(findings: DescriptorFindings) -> Iterable[Row]:
+        for pair in findings.differences:
             name = f"{pair.high_index} − {pair.low_index}"
-            ends = range_cell(pair.low, pair.high, places(1))
-            yield (name, pair.n, digits(pair.mean, 1), ends, p_value(pair.p), p_value(pair.p_holm))
+            interval = range_cell(pair.low, pair.high, places(1))
+            yield (name, pair.n, digits(pair.mean, 1), interval, p_value(pair.p), p_value(pair.p_holm))
 
     columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
-    return _table(study, "table-differences", caption("study-differences"), columns, rows)
+    return _table(study, "table-differences", "study-differences", columns, rows)
 
 
 def _estimates(study: StudyFindings) -> Table | None:
@@ -132,25 +133,26 @@ def _estimates(study: StudyFindings) -> Table | None:
     def from_log(log: float) -> str:
         return three_figures(math.exp(log))
 
-    def rows(one: DescriptorFindings) -> Iterable[Row]:
-        if one.estimates is None:
+    def rows(findings: DescriptorFindings) -> Iterable[Row]:
+        if findings.estimates is None:
             return
-        for index, geometric in one.estimates.geometric.items():
-            means = (geometric, one.estimates.equal_moduli[index])
+        for index, geometric in findings.estimates.geometric.items():
+            means = (geometric, findings.estimates.equal_moduli[index])
             yield (index, geometric.n, *(cell for mean in means for cell in _mean(mean, from_log)))
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
-    out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]
-    note = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
-    return _table(study, "table-estimates", caption("study-estimates", left=note), columns, rows)
+    left_out = {d.descriptor: d.estimates.left_out for d in study.descriptors if d.estimates and d.estimates.left_out}
+    subjects = "; ".join(f"{descriptor}: {', '.join(names)}" for descriptor, names in left_out.items())
+    note = f" Left out for an estimate that is not above 0: {subjects}." if subjects else ""
+    return _table(study, "table-estimates", "study-estimates", columns, rows, left=note)
 
 
 def _surfaces(study: StudyFindings) -> Table | None:
 
-    def row(one: DescriptorFindings) -> Iterable[Row]:
-        for s in one.surfaces if any(s.subjects for s in one.surfaces) else ():
-            cells = (*_mean(s.mu, places(3)), *_mean(s.response, in_unit))
-            yield (s.index, s.subjects, *cells, _spread(s.response, quantity.factor))
+    def rows(findings: DescriptorFindings) -> Iterable[Row]:
+        for surface in findings.surfaces if any(s.subjects for s in findings.surfaces) else ():
+            cells = (*_mean(surface.mu, places(3)), *_mean(surface.response, in_unit))
+            yield (surface.index, surface.subjects, *cells, _spread(surface.response, quantity.factor))
 
     def in_unit(response: float) -> str:
         return digits(quantity.factor * response, quantity.places)
@@ -161,8 +163,7 @@ def _surfaces(study: StudyFindings) -> Table | None:
         f"index | subjects | µ [1] | 95 % interval [1] | {quantity.label} [{unit}] | 95 % interval [{unit}] | "
         f"standard deviation [{unit}]"
     )
-    words = caption("study-surfaces", label=quantity.label, model=study_model(study))
-    return _table(study, "table-surfaces", words, columns, row)
+    return _table(study, "table-surfaces", "study-surfaces", columns, rows)
 
 
 def _spread(mean: Average | None, factor: float) -> Cell:
@@ -174,17 +175,18 @@ def _spread(mean: Average | None, factor: float) -> Cell:
 
 def _forces(study: StudyFindings) -> Table | None:
 
-    def row(one: DescriptorFindings) -> Iterable[Row]:
-        for s in one.surfaces:
-            if s.normal_force is not None or s.model_normal_force is not None:
-                numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
-                yield (s.index, s.subjects, *(cell for number in numbers for cell in _mean(number, places(2))))
+    def rows(findings: DescriptorFindings) -> Iterable[Row]:
+        for surface in findings.surfaces:
+            if surface.normal_force is not None or surface.model_normal_force is not None:
+                numbers = (surface.normal_force, surface.model_normal_force, surface.matching_depth)
+                cells = chain.from_iterable(_mean(number, places(2)) for number in numbers)
+                yield (surface.index, surface.subjects, *cells)
 
     columns = (
         "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
         "depth to match [mm] | 95 % interval [mm]"
     )
-    return _table(study, "table-forces", caption("study-forces", model=study_model(study)), columns, row)
+    return _table(study, "table-forces", "study-forces", columns, rows)
 
 
 _NOT_WITHIN = "no interval: no two subjects scored every surface, or they differ alike between surfaces"
@@ -201,26 +203,25 @@ def _mean(mean: Average | None, as_text: Format) -> Row:
 
 def _relation(study: StudyFindings) -> Table | None:
 
-    def rows(one: DescriptorFindings) -> tuple[Row, ...]:
-        of_estimates = None if one.estimates is None else one.estimates.repeated
+    def rows(findings: DescriptorFindings) -> tuple[Row, ...]:
+        of_estimates = None if findings.estimates is None else findings.estimates.repeated
         return (
-            *_of_means("means", one.mean_relation),
-            *_of_means("means, standardised", one.normalised.mean_relation),
-            *_within_subjects("within subjects", one.repeated, one.repeated_holm, one.without_subject),
-            *_within_subjects("within, standardised", one.normalised.repeated),
+            *_of_means("means", findings.mean_relation),
+            *_of_means("means, standardised", findings.normalised.mean_relation),
+            *_within_subjects("within subjects", findings.repeated, findings.repeated_holm, findings.without_subject),
+            *_within_subjects("within, standardised", findings.normalised.repeated),
             *_within_subjects("within, log estimates", of_estimates),
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
-    words = caption("study-relation", label=BY_NAME[study.response].label, model=study_model(study))
-    return _table(study, "table-relation", words, columns, rows)
+    return _table(study, "table-relation", "study-relation", columns, rows)
 
 
 def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
     rival_groups = [
-        (f"{one.descriptor}, {kind}", rivals)
-        for one in study.descriptors
-        for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
+        (f"{findings.descriptor}, {level}", rivals)
+        for findings in study.descriptors
+        for level, rivals in (("means over subjects", findings.rivals_of_means), ("within subjects", findings.rivals))
     ]
     return rival_tables(rival_groups, BY_NAME[study.response].label, study_model(study))
 
@@ -267,10 +268,12 @@ def _or_dash(value: float | None, as_text: Format) -> str:
 def _without(left_out: Sequence[tuple[str, float]]) -> str:
     if not left_out:
         return NONE
-    least, greatest = min(left_out, key=lambda one: one[1]), max(left_out, key=lambda one: one[1])
-    return ", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest))
+    extremes = min(left_out, key=itemgetter(1)), max(left_out, key=itemgetter(1))
+    return ", ".join(f"{correlation(r)} ({name})" for name, r in extremes)
 
 
-def _table(study: StudyFindings, name: str, words: str, columns: str, rows: RowsOf) -> Table | None:
+def _table(study: StudyFindings, name: str, caption: str, columns: str, rows: RowsOf, **values: str) -> Table | None:
     """Return a table with the rows of each descriptor under its name."""
-    return table(name, words, columns, ((one.descriptor, rows(one)) for one in study.descriptors))
+    groups = ((findings.descriptor, rows(findings)) for findings in study.descriptors)
+    model = {"label": BY_NAME[study.response].label, "model": study_model(study)}
+    return table(name, caption, columns, groups, **model, **values)
