@@ -44,16 +44,16 @@ _REMEDIES: tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...] = (  # for w
     ("restore it from a copy, or give another name", (errno.ENOENT,), ()),
     (_OTHER, (), (sqlite3.SQLITE_CANTOPEN,)),
 )
-_BY_ERRNO = {number: words for words, numbers, _ in _REMEDIES for number in numbers}
-_BY_SQLITE = {code: words for words, _, codes in _REMEDIES for code in codes}
+_BY_ERRNO = {number: advice for advice, numbers, _ in _REMEDIES for number in numbers}
+_BY_SQLITE = {code: advice for advice, _, codes in _REMEDIES for code in codes}
 
 
-def read_within_limit(path: Path, most: int = LARGEST_DOCUMENT) -> bytes:
-    """Return the bytes of a file, which may be a pipe. Raises OSError, also where there are more than `most`."""
+def read_within_limit(path: Path, limit: int = LARGEST_DOCUMENT) -> bytes:
+    """Return the bytes of a file, which may be a pipe. Raises OSError, also where there are more than `limit`."""
     with path.open("rb") as file:
-        if os.fstat(file.fileno()).st_size <= most and len(content := file.read(most + 1)) <= most:
+        if os.fstat(file.fileno()).st_size <= limit and len(content := file.read(limit + 1)) <= limit:
             return content
-    raise OSError(errno.EFBIG, f"it holds more than {most / 2**20:.0f} MB", str(path))
+    raise OSError(errno.EFBIG, f"it holds more than {limit / 2**20:.0f} MB", str(path))
 
 
 def open_new(path: Path) -> BinaryIO:
@@ -64,11 +64,11 @@ def open_new(path: Path) -> BinaryIO:
 
 def gzip_lines(path: Path) -> Iterator[str]:
     """Yield the lines of a table packed by gzip. Raises ValueError where it grows as no readings do, OSError."""
-    size, most = 0, MOST_PACKED * path.stat().st_size + LARGEST_TEXT
+    size, limit = 0, MOST_PACKED * path.stat().st_size + LARGEST_TEXT
     with gzip.open(path, "rt", encoding="utf-8") as file:
         while line := file.readline(LONGEST_LINE):
             size += len(line)
-            if len(line) == LONGEST_LINE or size > most:
+            if len(line) == LONGEST_LINE or size > limit:
                 raise ValueError(f"{path.name} unpacks to more than readings can")
             yield line
 
@@ -141,14 +141,14 @@ def write_whole(path: Path, content: bytes) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(content)
         return
-    new = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with open_new(new) as file:
+        with open_new(temporary) as file:
             file.write(content)
-        put_in_place(new, path)
+        put_in_place(temporary, path)
     except OSError as error:  # a full disk, on which a part of the file would only take room
         with suppress(OSError):
-            new.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         error.filename, error.filename2 = str(path), None  # people know no other name of it
         raise
 
@@ -183,22 +183,22 @@ def whole_or_nothing(folder: Path, unless: type[Exception]) -> Generator[None]:
 
     Where it raises `unless`, what the folder holds is another program's, and stays.
     """
-    new = not holds_something(folder)
+    is_new = not holds_something(folder)
     try:
         yield
     except unless:
         raise
     except BaseException:
-        if new:
+        if is_new:
             shutil.rmtree(folder, ignore_errors=True)
         raise
 
 
-def put_in_place(new: Path, path: Path) -> None:
+def put_in_place(finished: Path, path: Path) -> None:
     """Give a finished file its name, after it is safe on the disk."""
-    with new.open("rb+") as file:
+    with finished.open("rb+") as file:
         os.fsync(file.fileno())
-    new.replace(path)
+    finished.replace(path)
     sync_folder(path.parent)
 
 
@@ -290,16 +290,17 @@ def complete(document: Mapping[str, Any], form: type[T]) -> T:
     return value
 
 
-def _missing_keys(document: object, complete: object, where: str = "") -> Iterator[str]:
+def _missing_keys(document: object, complete: object, path: str = "") -> Iterator[str]:
     """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
     if isinstance(complete, list | tuple):
-        for at, (part, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)):
-            yield from _missing_keys(part, item, f"{where}[{at}]")
+        items = zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)
+        for index, (item, complete_item) in enumerate(items):
+            yield from _missing_keys(item, complete_item, f"{path}[{index}]")
     elif isinstance(complete, dict):
-        part = cast("Mapping[str, Any]", document)
+        table = cast("Mapping[str, Any]", document)
         for name, item in cast("dict[str, Any]", complete).items():
-            path = f"{where}.{name}" if where else name
-            if name in part:
-                yield from _missing_keys(part[name], item, path)
+            key = f"{path}.{name}" if path else name
+            if name in table:
+                yield from _missing_keys(table[name], item, key)
             elif item is not None:
-                yield path
+                yield key

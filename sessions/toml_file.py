@@ -61,8 +61,8 @@ def load_toml(path: Path, cls: type[T]) -> T:
 def text_of(path: Path) -> str:
     """Return the text of a TOML file, which may be a pipe. Raises as `load_toml` does."""
     if path.is_dir() or not path.exists():
-        what = "this is a folder" if path.is_dir() else "there is no such file"
-        raise FileNotFoundError(f"{path}: {what}; give the path of a TOML file")
+        problem = "this is a folder" if path.is_dir() else "there is no such file"
+        raise FileNotFoundError(f"{path}: {problem}; give the path of a TOML file")
     with name_failure(OSError, f"{path} cannot be read"):
         content = read_within_limit(path, LARGEST_TEXT)
     try:
@@ -79,7 +79,7 @@ def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | 
     try:
         return from_table({**tables_in(text, where), **(instead or {})}, cls, where)
     except _Wrong as wrong:
-        line = _line_of(text, wrong.key)
+        line = _line_number(text, wrong.key)
         raise SettingsError(f"{where}{f', line {line}' if line else ''}: {wrong.sentence}") from wrong
 
 
@@ -127,8 +127,8 @@ def _places(value: Any, form: inspect.Type | None, key: str) -> Iterator[tuple[s
     """Yield the key, the value and the type of a place in a table and of all places inside it."""
     yield key, value, form
     if isinstance(value, list):
-        for at, item in enumerate(cast("list[Any]", value)):
-            yield from _places(item, _inside(form, at), f"{key}[{at}]")
+        for index, item in enumerate(cast("list[Any]", value)):
+            yield from _places(item, _inside(form, index), f"{key}[{index}]")
     if isinstance(value, Mapping):
         for name, item in cast("Mapping[str, Any]", value).items():
             yield from _places(item, _inside(form, name), _join_key(key, name))
@@ -138,32 +138,32 @@ def _member_with_places(form: inspect.Type | None) -> inspect.Type | None:
     """Return the member of a union that holds other values, or the type itself where it is no union."""
     kinds = (inspect.DataclassType, inspect.StructType, inspect.ListType, inspect.VarTupleType, inspect.TupleType)
     types = form.types if isinstance(form, inspect.UnionType) else (form,)
-    return next((one for one in types if isinstance(one, kinds)), None)
+    return next((member for member in types if isinstance(member, kinds)), None)
 
 
-def _inside(form: inspect.Type | None, part: str | int) -> inspect.Type | None:
+def _inside(form: inspect.Type | None, position: str | int) -> inspect.Type | None:
     """Return the type at a name or a position inside a type; None where it has none there."""
-    match _member_with_places(form), part:
+    match _member_with_places(form), position:
         case inspect.DataclassType(fields=fields) | inspect.StructType(fields=fields), str():
-            return next((field.type for field in fields if field.encode_name == part), None)
+            return next((field.type for field in fields if field.encode_name == position), None)
         case inspect.VarTupleType(item_type=item) | inspect.ListType(item_type=item), int():
             return item
         case inspect.TupleType(item_types=items), int():
-            return items[min(part, len(items) - 1)]
+            return items[min(position, len(items) - 1)]
         case _:
             return None
 
 
 def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, inspect.Type | None]]) -> tuple[str, str]:
     """Return the key that msgspec refuses, as a TOML file would write it, and a sentence about it."""
-    message, _, place = str(error).partition(" - at `$")
-    path = place.strip(".`").removesuffix("[...]")
+    message, _, location = str(error).partition(" - at `$")
+    path = location.strip(".`").removesuffix("[...]")
     cause = error.__cause__
     if cause is None:
         value, form = places[path]
         if absence := re.match(r"Object missing required field `(.*?)`", message):
-            return path, f"{_join_key(path, absence[1])} is missing; it must be {_in_words(_inside(form, absence[1]))}"
-        return path, f"{path} = {toml_value(value)} is not allowed: it must be {_in_words(form)}"
+            return path, f"{_join_key(path, absence[1])} is missing; it must be {_type_text(_inside(form, absence[1]))}"
+        return path, f"{path} = {toml_value(value)} is not allowed: it must be {_type_text(form)}"
     # A dataclass that checks itself names the key, in full or from itself on.
     key = str(getattr(cause, "key", ""))
     if not key:
@@ -183,7 +183,7 @@ def _join_key(key: str, name: str) -> str:
     return f"{key}.{bare_or_quoted}" if key else bare_or_quoted
 
 
-def _in_words(form: inspect.Type | None) -> str:
+def _type_text(form: inspect.Type | None) -> str:
     """Say what a type allows.
 
     >>> _in_words(inspect.type_info(tuple[float, float])), _in_words(inspect.type_info(float | None))
@@ -193,16 +193,17 @@ def _in_words(form: inspect.Type | None) -> str:
     """
     match form:
         case inspect.UnionType(types):
-            return " or ".join(_in_words(choice) for choice in types if not isinstance(choice, inspect.NoneType))
+            return " or ".join(_type_text(choice) for choice in types if not isinstance(choice, inspect.NoneType))
         case inspect.LiteralType(values):
             return " or ".join(f'"{value}"' for value in values)
         case inspect.VarTupleType(item) | inspect.ListType(item):
-            return f"a list, each {_in_words(item)}"
+            return f"a list, each {_type_text(item)}"
         case inspect.FloatType(gt=above, ge=least, le=most):
-            ends = {"above": above, "at least": least, "at most": most}
-            return f"a number {' and '.join(f'{w} {end:g}' for w, end in ends.items() if end is not None)}".rstrip()
+            limits = {"above": above, "at least": least, "at most": most}
+            texts = [f"{label} {limit:g}" for label, limit in limits.items() if limit is not None]
+            return f"a number {' and '.join(texts)}".rstrip()
         case inspect.TupleType(items):
-            return f"a list of {len(items)}, each {_in_words(items[0])}"
+            return f"a list of {len(items)}, each {_type_text(items[0])}"
         case _:
             return _WORDS.get(type(form), "a value")
 
@@ -224,10 +225,10 @@ def toml_text(value: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbe
 def _lines(table: Mapping[str, Any], name: str) -> Iterator[str]:
     """Yield a table's own values, and then the tables inside it."""
     inside: dict[str, Mapping[str, Any]] = {key: value for key, value in table.items() if isinstance(value, Mapping)}
-    own = {key: value for key, value in table.items() if value is not None and key not in inside}
-    if name and own:
+    values = {key: value for key, value in table.items() if value is not None and key not in inside}
+    if name and values:
         yield f"\n[{name}]"
-    for key, value in own.items():
+    for key, value in values.items():
         yield f"{key} = {_inline(value)}"
     for key, value in inside.items():
         yield from _lines(value, f"{name}.{key}" if name else key)
@@ -245,7 +246,7 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_inline, cast("tuple[Any, ...]", value))) + "]"
     if isinstance(value, str):
-        return "".join(c if c.isprintable() else _escape(c) for c in json.dumps(value, ensure_ascii=False))
+        return "".join(map(_escape, json.dumps(value, ensure_ascii=False)))
     if isinstance(value, date | time):
         return value.isoformat()
     if isinstance(value, bool):
@@ -256,7 +257,9 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
 
 
 def _escape(character: str) -> str:
-    """Return the escape of a character that a terminal would obey or nobody would see, for a text in quotes."""
+    """Return a character of a text in quotes, or its escape where a terminal would obey it or nobody would see it."""
+    if character.isprintable():
+        return character
     code = ord(character)
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
@@ -282,21 +285,21 @@ def toml_value(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _line_of(text: str, key: str) -> int | None:
+def _line_number(text: str, key: str) -> int | None:
     """Return the line of a TOML text on which a dotted key is set or its table begins; None when not found."""
     tables: dict[str, int] = {}
-    here = ""
-    best: int | None = None
+    table = ""
+    table_line: int | None = None
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*\[\[?\s*([\w.\-]+)\s*\]\]?\s*(#.*)?$", line):
-            here = header.group(1)
+            table = header.group(1)
             if line.lstrip().startswith("[["):
-                tables[here] = tables.get(here, -1) + 1
-                here += f"[{tables[here]}]"
-            if key == here or key.startswith((f"{here}.", f"{here}[")):
-                best = number  # where nothing better comes: a key that is missing is missed in its table
+                tables[table] = tables.get(table, -1) + 1
+                table += f"[{tables[table]}]"
+            if key == table or key.startswith((f"{table}.", f"{table}[")):
+                table_line = number  # where nothing better comes: a key that is missing is missed in its table
         elif assignment := re.match(r"\s*([\w.\-]+)\s*=", line):
-            full = f"{here}.{assignment.group(1)}" if here else assignment.group(1)
+            full = f"{table}.{assignment.group(1)}" if table else assignment.group(1)
             if key == full or key.startswith((f"{full}.", f"{full}[")):
                 return number
-    return best
+    return table_line

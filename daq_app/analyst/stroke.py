@@ -154,7 +154,9 @@ def reversal(decisions: Decisions, by: str, *, again: bool) -> Decision | None:
 def history(decisions: Decisions) -> History:
     """Return which decisions can be undone, and which redone."""
     undone = [effective_decision(decisions, line) for line in reversed(_undone(decisions))]
-    return History(*(tuple(f"{one.what} of {one.of}" for one in lines) for lines in (_standing(decisions), undone)))
+    return History(
+        *(tuple(f"{one.what} of {one.target_text}" for one in lines) for lines in (_standing(decisions), undone))
+    )
 
 
 def _standing(decisions: Decisions) -> list[Decision]:

@@ -19,7 +19,7 @@ from sessions.exchange import ExportSource, export
 from sessions.file_access import failure_sentence, write_whole
 from sessions.plan.plan import Blinded
 from sessions.prediction import PredictionOptions, TrialPrediction, predict
-from sessions.prediction.scenes import Way
+from sessions.prediction.scenes import SolutionPath
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.derived import reveal
@@ -55,7 +55,7 @@ class Work:
         self._recording = _open_recording(folder)
         self._raw = RawFile(self._recording)
         self._row = 0
-        self._ways: dict[m.Key, tuple[TrialPrediction, Way | None]] = {}  # no way at finite strain
+        self._ways: dict[m.Key, tuple[TrialPrediction, SolutionPath | None]] = {}  # no way at finite strain
         self._sketches: dict[int, Sketch] = {}
         self._other: Report | None = None  # that is compared
         self._history: m.FingerHistory | None = None  # the last history
@@ -145,7 +145,7 @@ class Work:
         main = [trial.number for block in plan.blocks if block.phase == "main" for trial in block.trials]
         return main.index(stroke.trial) if stroke.trial in main else None
 
-    def _take_answer(self, _number: int, row: TrialPrediction, way: Way | None) -> None:
+    def _take_answer(self, _number: int, row: TrialPrediction, way: SolutionPath | None) -> None:
         finding = finding_of(row)
         self._ways[finding.trial, finding.stroke] = row, way
         self._say(m.TrialAnswer(finding, self._finger(row.prediction)))
@@ -259,7 +259,7 @@ class Work:
         progress = self.progress_listener(tr("predicting {name}", name=folder.name))
         fingers: dict[m.Key, Finger] = {}
 
-        def take_answer(_number: int, row: TrialPrediction, _way: Way | None) -> None:
+        def take_answer(_number: int, row: TrialPrediction, _way: SolutionPath | None) -> None:
             if (finger := self._finger(row.prediction)) is not None:
                 finding = finding_of(row)
                 fingers[finding.trial, finding.stroke] = finger
@@ -340,7 +340,7 @@ def _parts(sketch: Sketch) -> Parts:
     return Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
 
 
-def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
+def film_of(way: SolutionPath, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
     """Return the states of a way. Raises Cancelled where `progress` returns False."""
     pictures: list[Still] = []
     for begin in range(0, len(instants), AT_ONCE):
@@ -351,7 +351,7 @@ def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progre
     return Film(_parts(sketch), frames, tuple(_instant(still) for still in pictures), ROW)
 
 
-def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
+def lost_film(way: SolutionPath, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
     """Return the states up to where a solve that has no answer came, and what stopped it there."""
     instants, failure = way_until(way.scene, way.finger, progress)
     every = max(1, -(-len(instants) // _MOST))

@@ -157,11 +157,11 @@ def session_firing(
         peak = settled_ends = None
         friction = row.interval if settings.quantity == SED.name else None  # the SED alone has one
         if friction is not None and friction.low is not None and friction.high is not None:
-            ends = friction.low, friction.high
+            bounds = friction.low, friction.high
             # The whole course moves with its end: friction is what is uncertain, and presses nothing.
-            peaks = [firing_rate(row.history.time, end / value * course, reference, settings)[1] for end in ends]
+            peaks = [firing_rate(row.history.time, bound / value * course, reference, settings)[1] for bound in bounds]
             peak = float(peaks[0].max()), float(peaks[1].max())
-            settled_ends = _settled_rate(ends[0], reference, settings), _settled_rate(ends[1], reference, settings)
+            settled_ends = _settled_rate(bounds[0], reference, settings), _settled_rate(bounds[1], reference, settings)
         level = _settled_rate(value, reference, settings)
         firings.append(Firing(row.trial, time, rate, level, spikes, peak, settled_ends))
     return reference, tuple(firings)
@@ -190,7 +190,7 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
         "reference_sed": reference if settings.quantity == SED.name else None,  # its name before; for one release
         "settings": asdict(settings),
         "parameters": parameters(settings, reference),
-        "trials": [one.to_dict() for one in firings],
+        "trials": [firing.to_dict() for firing in firings],
     }
 
 
@@ -203,13 +203,13 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
     quantity, usual = BY_NAME[settings.quantity], usual_settings(settings.quantity)
     if reference is not None:
         basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
-        of_reference = {"name": "reference", "value": reference, "unit": quantity.unit}
-        rows.append({**of_reference, "standing": "assumed", "basis": basis})
+        row = {"name": "reference", "value": reference, "unit": quantity.unit}
+        rows.append({**row, "standing": "assumed", "basis": basis})
     for name, (unit, basis) in PARAMETERS.items():
         value: float = getattr(settings, name)
         origin = "assumed" if value == getattr(usual, name) and name != "seed" else "set"
-        rests = f"{_THRESHOLDS[quantity.name][1]}; {basis}" if name == "threshold" else basis
-        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": origin, "basis": rests})
+        sources = f"{_THRESHOLDS[quantity.name][1]}; {basis}" if name == "threshold" else basis
+        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": origin, "basis": sources})
     return rows
 
 
@@ -231,7 +231,7 @@ def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = S
         if name not in names:
             raise ValueError(f"{name} is no parameter of the afferent: give one of {', '.join(names)}")
         least = 1e-6 if name in ("exponent", "adaptation_time", "greatest_rate", "variation") else 0.0
-        most = 1.0 if name == "variation" else 1e4
-        if not least <= value <= most:
-            raise ValueError(f"{name} = {value:g} is not allowed: {least:g} to {most:g}")
+        greatest = 1.0 if name == "variation" else 1e4
+        if not least <= value <= greatest:
+            raise ValueError(f"{name} = {value:g} is not allowed: {least:g} to {greatest:g}")
     return replace(usual_settings(quantity), seed=seed, **changes)

@@ -46,10 +46,10 @@ class LoadingCurve(NamedTuple):
     def of(displacement: Array, force: Array, width: Array) -> "LoadingCurve":
         """Return the means of readings (m,) over as many equal parts of their travel as a curve has points."""
         edges: Array = np.linspace(float(displacement[0]), float(displacement[-1]), _POINTS + 1)
-        which = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, _POINTS - 1)
-        count = np.bincount(which, minlength=_POINTS)
-        some = count > 0
-        means = [np.bincount(which, one, _POINTS)[some] / count[some] for one in (displacement, force, width)]
+        part = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, _POINTS - 1)
+        count = np.bincount(part, minlength=_POINTS)
+        filled = count > 0
+        means = [np.bincount(part, values, _POINTS)[filled] / count[filled] for values in (displacement, force, width)]
         return LoadingCurve(means[0], means[1], float(displacement[0]), means[2], len(displacement))
 
 
@@ -115,10 +115,10 @@ class Likelihood:
         """Take presses. Raises FitError where they are too few."""
         self.model = model
         self.force, self.displacement, width = (
-            np.concatenate([getattr(one, name) for one in presses]) for name in ("force", "displacement", "width")
+            np.concatenate([getattr(press, name) for press in presses]) for name in ("force", "displacement", "width")
         )
-        self.which = np.repeat(np.arange(len(presses)), [len(one.force) for one in presses])
-        self.presses = self.which == np.arange(len(presses))[:, None]
+        self.press = np.repeat(np.arange(len(presses)), [len(press.force) for press in presses])
+        self.presses = self.press == np.arange(len(presses))[:, None]
         self.free = len(self.force) - 1 - len(presses)
         if self.free < _FEWEST:
             raise FitError(
@@ -128,9 +128,9 @@ class Likelihood:
         self.floor = len(self.force) * float(np.mean((model.error * self.force) ** 2))
         self.wide = np.flatnonzero(np.isfinite(width))
         self.width = width[self.wide]
-        depth = self.displacement - np.array([one.touch for one in presses])[self.which]
-        off = np.interp(depth[self.wide], model.depth, model.width_error)
-        self.width_floor = float(np.sum((off * self.width) ** 2))
+        depth = self.displacement - np.array([press.touch for press in presses])[self.press]
+        width_error = np.interp(depth[self.wide], model.depth, model.width_error)
+        self.width_floor = float(np.sum((width_error * self.width) ** 2))
 
     def grid(self, contrast: Array, step: float, start: Array) -> _Grid:
         """Return the best mean and touch at contrasts (g, 2) that lie a `step` apart, from touches (presses,) [mm]."""
@@ -140,37 +140,37 @@ class Likelihood:
         mean, misfit, residual, jacobian = self._linear(spline, touch)
         damping = np.full(len(contrast), 1e-3)
         for _ in range(_ROUNDS):  # Levenberg and Marquardt, all contrasts at once
-            new_touch = touch + _steps(jacobian, residual, damping)[:, 1:]
-            spread = self._linear(spline, new_touch)
-            better = spread[1] < misfit
-            gain = float(np.max(np.where(better, misfit - spread[1], 0.0) / (misfit + self.floor)))
-            for old, new in zip((touch, mean, misfit, residual, jacobian), (new_touch, *spread), strict=True):
-                old[better] = new[better]
+            trial_touch = touch + _steps(jacobian, residual, damping)[:, 1:]
+            trial = self._linear(spline, trial_touch)
+            better = trial[1] < misfit
+            gain = float(np.max(np.where(better, misfit - trial[1], 0.0) / (misfit + self.floor)))
+            for array, update in zip((touch, mean, misfit, residual, jacobian), (trial_touch, *trial), strict=True):
+                array[better] = update[better]
             damping = np.where(better, damping / 5.0, damping * 5.0)
             if gain < SETTLED:
                 break
         normal = np.swapaxes(jacobian, 1, 2) @ jacobian
         variance = np.asarray(np.linalg.inv(normal)[:, 0, 0], np.float64)
         prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
-        fits = -(self.free * np.log(misfit + self.floor) + self._of_width(contrast, touch)) / 2.0
-        log = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
-        return _Grid(contrast, mean, touch, misfit, variance, fits, softmax(log), softmax(fits), step)
+        fits = -(self.free * np.log(misfit + self.floor) + self._width_deviance(contrast, touch)) / 2.0
+        log_posterior = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
+        return _Grid(contrast, mean, touch, misfit, variance, fits, softmax(log_posterior), softmax(fits), step)
 
     def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array, Array]:
         """Return the best mean (g,) at touches, its misfit (g,), residual (g, n) and Jacobian (g, n, 1 + presses)."""
-        shape, slope = at_depths(spline, self.displacement - touch[:, self.which])
+        shape, slope = at_depths(spline, self.displacement - touch[:, self.press])
         factor = np.maximum((shape @ self.force) / np.maximum((shape**2).sum(axis=1), 1e-30), 1e-6)
         force = factor[:, None] * shape
-        by_touch = (-factor[:, None] * slope)[:, :, None] * self.presses.T
+        touch_slope = (-factor[:, None] * slope)[:, :, None] * self.presses.T
         residual = force - self.force
-        return np.log(factor), (residual**2).sum(axis=1), residual, np.dstack([force, by_touch])
+        return np.log(factor), (residual**2).sum(axis=1), residual, np.dstack([force, touch_slope])
 
-    def _of_width(self, contrast: Array, touch: Array) -> Array:
+    def _width_deviance(self, contrast: Array, touch: Array) -> Array:
         """Return minus twice the log likelihood (g,) of the contacts' lengths, 0 where there are none."""
         if not len(self.wide):
             return np.zeros(len(contrast))
         spline = CubicSpline(np.log(self.model.depth), self.model.log_width(contrast), axis=1)
-        width, _ = at_depths(spline, self.displacement[self.wide] - touch[:, self.which[self.wide]])
+        width, _ = at_depths(spline, self.displacement[self.wide] - touch[:, self.press[self.wide]])
         misfit = ((width - self.width) ** 2).sum(axis=1) + self.width_floor
         return np.asarray(len(self.wide) * np.log(misfit), np.float64)
 
@@ -179,21 +179,21 @@ class Likelihood:
         best = int(np.argmax(grid.weight))
         sigma = float(np.sqrt((grid.misfit[best] + self.floor) / self.free))
         start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
-        of_width = float(self._of_width(grid.contrast[best][None], grid.touch[best][None])[0])
-        width_sigma = float(np.exp(of_width / max(len(self.wide), 1) / 2.0)) / max(len(self.wide), 1) ** 0.5
+        width_deviance = float(self._width_deviance(grid.contrast[best][None], grid.touch[best][None])[0])
+        width_sigma = float(np.exp(width_deviance / max(len(self.wide), 1) / 2.0)) / max(len(self.wide), 1) ** 0.5
         scale = np.concatenate([np.full(len(self.force), sigma), np.full(len(self.wide), width_sigma), np.ones(3)])
 
         knots, width = np.log(self.model.depth), np.log(self.model.scene.finger.width)
 
-        def residual(at: Array) -> Array:
+        def residual(numbers: Array) -> Array:
             """Return residuals of forces, contacts and prior, each by its standard deviation."""
-            depth, contrast = self.displacement - at[3:][self.which], at[None, :2]
+            depth, contrast = self.displacement - numbers[3:][self.press], numbers[None, :2]
             logs = (
-                (self.model.log_force(contrast) + width + at[2], depth),
+                (self.model.log_force(contrast) + width + numbers[2], depth),
                 (self.model.log_width(contrast), depth[self.wide]),
             )
-            values = [at_depths(CubicSpline(knots, log, axis=1), where[None])[0][0] for log, where in logs]
-            prior = at[:3] * [1.0, 1.0, np.sqrt(3.0) / self.model.spread]
+            values = [at_depths(CubicSpline(knots, log, axis=1), depths[None])[0][0] for log, depths in logs]
+            prior = numbers[:3] * [1.0, 1.0, np.sqrt(3.0) / self.model.spread]
             return np.concatenate([values[0] - self.force, values[1] - self.width, prior]) / scale
 
         optimum = least_squares(residual, start, "3-point", x_scale="jac").x
@@ -202,17 +202,17 @@ class Likelihood:
     def profile(self, grids: Sequence[_Grid], layer: int) -> Interval:
         """Return a layer's log factor of greatest likelihood with the 95 % interval of its profile, 0 as published."""
         contrast, mean, misfit, variance, fits = (
-            np.concatenate([getattr(one, name) for one in grids]) for name in _Grid._fields[:6] if name != "touch"
+            np.concatenate([getattr(grid, name) for grid in grids]) for name in _Grid._fields[:6] if name != "touch"
         )
-        step = np.concatenate([np.full(len(one.mean), one.step) for one in grids])
+        step = np.concatenate([np.full(len(grid.mean), grid.step) for grid in grids])
         log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
         # Likelihood-ratio interval: the deviance may exceed its minimum by CHI_SQUARED, at each contrast by the rest.
         margin = CHI_SQUARED - 2.0 * (fits.max() - fits)
         wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(margin, 0.0) / self.free))
         half = np.where(margin >= 0.0, wide, -np.inf)
-        ends = [int((log - half).argmin()), int((log + half).argmax())]
-        rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
-        low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])
+        extremes = [int((log - half).argmin()), int((log + half).argmax())]
+        rim = np.hypot(*contrast[extremes].T) + 1.5 * step[extremes] > REACH
+        low, high = float((log - half)[extremes[0]]), float((log + half)[extremes[1]])
         return Interval(float(log[fits.argmax()]), None if rim[0] else low, None if rim[1] else high)
 
 
@@ -222,22 +222,22 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
     `gain_error` is the force's standard uncertainty [-], `seed` that of draws. Raises FitError for too few points.
     """
     likelihood = Likelihood(model, presses)
-    start = np.array([one.touch for one in presses])
-    first = likelihood.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
-    last = _closer(likelihood, first, "weight")
-    likely = [first, last, _closer(likelihood, first, "likelihood")]
-    at, touch, mean = likelihood.maximum(last)
+    start = np.array([press.touch for press in presses])
+    coarse = likelihood.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
+    fine = _closer(likelihood, coarse, "weight")
+    likely = [coarse, fine, _closer(likelihood, coarse, "likelihood")]
+    contrast, touch, mean = likelihood.maximum(fine)
     rng = np.random.default_rng(seed)
-    rows = rng.choice(len(last.weight), _DRAWS, p=last.weight)
-    scale = np.sqrt((last.misfit + likelihood.floor) / likelihood.free * last.variance)
-    means = last.mean[rows] + scale[rows] * rng.standard_t(likelihood.free, _DRAWS)
+    rows = rng.choice(len(fine.weight), _DRAWS, p=fine.weight)
+    scale = np.sqrt((fine.misfit + likelihood.floor) / likelihood.free * fine.variance)
+    means = fine.mean[rows] + scale[rows] * rng.standard_t(likelihood.free, _DRAWS)
     means += gain_error * rng.standard_normal(_DRAWS)
-    best = model.stiffnesses(np.array([mean]), at[None])[0]
-    draws = model.stiffnesses(means, last.contrast[rows])
-    depth = likelihood.displacement - touch[likelihood.which]
+    best = model.stiffnesses(np.array([mean]), contrast[None])[0]
+    draws = model.stiffnesses(means, fine.contrast[rows])
+    depth = likelihood.displacement - touch[likelihood.press]
     inside = (model.depth >= depth.min()) & (model.depth <= depth.max())
     inside[np.argmin(np.abs(model.depth - np.median(depth)))] = True
-    relative = (model.log_force(np.vstack([at, last.contrast])) - model.log_force(np.zeros((1, 2))))[:, inside]
+    relative = (model.log_force(np.vstack([contrast, fine.contrast])) - model.log_force(np.zeros((1, 2))))[:, inside]
     ratio = relative.mean(axis=1)
     low, high = np.exp(np.quantile(means + ratio[1:][rows], QUANTILES))
     return FingerFit(
@@ -245,7 +245,7 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
         layers=tuple(_layer(likelihood, likely, number, best, draws) for number in range(len(LAYERS))),
         overall=Interval(float(np.exp(mean + ratio[0])), float(low), float(high)),
         touch=tuple(touch.tolist()),
-        noise=float(np.sqrt(last.misfit.min() / likelihood.free)),
+        noise=float(np.sqrt(fine.misfit.min() / likelihood.free)),
         points=len(likelihood.force),
         widths=len(likelihood.width),
         deepest=float(depth.max()),
@@ -267,10 +267,10 @@ def _layer(likelihood: Likelihood, grids: Sequence[_Grid], number: int, best: Ar
         else f"The presses cannot tell the stiffness of the {name} from that of the other layers: {share}."
     )
     profile = likelihood.profile(grids, number)
-    low_end, high_end = (None if one is None else published * float(np.exp(one)) for one in (profile.low, profile.high))
-    ends = Interval(published * float(np.exp(profile.value)), low_end, high_end)
+    ends = (None if log is None else published * float(np.exp(log)) for log in (profile.low, profile.high))
+    profile_interval = Interval(published * float(np.exp(profile.value)), *ends)
     prior = Interval(published, published * float(np.exp(-half)), published * float(np.exp(half)))
-    return LayerFit(name, Interval(float(best[number]), low, high), ends, prior, ratio, sentence)
+    return LayerFit(name, Interval(float(best[number]), low, high), profile_interval, prior, ratio, sentence)
 
 
 def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
@@ -301,9 +301,9 @@ def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
 
 def _steps(jacobian: Array, residual: Array, damping: Array) -> Array:
     """Return the damped steps (g, p) that lessen residuals (g, n), each number on its own scale."""
-    across = np.swapaxes(jacobian, 1, 2)
-    normal = across @ jacobian
+    transposed = np.swapaxes(jacobian, 1, 2)
+    normal = transposed @ jacobian
     diagonal = np.einsum("gii->gi", normal)
     diagonal *= 1.0 + damping[:, None]
     diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True)
-    return np.asarray(np.linalg.solve(normal, -(across @ residual[:, :, None]))[:, :, 0], np.float64)
+    return np.asarray(np.linalg.solve(normal, -(transposed @ residual[:, :, None]))[:, :, 0], np.float64)

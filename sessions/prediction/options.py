@@ -37,13 +37,13 @@ def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> Prediction
     if options.scene is not None:
         return options
     published = template(options)
-    own = replace(
+    finger = replace(
         published.finger,
         tip_radius=plan.finger.tip_radius or published.finger.tip_radius,
         contact_angle=plan.contact_angle,
         width=plan.finger.width or published.finger.width,
     )
-    scene = replace(published, finger=own)
+    scene = replace(published, finger=finger)
     return options if scene == published else replace(options, scene=scene)
 
 
@@ -78,13 +78,13 @@ def finger_in(path: Path) -> tuple[Scene, str]:
     document = tomllib.loads(text)
     keys = [f"[{name}]" for name in _OF_TRIALS if name in document]
     keys += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
-    of_others = ("title", *_OF_TRIALS, *(f"solve.{name}" for name in _OF_OPTIONS))
-    if all(name.startswith(of_others) for name, _ in leaves(document)):
+    not_taken = ("title", *_OF_TRIALS, *(f"solve.{name}" for name in _OF_OPTIONS))
+    if all(name.startswith(not_taken) for name, _ in leaves(document)):
         raise SettingsError(f"{path} tells nothing of a finger; give it [finger] or [materials], or name no file")
     if not keys:
         return scene, ""
-    are = "is" if len(keys) == 1 else "are"
+    verb = "is" if len(keys) == 1 else "are"
     return scene, (
-        f"{path}: {', '.join(keys)} {are} not taken: each trial brings its own friction and loading, and strain "
+        f"{path}: {', '.join(keys)} {verb} not taken: each trial brings its own friction and loading, and strain "
         "and course are options of the verb"
     )

@@ -23,8 +23,8 @@ LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
 class DisplacementLog:
     """Where the bone or the stage stood; n rows in order of time."""
 
-    clock: str  # what `at` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings
-    at: Array  # (n,) growing
+    clock: str  # what `instants` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings
+    instants: Array  # (n,) growing
     displacement: Array  # (n,) positive into the finger, from anywhere [mm]
     width: Array  # (n,) of the contact along the finger [mm]; nan where nobody measured it
 
@@ -44,7 +44,7 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
     if recording.info is None:
         return PressCurves((), (), (), ("No forces were recorded.",))
     records = [record for record in recording.trials if record.take]
-    parts = (
+    trials = (
         [(record.trial, recording.readings(record.trial.number)) for record in records]
         if recording.plan.blocks
         else [(None, recording.readings())]
@@ -52,7 +52,7 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
     context = TrialContext(recording.plan, recording.info, settings)
     presses: list[tuple[LoadingCurve, str, HoldCurve | None]] = []
     left_out: list[str] = []
-    for trial, block in parts:
+    for trial, block in trials:
         analysis = analyse_blocks([(trial, block)], context)
         clocks: Mapping[str, Array] = {
             "time_s": block.time,
@@ -60,58 +60,58 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
             "sequence": block.sequence.astype(np.float64),
         }
         for stroke in analysis.strokes:
-            begin, end = stroke.onset, np.inf if stroke.lift is None else stroke.lift
-            if begin is None or not any(begin <= press.start <= end for press in analysis.presses):
+            begin, stop = stroke.onset, np.inf if stroke.lift is None else stroke.lift
+            if begin is None or not any(begin <= press.start <= stop for press in analysis.presses):
                 continue
             name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
-            when = np.interp(log.at, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
-            loading = _loading(stroke, when, log)
+            times = np.interp(log.instants, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
+            loading = _loading(stroke, times, log)
             if isinstance(loading, str):
                 left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loading}.")
             else:
-                presses.append((loading, name, _hold(stroke, when, log.displacement)))
+                presses.append((loading, name, _hold(stroke, times, log.displacement)))
     curves, names, holds = zip(*presses, strict=True) if presses else ((), (), ())
     return PressCurves(curves, names, holds, tuple(left_out))
 
 
-def _loading(stroke: Stroke, when: Array, log: DisplacementLog) -> LoadingCurve | str:
-    """Return the loading of a press whose log has its rows at instants `when` (n,) [s]; or why there is none."""
+def _loading(stroke: Stroke, times: Array, log: DisplacementLog) -> LoadingCurve | str:
+    """Return the loading of a press whose log has its rows at instants `times` (n,) [s]; or why there is none."""
     curve = stroke.curve
     assert curve is not None
     assert stroke.onset is not None
-    last = float(curve.time[int(np.nanargmax(curve.normal))])
-    finite = np.isfinite(when)
-    when, displacement, width = when[finite], log.displacement[finite], log.width[finite]
-    inside = np.flatnonzero((when >= stroke.onset) & (when <= last))
-    if not len(when) or when[0] > stroke.onset or when[-1] < last:
+    peak_time = float(curve.time[int(np.nanargmax(curve.normal))])
+    finite = np.isfinite(times)
+    times, displacement, width = times[finite], log.displacement[finite], log.width[finite]
+    inside = np.flatnonzero((times >= stroke.onset) & (times <= peak_time))
+    if not len(times) or times[0] > stroke.onset or times[-1] < peak_time:
         return "the log does not follow it from its onset to its greatest force"
-    around = when[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else when[:0]
+    around = times[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else times[:0]
     if not len(inside) or float(np.diff(around).max(initial=0.0)) > LONGEST_GAP:
         return f"the log has a gap of more than {LONGEST_GAP:g} s in it"
-    loading = (curve.time >= stroke.onset) & (curve.time <= last) & np.isfinite(curve.normal)
-    travel = np.interp(curve.time[loading], when, displacement)
+    loading = (curve.time >= stroke.onset) & (curve.time <= peak_time) & np.isfinite(curve.normal)
+    travel = np.interp(curve.time[loading], times, displacement)
     force = curve.normal[loading]
     # A stage that stands while the finger relaxes adds nothing but time: it ends where it has arrived.
-    end = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
-    travel, force = travel[:end], force[:end]
+    count = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
+    travel, force = travel[:count], force[:count]
     if travel[-1] - travel[0] < LEAST_TRAVEL:
         return (
             f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
             "mm is no press: displacement must be positive into the finger, on the session's clock"
         )
-    lengths = np.interp(curve.time[loading][:end], when, width)  # nan beside every row that has none
+    lengths = np.interp(curve.time[loading][:count], times, width)  # nan beside every row that has none
     return LoadingCurve.of(travel, force, lengths)
 
 
-def _hold(stroke: Stroke, when: Array, displacement: Array) -> HoldCurve | None:
+def _hold(stroke: Stroke, times: Array, displacement: Array) -> HoldCurve | None:
     """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
     curve = stroke.curve
     assert curve is not None
     assert stroke.onset is not None
-    finite = np.isfinite(when)
-    inside = (curve.time >= stroke.onset) & (curve.time <= when[finite][-1]) & np.isfinite(curve.normal)
+    finite = np.isfinite(times)
+    inside = (curve.time >= stroke.onset) & (curve.time <= times[finite][-1]) & np.isfinite(curve.normal)
     time, force = curve.time[inside], curve.normal[inside]
-    travel = np.interp(time, when[finite], displacement[finite])
+    travel = np.interp(time, times[finite], displacement[finite])
     plateau = np.flatnonzero(travel >= travel.max() - STANDS * np.ptp(travel))
     if time[plateau[-1]] - time[plateau[0]] < SHORTEST_HOLD:
         return None
@@ -121,4 +121,4 @@ def _hold(stroke: Stroke, when: Array, displacement: Array) -> HoldCurve | None:
 
 def deepest(curves: PressCurves) -> float:
     """Return the greatest travel of any press [mm]."""
-    return max(float(one.displacement.max() - one.touch) for one in curves.presses)
+    return max(float(press.displacement.max() - press.touch) for press in curves.presses)

@@ -60,11 +60,11 @@ class PressModel:
 
     def force(self, stiffness: Array, depth: Array) -> Array:
         """Return N (n,) [N] of the whole finger with layers of a `stiffness` (3,) [MPa] at depths (n,) [mm]."""
-        mean, contrast = self.place(stiffness)
+        mean, contrast = self.contrasts(stiffness)
         log = self.log_force(contrast[None]) + mean + np.log(self.scene.finger.width)
         return at_depths(CubicSpline(np.log(self.depth), log, axis=1), depth[None])[0][0]
 
-    def place(self, stiffness: Array) -> tuple[float, Array]:
+    def contrasts(self, stiffness: Array) -> tuple[float, Array]:
         """Return the mean log factor and the contrast (2,) of a `stiffness` (3,) [MPa]."""
         log = np.log(stiffness) - np.log([self.scene.materials.of(name).E for name in LAYERS])
         return float(log.mean()), CONTRASTS @ log / self.spread
@@ -97,38 +97,38 @@ def press_model(
     contrast = _design(RINGS)
     sticking = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
     count = len(contrast) + len(sticking)
-    force, width, slope = (np.empty((len(contrast), *more, DEPTHS)) for more in ((), (), (2,)))
+    force, width, slope = (np.empty((len(contrast), *shape, DEPTHS)) for shape in ((), (), (2,)))
     errors: list[float] = []
     wide = np.zeros(DEPTHS)
     blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
-    for at, finger in enumerate(blank.fingers(contrast)):
-        report_part(progress, at / count)
+    for number, finger in enumerate(blank.fingers(contrast)):
+        report_part(progress, number / count)
         presses = _solve_presses(finger, depth, 0.0)
-        force[at] = np.log([one.normal_force for one in presses])
+        force[number] = np.log([press.normal_force for press in presses])
         shares = stiffness_shares(presses)[:, : len(LAYERS)]
-        slope[at] = spread * CONTRASTS @ shares.T
-        width[at] = np.log([one.contact_width for one in presses])
-        errors += [one.normal_force_error or 0.0 for one in presses]
-        wide += np.array([one.contact_width_error or 0.0 for one in presses]) / len(contrast)
+        slope[number] = spread * CONTRASTS @ shares.T
+        width[number] = np.log([press.contact_width for press in presses])
+        errors += [press.normal_force_error or 0.0 for press in presses]
+        wide += np.array([press.contact_width_error or 0.0 for press in presses]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
     targets = np.vstack([force, slope[:, 0], slope[:, 1]])
     coefficients = np.linalg.lstsq(basis, targets, rcond=None)[0]
     residual = basis[: len(contrast)] @ coefficients - force
     if mu:
-        more = np.empty((len(sticking), DEPTHS))
-        for at, finger in enumerate(blank.fingers(sticking)):
-            report_part(progress, (len(contrast) + at) / count)
-            more[at] = np.log([one.normal_force for one in _solve_presses(finger, depth, mu)])
-        more -= _basis(sticking, DEGREE)[0] @ coefficients
+        shape = np.empty((len(sticking), DEPTHS))
+        for number, finger in enumerate(blank.fingers(sticking)):
+            report_part(progress, (len(contrast) + number) / count)
+            shape[number] = np.log([press.normal_force for press in _solve_presses(finger, depth, mu)])
+        shape -= _basis(sticking, DEGREE)[0] @ coefficients
         basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
-        friction = np.linalg.lstsq(basis, more, rcond=None)[0]
-        residual = np.vstack([residual, basis @ friction - more])
+        friction = np.linalg.lstsq(basis, shape, rcond=None)[0]
+        residual = np.vstack([residual, basis @ friction - shape])
         coefficients[_orders(DEGREE).sum(axis=1) <= DEGREE_OF_FRICTION] += friction
     error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(residual**2))))
     basis = _basis(contrast, DEGREE_OF_WIDTH)[0]
-    of_width = np.linalg.lstsq(basis, width, rcond=None)[0]
-    wide = np.hypot(wide, np.sqrt(np.mean((basis @ of_width - width) ** 2, axis=0)))
-    return replace(blank, coefficients=coefficients, width=of_width, error=error, width_error=wide)
+    width_coefficients = np.linalg.lstsq(basis, width, rcond=None)[0]
+    wide = np.hypot(wide, np.sqrt(np.mean((basis @ width_coefficients - width) ** 2, axis=0)))
+    return replace(blank, coefficients=coefficients, width=width_coefficients, error=error, width_error=wide)
 
 
 class Check(NamedTuple):
@@ -141,13 +141,13 @@ class Check(NamedTuple):
 def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
     """Solve presses to a depth [mm] with layers of a `stiffness` (3,) [MPa] and compare forces. Raises FitError."""
     finger = model.finger(stiffness)
-    mean, contrast = model.place(stiffness)
+    mean, contrast = model.contrasts(stiffness)
     upto = np.flatnonzero(model.depth <= deepest)[-CHECK_DEPTHS:]
     depth = model.depth[upto]
     fitted = model.log_force(contrast[None])[0, upto] + mean
     free = _solve_presses(finger, depth, 0.0)
     sticking = _solve_presses(finger, depth, model.mu) if model.mu else free
-    deviation = np.abs(np.exp(fitted) / np.array([one.normal_force for one in sticking]) - 1.0)
+    deviation = np.abs(np.exp(fitted) / np.array([press.normal_force for press in sticking]) - 1.0)
     return Check(float(deviation.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
 
 
@@ -161,9 +161,9 @@ def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
     inside = np.clip(log, knots[0], knots[-1])
     piece = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
     cubic, square, line, constant = spline.c[:, piece, np.arange(len(depth))[:, None]]
-    by = inside - knots[piece]
-    slope = (3.0 * cubic * by + 2.0 * square) * by + line
-    value = np.exp(((cubic * by + square) * by + line) * by + constant + slope * (log - inside))
+    step = inside - knots[piece]
+    slope = (3.0 * cubic * step + 2.0 * square) * step + line
+    value = np.exp(((cubic * step + square) * step + line) * step + constant + slope * (log - inside))
     return value, value * slope / depth
 
 
@@ -204,9 +204,9 @@ def _orders(degree: int) -> Indices:
 def _basis(contrast: Array, degree: int) -> tuple[Array, Array, Array]:
     """Return Chebyshev products (g, c) up to a total degree at contrasts (g, 2), and their derivatives by both."""
     value = [chebyshev.chebvander(contrast[:, axis] / REACH, degree) for axis in (0, 1)]
-    by = np.zeros((degree + 1, degree + 1))
+    derivative = np.zeros((degree + 1, degree + 1))
     for order in range(1, degree + 1):
-        by[:degree, order] = np.asarray(chebyshev.chebder(np.eye(degree + 1)[order]), np.float64) / REACH
-    slope = [one @ by for one in value]
+        derivative[:degree, order] = np.asarray(chebyshev.chebder(np.eye(degree + 1)[order]), np.float64) / REACH
+    slope = [values @ derivative for values in value]
     i, j = _orders(degree).T
     return value[0][:, i] * value[1][:, j], slope[0][:, i] * value[1][:, j], value[0][:, i] * slope[1][:, j]

@@ -44,17 +44,17 @@ class HoldCurve(NamedTuple):
         force = _means(np.floor((self.time - self.time[0]) / BLOCK).astype(np.int64), self.force)
         return float(1.0 - force[-1] / force.max())
 
-    def at_once(self, part: float, tau: float) -> "HoldCurve":
+    def unrelaxed(self, part: float, tau: float) -> "HoldCurve":
         """Return the press with the forces that it would have had if nothing had relaxed since its touch."""
-        out = np.empty(len(self.force))
-        out[0] = after = self.force[0]
-        for at in range(1, len(out)):
-            by = float(self.time[at] - self.time[at - 1]) / tau
-            decay, growth = np.exp(-by), -np.expm1(-by) / by
-            rest = self.force[at] - part * (decay * after - growth * out[at - 1])
-            out[at] = rest / (1.0 - part + part * growth)
-            after = decay * after + growth * (out[at] - out[at - 1])
-        return self._replace(force=out)
+        forces = np.empty(len(self.force))
+        forces[0] = memory = self.force[0]
+        for index in range(1, len(forces)):
+            step = float(self.time[index] - self.time[index - 1]) / tau
+            decay, growth = np.exp(-step), -np.expm1(-step) / step
+            elastic = self.force[index] - part * (decay * memory - growth * forces[index - 1])
+            forces[index] = elastic / (1.0 - part + part * growth)
+            memory = decay * memory + growth * (forces[index] - forces[index - 1])
+        return self._replace(force=forces)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class RelaxationFit:
         """Return a scene whose layers are as stiff at once as found here and relax."""
         term = (Relaxation(self.part.value, self.time.value),)
         layers = {name: scene.materials.of(name) for name in LAYERS}
-        prony_layers = {name: replace(one, E=one.E * self.at_once, prony=term) for name, one in layers.items()}
+        prony_layers = {name: replace(layer, E=layer.E * self.at_once, prony=term) for name, layer in layers.items()}
         return replace(scene, materials=replace(scene.materials, **prony_layers))
 
 
@@ -94,56 +94,54 @@ def relaxing_fit(
     finger_fit = fit(model, presses, gain_error, seed)
     rate = relaxation(model, finger_fit, holds)
     for _ in range(TURNS):
-        before = rate.part.value
-        calm: list[LoadingCurve] = []
-        for one, hold in zip(presses, holds, strict=True):
-            force = hold.at_once(rate.part.value, rate.time.value).force[: one.readings]
-            curve = LoadingCurve.of(hold.displacement[: one.readings], force, np.zeros(one.readings))
-            calm.append(one._replace(force=curve.force))
-        finger_fit = fit(model, calm, gain_error, seed)
+        previous = rate.part.value
+        unrelaxed: list[LoadingCurve] = []
+        for press, hold in zip(presses, holds, strict=True):
+            force = hold.unrelaxed(rate.part.value, rate.time.value).force[: press.readings]
+            curve = LoadingCurve.of(hold.displacement[: press.readings], force, np.zeros(press.readings))
+            unrelaxed.append(press._replace(force=curve.force))
+        finger_fit = fit(model, unrelaxed, gain_error, seed)
         rate = relaxation(model, finger_fit, holds)
-        if abs(rate.part.value - before) < _AGREED:
+        if abs(rate.part.value - previous) < _AGREED:
             break
     return finger_fit, rate
 
 
-def relaxation(model: PressModel, finger_fit: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:
+def relaxation(model: PressModel, finger_fit: FingerFit, holds: Sequence[HoldCurve]) -> RelaxationFit:
     """Return how a finger relaxes in presses that are held.
 
     g is equally likely from 0 to 0.95 before, tau equally likely in its logarithm; a and the noise are integrated in
     closed form, as for the stiffness. Raises FitError where no press is held.
     """
-    if not presses:
+    if not holds:
         raise FitError("No press is held: let the stage stand for half a second or more before it lifts.")
     stiffness = np.array([finger_fit.scene.materials.of(name).E for name in LAYERS])
     elastic = [
-        model.force(stiffness, one.displacement - touch) for one, touch in zip(presses, finger_fit.touch, strict=True)
+        model.force(stiffness, hold.displacement - touch) for hold, touch in zip(holds, finger_fit.touch, strict=True)
     ]
-    limits = (0.0, LARGEST_PART), (BLOCK, _LONGEST * max(float(np.ptp(one.time)) for one in presses))
+    limits = (0.0, LARGEST_PART), (BLOCK, _LONGEST * max(float(np.ptp(hold.time)) for hold in holds))
     bounds, rounds = limits, 0
     while True:
         rounds += 1
-        parts: Array = np.linspace(*bounds[0], GRID_SIZE)
-        times = np.geomspace(*bounds[1], GRID_SIZE)
-        log, at_once = _posterior(presses, elastic, parts, times, model.error)
-        weight = np.exp(log - log.max())
+        part_grid: Array = np.linspace(*bounds[0], GRID_SIZE)
+        time_grid = np.geomspace(*bounds[1], GRID_SIZE)
+        log_posterior, at_once = _posterior(holds, elastic, part_grid, time_grid, model.error)
+        weight = np.exp(log_posterior - log_posterior.max())
         marginal: tuple[Array, Array] = (weight.sum(axis=1), weight.sum(axis=0))
-        if rounds == _ROUNDS or min(float(one.sum() ** 2 / (one**2).sum()) for one in marginal) >= _FINE:
+        if rounds == _ROUNDS or min(float(hold.sum() ** 2 / (hold**2).sum()) for hold in marginal) >= _FINE:
             break
-        bounds = _about(parts, marginal[0]), _about(times, marginal[1])
-    at = np.unravel_index(int(log.argmax()), log.shape)
-    low, high = _ends(parts, marginal[0])
-    part = Interval(float(parts[at[0]]), low, None if high >= LARGEST_PART else high)
-    low, high = _ends(times, marginal[1])
-    edge = 1.0 + 1e-6
-    time = Interval(
-        float(times[at[1]]), None if low <= limits[1][0] * edge else low, None if high * edge >= limits[1][1] else high
-    )
-    return RelaxationFit(part, time, float(at_once[at]), _sentence(part, time))
+        bounds = _about(part_grid, marginal[0]), _about(time_grid, marginal[1])
+    best = np.unravel_index(int(log_posterior.argmax()), log_posterior.shape)
+    low, high = _interval(part_grid, marginal[0])
+    part = Interval(float(part_grid[best[0]]), low, None if high >= LARGEST_PART else high)
+    low, high = _interval(time_grid, marginal[1])
+    shortest, longest = limits[1][0] * (1.0 + 1e-6), limits[1][1] / (1.0 + 1e-6)
+    time = Interval(float(time_grid[best[1]]), None if low <= shortest else low, None if high >= longest else high)
+    return RelaxationFit(part, time, float(at_once[best]), _sentence(part, time))
 
 
 def _posterior(
-    presses: Sequence[HoldCurve], elastic: Sequence[Array], parts: Array, times: Array, error: float
+    holds: Sequence[HoldCurve], elastic: Sequence[Array], parts: Array, times: Array, error: float
 ) -> tuple[Array, Array]:
     """Return the log posterior (g, t) of parts (g,) and times (t,), and the stiffness at once that fits best (g, t).
 
@@ -151,30 +149,32 @@ def _posterior(
     """
     misfit, spread, size = np.zeros((3, len(parts), len(times)))
     count = 0
-    for one, calm in zip(presses, elastic, strict=True):
-        block = np.floor((one.time - one.time[0]) / BLOCK).astype(np.int64)
-        force, base, after = (_means(block, part) for part in (one.force, calm, _decay(one.time, calm, times)))
-        shape = base[:, None, None] + parts[:, None] * (after - base[:, None])[:, None, :]  # (n, g, t)
+    for hold, unrelaxed in zip(holds, elastic, strict=True):
+        block = np.floor((hold.time - hold.time[0]) / BLOCK).astype(np.int64)
+        columns = (hold.force, unrelaxed, _decay(hold.time, unrelaxed, times))
+        force, base, memory = (_means(block, column) for column in columns)
+        shape = base[:, None, None] + parts[:, None] * (memory - base[:, None])[:, None, :]  # (n, g, t)
         square = (shape**2).sum(axis=0)
         factor = np.einsum("n,ngt->gt", force, shape) / square
         misfit += ((factor * shape - force[:, None, None]) ** 2).sum(axis=0) + float(np.sum((error * force) ** 2))
         spread += np.log(square)
-        size += np.log(factor) / len(presses)
+        size += np.log(factor) / len(holds)
         count += len(force)
-    free = count - len(presses)
-    if free < _FEWEST:
+    dof = count - len(holds)
+    if dof < _FEWEST:
         raise FitError(f"Presses are held for {count * BLOCK:.2g} s in all, which is too short: hold them longer.")
-    return -(free * np.log(misfit) + spread) / 2.0, np.exp(size)
+    return -(dof * np.log(misfit) + spread) / 2.0, np.exp(size)
 
 
 def _decay(time: Array, elastic: Array, times: Array) -> Array:
     """Return h (n, t) for an elastic force (n,) linear between instants, exactly (Taylor, Pister and Goudreau 1970)."""
-    out = np.zeros((len(time), len(times)))
-    out[0] = elastic[0]
-    for at in range(1, len(time)):
-        by = (time[at] - time[at - 1]) / times
-        out[at] = np.exp(-by) * out[at - 1] - np.expm1(-by) / by * (elastic[at] - elastic[at - 1])
-    return out
+    memory = np.zeros((len(time), len(times)))
+    memory[0] = elastic[0]
+    for index in range(1, len(time)):
+        step = (time[index] - time[index - 1]) / times
+        rise = elastic[index] - elastic[index - 1]
+        memory[index] = np.exp(-step) * memory[index - 1] - np.expm1(-step) / step * rise
+    return memory
 
 
 def _means(block: Indices, values: Array) -> Array:
@@ -190,10 +190,10 @@ def _about(values: Array, weight: Array) -> tuple[float, float]:
     return float(values[max(carry[0] - 1, 0)]), float(values[min(carry[-1] + 1, len(values) - 1)])
 
 
-def _ends(values: Array, weight: Array) -> tuple[float, float]:
+def _interval(values: Array, weight: Array) -> tuple[float, float]:
     """Return the ends of a 95 % interval of values (n,) of a weight."""
     sums = np.cumsum(weight) / weight.sum()
-    low, high = (float(values[int(np.searchsorted(sums, one))]) for one in QUANTILES)
+    low, high = (float(values[int(np.searchsorted(sums, share))]) for share in QUANTILES)
     return low, high
 
 

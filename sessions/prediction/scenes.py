@@ -42,7 +42,8 @@ class ModelInput:
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
     """Return the scene of each trial that `predict` would solve, by the trial's number."""
     inputs = model_inputs(analysis, plan, with_own_finger(options, plan))
-    return {one.row.trial: one.scene for one in inputs if one.scene is not None and one.row.trial is not None}
+    scenes = ((model_input.row.trial, model_input.scene) for model_input in inputs)
+    return {trial: scene for trial, scene in scenes if trial is not None and scene is not None}
 
 
 def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Iterator[ModelInput]:
@@ -54,14 +55,14 @@ def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptio
         return
     if not plan.forces:
         return
-    of_trial = {friction.trial: friction for friction in analysis.friction}
-    first: dict[int | None, int] = {}
+    by_trial = {friction.trial: friction for friction in analysis.friction}
+    first_stroke: dict[int | None, int] = {}
     for number, stroke in enumerate(analysis.strokes):
-        first.setdefault(stroke.trial, number)
+        first_stroke.setdefault(stroke.trial, number)
     for block in plan.blocks:
         for trial in block.trials if block.phase == "main" else ():
-            friction = of_trial.get(trial.number)
-            number = first.get(trial.number) if friction is None else friction.stroke
+            friction = by_trial.get(trial.number)
+            number = first_stroke.get(trial.number) if friction is None else friction.stroke
             yield _model_input(analysis, number, friction, options, trial, block)
 
 
@@ -93,23 +94,23 @@ def _model_input(
         measured_normal=None if stroke is None else stroke.normal_force,
         measured_tangential=None if stroke is None else stroke.tangential_force,
     )
-    why = _why_missing(row, stroke)
-    if why is not None:
+    reason = _missing_reason(row, stroke)
+    if reason is not None:
         names = ("sed", "normal_force", "tangential_force", "matching_depth", "opposite_sed")
-        return ModelInput(replace(row, reasons=dict.fromkeys(names, why)), None)
+        return ModelInput(replace(row, reasons=dict.fromkeys(names, reason)), None)
     return ModelInput(row, _scene(row, options))
 
 
-def _why_missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
+def _missing_reason(row: TrialPrediction, stroke: Stroke | None) -> str | None:
     """Return why there is nothing to solve; None where all is there."""
     if stroke is None:
         return "No stroke was found in this trial."
     if not stroke.kept:
         return f"The stroke was left out: {stroke.decided['kept']}."
     if row.mu is None or row.tau_max is None:
-        what = "coefficient of friction" if row.mu is None else "traction bound"
+        number = "coefficient of friction" if row.mu is None else "traction bound"
         flaws = ", ".join(stroke.flaws) or "no steady sliding"
-        return f"The stroke gives no {what} ({flaws})."
+        return f"The stroke gives no {number} ({flaws})."
     if row.direction is None:
         return "Neither the stroke nor a plan gives the direction."
     if row.indentation is None:
@@ -173,18 +174,18 @@ def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
 
 def part_of(progress: Progress | None, low: float, high: float) -> Progress | None:
     """Scale a progress callback to the piece of the work from `low` to `high` of the whole."""
-    return None if progress is None else lambda part: progress(low + (high - low) * part)
+    return None if progress is None else lambda share: progress(low + (high - low) * share)
 
 
 def settled_predictions(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
     """Return the prediction of each scene, None where it has no settled state. Raises Cancelled."""
-    return tuple(None if isinstance(one, str) else one for one in predict_scenes(scenes, progress))
+    return tuple(None if isinstance(answer, str) else answer for answer in predict_scenes(scenes, progress))
 
 
 def predict_scenes(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | str, ...]:
     """Return the prediction of each scene, or why it has no settled state. Raises Cancelled."""
     answers = solve_many([quick(scene) for scene in scenes], progress)
-    return tuple(str(one) if isinstance(one, SolveFailure) else one for one in answers)
+    return tuple(str(answer) if isinstance(answer, SolveFailure) else answer for answer in answers)
 
 
 def quick(scene: Scene) -> Scene:
@@ -207,7 +208,7 @@ def seds_at(
         )
         for mu, tau_max, depth, direction, speed in strokes
     ]
-    return tuple(None if one is None else one.sed_ending for one in settled_predictions(scenes))
+    return tuple(None if prediction is None else prediction.sed_ending for prediction in settled_predictions(scenes))
 
 
 def slides(predictions: Sequence[Prediction], progress: Progress | None = None) -> Iterator[Nearby | None]:
@@ -228,14 +229,15 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
     derivatives, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
     per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # of a force as it is given
 
-    def by(one: By, unit: float = 1.0) -> dict[str, float]:
-        return {"mu": unit * one.mu, "tau_max": unit * one.tau_max, "force": unit * per_mm * (one.normal_force or 0.0)}
+    def by_load(slope: By, unit: float = 1.0) -> dict[str, float]:
+        by_force = per_mm * (slope.normal_force or 0.0)
+        return {"mu": unit * slope.mu, "tau_max": unit * slope.tau_max, "force": unit * by_force}
 
     return {
-        "sed": by(derivatives.sed),
-        "normal_force": by(derivatives.normal, width),
-        "tangential_force": by(derivatives.tangential, width),
-        "indentation": by(derivatives.indentation),
+        "sed": by_load(derivatives.sed),
+        "normal_force": by_load(derivatives.normal, width),
+        "tangential_force": by_load(derivatives.tangential, width),
+        "indentation": by_load(derivatives.indentation),
     }
 
 
@@ -245,7 +247,7 @@ def doubt_of(prediction: Prediction) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Way:
+class SolutionPath:
     """How the model came to its answer for one trial, for pictures of it."""
 
     scene: Scene
@@ -253,7 +255,7 @@ class Way:
     march: tuple[Instant, ...] | None  # None where it has none that can be drawn
 
 
-Watch = Callable[[int, TrialPrediction, Way | None], None]  # position of the row, the row, how it was found
+Watch = Callable[[int, TrialPrediction, SolutionPath | None], None]  # position of the row, the row, how it was found
 
 
 def predict(
@@ -273,36 +275,37 @@ def predict(
     """
     options = with_own_finger(options or PredictionOptions(), plan)
     inputs, width = list(model_inputs(analysis, plan, options)), template(options).finger.width
-    rows = [one.row for one in inputs]
-    report: Watch = watch or (lambda _number, _row, _way: None)
-    for number, one in enumerate(inputs):
-        if one.scene is None:
-            report(number, one.row, None)
-    order = sorted((n for n, one in enumerate(inputs) if one.scene is not None), key=lambda n: (n != first, n))
-    scenes = [scene for n in order if (scene := inputs[n].scene) is not None]
+    rows = [model_input.row for model_input in inputs]
+    scene_of_row = {n: scene for n, model_input in enumerate(inputs) if (scene := model_input.scene) is not None}
+    report: Watch = watch or (lambda _number, _row, _path: None)
+    for number, row in enumerate(rows):
+        if number not in scene_of_row:
+            report(number, row, None)
+    order = sorted(scene_of_row, key=lambda n: (n != first, n))
+    scenes = [scene_of_row[n] for n in order]
     small = options.kinematics == "small"  # a depth is matched on its finger, which finite strain would put elsewhere
-    forces = [inputs[n].row.measured_normal if small else None for n in order]
-    depths = _depths(scenes, [None if f is None else f / s.finger.width for f, s in zip(forces, scenes, strict=True)])
-    ways: dict[int, Way] = {}
+    forces = [rows[n].measured_normal if small else None for n in order]
+    depths = _depths(scenes, [None if force is None else force / width for force in forces])
+    solutions: dict[int, SolutionPath] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
 
-    def fill_row(at: int) -> TrialPrediction:
-        return _fill_row(inputs[order[at]], answers[2 * at], answers[2 * at + 1], depths[at])
+    def fill_row(position: int) -> TrialPrediction:
+        return _fill_row(inputs[order[position]], answers[2 * position], answers[2 * position + 1], depths[position])
 
     def take_answer(
         number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
     ) -> None:
         answers[number] = answer
-        at, back = divmod(number, 2)
+        position, back = divmod(number, 2)
         if not back:
-            ways[at] = Way(scenes[at], finger, march)
-        elif 2 * at in answers:
-            report(order[at], fill_row(at), ways.get(at))
+            solutions[position] = SolutionPath(scenes[position], finger, march)
+        elif 2 * position in answers:
+            report(order[position], fill_row(position), solutions.get(position))
 
-    pairs = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
+    pairs = [model_input for scene in scenes for model_input in (scene, quick(opposite(scene)))]
     answers |= dict(enumerate(solve_many(pairs, progress, take_answer if watch else None)))
-    for at, number in enumerate(order):
-        rows[number] = fill_row(at)
+    for position, number in enumerate(order):
+        rows[number] = fill_row(position)
         if not small:
             report(number, rows[number], None)
     return SessionPrediction(
@@ -338,8 +341,8 @@ def _fill_row(
         elif row.measured_normal is None:
             reasons["matching_depth"] = "The stroke gives no steady normal force."
         else:
-            why = "The model would have to be pressed nearly to its bone, or has no settled state there."
-            reasons["matching_depth"] = why
+            reason = "The model would have to be pressed nearly to its bone, or has no settled state there."
+            reasons["matching_depth"] = reason
     row = replace(row, matching_depth=depth)
     if isinstance(back, SolveFailure):
         reasons["opposite_sed"] = str(back)

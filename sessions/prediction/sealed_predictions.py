@@ -25,10 +25,10 @@ def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
 
     Raises RecordingError where a seal is there, for none replaces another, or where nothing can be written.
     """
-    before = load_derived(recording.folder, SEAL)
-    if before is not None:
+    earlier = load_derived(recording.folder, SEAL)
+    if earlier is not None:
         raise RecordingError(
-            f"{recording.folder / SEAL}: sealed on {before.get('sealed_utc')}, and none is sealed over it"
+            f"{recording.folder / SEAL}: sealed on {earlier.get('sealed_utc')}, and none is sealed over it"
         )
     numbers = [{name: row[name] for name in SEAL_NUMBERS} for row in prediction["trials"]]
     sha256 = digest(numbers)
@@ -68,11 +68,11 @@ def sealed_sentence(recording: Recording, current: Sequence[Mapping[str, Any]]) 
     sha256 = str(seal.get("sha256"))
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."
-    when = f"sealed on {seal.get('sealed_utc')} (SHA-256 {sha256[:16]}…)"
-    now = [{name: row[name] for name in SEAL_NUMBERS} for row in current]
-    same = _same(numbers, now)
-    comparison = "the predictions shown are those" if same else "the predictions shown here are others, made since"
-    return f"Predictions were {when} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {comparison}."
+    time_text = f"sealed on {seal.get('sealed_utc')} (SHA-256 {sha256[:16]}…)"
+    current_numbers = [{name: row[name] for name in SEAL_NUMBERS} for row in current]
+    agree = _agree(numbers, current_numbers)
+    comparison = "the predictions shown are those" if agree else "the predictions shown here are others, made since"
+    return f"Predictions were {time_text} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {comparison}."
 
 
 def _how_blind(recording: Recording, *, blinded: bool) -> str:
@@ -82,21 +82,19 @@ def _how_blind(recording: Recording, *, blinded: bool) -> str:
     if unblinding is None:
         return "while the key of the stimuli was sealed, as it still is"
     content = (recording.folder / SEAL).read_bytes()
-    before: Any = unblinding.get("made_before")
-    if not isinstance(before, dict) or cast("dict[str, Any]", before).get(SEAL) != hashlib.sha256(content).hexdigest():
+    seals: Any = unblinding.get("made_before")
+    if not isinstance(seals, dict) or cast("dict[str, Any]", seals).get(SEAL) != hashlib.sha256(content).hexdigest():
         return "but the record of unblinding does not hold this seal: it was made or changed after the key was opened"
     return f"while the key of the stimuli was sealed; it was opened on {unblinding.get('unblinded_utc')}"
 
 
-def _same(original: Sequence[Any], current: Sequence[Mapping[str, Any]]) -> bool:
-    if len(original) != len(current):
-        return False
-    return all(
-        _alike(then.get(name), now[name]) for then, now in zip(original, current, strict=True) for name in SEAL_NUMBERS
-    )
+def _agree(original: Sequence[Any], current: Sequence[Mapping[str, Any]]) -> bool:
+    pairs = zip(original, current, strict=False)
+    alike = all(_alike(sealed.get(name), row[name]) for sealed, row in pairs for name in SEAL_NUMBERS)
+    return alike and len(original) == len(current)
 
 
-def _alike(then: object, now: object) -> bool:
-    if isinstance(then, float | int) and isinstance(now, float | int):
-        return math.isclose(then, now, rel_tol=_SAME)
-    return then == now
+def _alike(sealed: object, current: object) -> bool:
+    if isinstance(sealed, float | int) and isinstance(current, float | int):
+        return math.isclose(sealed, current, rel_tol=_SAME)
+    return sealed == current

@@ -201,10 +201,10 @@ class TrialPrediction(TrialNumbers):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        row: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(TrialNumbers)}
+        row: dict[str, Any] = {column.name: getattr(self, column.name) for column in fields(TrialNumbers)}
         row |= {name: asdict(row[name]) for name in _PARTS if row[name] is not None}
         row["reasons"] = dict(self.reasons)
-        row["alternatives"] = [asdict(one) for one in self.alternatives]
+        row["alternatives"] = [asdict(alternative) for alternative in self.alternatives]
         row["solver"] = None if self.prediction is None else self.prediction.to_dict()
         return {name: value for name, value in row.items() if value is not None or name not in _OPTIONAL}
 
@@ -232,7 +232,8 @@ class SessionPrediction:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
         options = asdict(self.options)
-        origin = {f.name: "default" if options[f.name] == f.default else "set" for f in fields(self.options)}
+        default = asdict(PredictionOptions())
+        origin = {name: "default" if value == default[name] else "set" for name, value in options.items()}
         return {
             **({"simulated": "SIMULATED"} if self.simulated else {}),
             "trials": [trial.to_dict() for trial in self.trials],
@@ -276,11 +277,11 @@ def _with_former_names(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a prediction with each of its options called as it is now, and by that name alone."""
-    parts = {name: document.get(name) for name in ("options", "options_origin")}
+    tables = {name: document.get(name) for name in ("options", "options_origin")}
     names = {
-        name: {_PRESENT_NAMES.get(key, key): value for key, value in cast("dict[str, Any]", part).items()}
-        for name, part in parts.items()
-        if isinstance(part, dict)
+        name: {_PRESENT_NAMES.get(key, key): value for key, value in cast("dict[str, Any]", table).items()}
+        for name, table in tables.items()
+        if isinstance(table, dict)
     }
     return {**document, **names}
 
@@ -327,9 +328,9 @@ def model_facts(prediction: SessionPrediction | None) -> tuple[tuple[str, str, s
     facts.append(("finger's width", f"{prediction.width:g} mm", prediction.width_origin))
     facts.append(("τ max", _READINGS[prediction.options.tau_reading], ""))
     facts.append((UNKNOWNS, f"{first.dofs} displacements", "one mesh for all trials"))
+    all_audits = [answer.audits for answer in predictions]
     audits = "; ".join(
-        f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in predictions]):.2g}"
-        for name in first.audits
+        f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, all_audits):.2g}" for name in first.audits
     )
     return (*facts, ("audits", audits, "the worst over all trials; 0 is perfect, 1 for the volume ratio"))
 

@@ -50,11 +50,11 @@ def series_slopes(
         responses = rough_responses([_scene(finger, surface, press or Press()) for surface in surfaces], arcs)
     except SceneError as unfit:
         return str(unfit)
-    out: dict[str, tuple[Slopes, ...]] = {}
+    slopes: dict[str, tuple[Slopes, ...]] = {}
     for name, series in SERIES.items():
         rows = [number for number, surface in enumerate(surfaces) if surface.descriptor == name]
-        out[name] = tuple(_slopes(series, responses[rows, :, place]) for place in range(len(arcs)))
-    return out
+        slopes[name] = tuple(_slopes(series, responses[rows, :, arc]) for arc in range(len(arcs)))
+    return slopes
 
 
 def other_signs(finger: Scene) -> list[str]:
@@ -63,13 +63,13 @@ def other_signs(finger: Scene) -> list[str]:
     Both at the kinematics of `finger`, pressed to the published depths; [] for the published finger itself.
     """
     base = Scene(friction=Friction(0.0), loading=Loading(1.0), solve=Solve(finger.solve.kinematics))
-    own = replace(finger.finger, width=base.finger.width), finger.materials, finger.receptor
-    if own == (base.finger, base.materials, base.receptor):
+    model = replace(finger.finger, width=base.finger.width), finger.materials, finger.receptor
+    if model == (base.finger, base.materials, base.receptor):
         return []
-    here, there = series_slopes(finger), series_slopes(base)
-    if isinstance(here, str) or isinstance(there, str):
+    slopes, base_slopes = series_slopes(finger), series_slopes(base)
+    if isinstance(slopes, str) or isinstance(base_slopes, str):
         return []
-    changes = {name: (float(here[name][0].change[_SED]), float(there[name][0].change[_SED])) for name in SERIES}
+    changes = {name: (float(slopes[name][0].change[_SED]), float(base_slopes[name][0].change[_SED])) for name in SERIES}
     return [
         f"On this finger the SED goes the other way with µ than on the published one, over its surfaces of {name}: by "
         f"{100 * mine:+.0f} % and {100 * published:+.0f} % of the mean from the least to the greatest µ, at the "
@@ -80,14 +80,14 @@ def other_signs(finger: Scene) -> list[str]:
 
 
 def _scene(finger: Scene, surface: Surface, press: Press) -> Scene:
-    of_surface = published(surface)
-    loading = of_surface.loading
+    reference = published(surface)
+    loading = reference.loading
     if press.force is not None:
         loading = replace(loading, indentation=None, normal_force=press.force)
     else:
         loading = replace(loading, indentation=press.depth * loading.depth)
     steady = replace(finger.solve, course="steady")
-    return replace(finger, friction=of_surface.friction, loading=loading, solve=steady)
+    return replace(finger, friction=reference.friction, loading=loading, solve=steady)
 
 
 def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
@@ -98,7 +98,8 @@ def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
     if count < _LEAST:
         return Slopes(count, none, none)
     values = responses[finite]
-    mu, index = (np.array(column)[finite] for column in zip(*((s.mu, float(s.index)) for s in series), strict=True))
+    mu = np.array([surface.mu for surface in series])[finite]
+    index = np.array([float(surface.index) for surface in series])[finite]
     slope = (mu - mu.mean()) @ (values - values.mean(axis=0)) / np.sum((mu - mu.mean()) ** 2)
     change = slope * np.ptp(mu) / np.abs(values).mean(axis=0)
     return Slopes(count, np.corrcoef(index, values, rowvar=False)[0, 1:], change)
@@ -140,12 +141,13 @@ def simulated_strokes(design: StudyDesign, people: int, draw: np.random.Generato
     tau = mu * normal / AREA
     base = scene(STICKINESS[0])
     steady = replace(base.solve, course="steady")
-    loadings = [replace(base.loading, indentation=d) for d in np.tile(np.repeat(design.depths, len(design.mu)), people)]
+    depths = np.tile(np.repeat(design.depths, len(design.mu)), people)
+    loadings = [replace(base.loading, indentation=depth) for depth in depths]
     scenes = [
-        replace(base, friction=Friction(m, t), loading=loading, solve=steady)
-        for m, t, loading in zip(mu.flat, tau.flat, loadings, strict=True)
+        replace(base, friction=Friction(*friction), loading=loading, solve=steady)
+        for *friction, loading in zip(mu.flat, tau.flat, loadings, strict=True)
     ]
     responses = rough_responses(scenes)[:, :, 0].reshape(*shape, len(NAMES))
     speed = np.array(design.speed) * np.exp(_STROKE * draw.standard_normal(shape))
-    own = {"mu": mu, "tau_max": tau, "N": normal, "speed": speed}
-    return own | {name: responses[:, :, at] for at, name in enumerate(NAMES)}
+    measured = {"mu": mu, "tau_max": tau, "N": normal, "speed": speed}
+    return measured | {name: responses[:, :, number] for number, name in enumerate(NAMES)}

@@ -62,14 +62,14 @@ def with_intervals(
         return prediction
     rows = prediction.trials
     draws = draws_of(analysis, prediction)
-    column: list[Prediction | str] = [row.prediction or _why(row, "sed") for row in rows]
+    answers: list[Prediction | str] = [row.prediction or _reason(row, "sed") for row in rows]
     if both_ways:
-        column += [row.opposite or _why(row, "opposite_sed") for row in rows]
-    intervals = intervals_of(column, [*draws, *draws][: len(column)], tau_scale(prediction.options), progress)
+        answers += [row.opposite or _reason(row, "opposite_sed") for row in rows]
+    intervals = intervals_of(answers, [*draws, *draws][: len(answers)], tau_scale(prediction.options), progress)
     back = intervals[len(rows) :] or [None] * len(rows)
     trials = tuple(
-        replace(row, interval=one, opposite_interval=other)
-        for row, one, other in zip(rows, intervals[: len(rows)], back, strict=True)
+        replace(row, interval=interval, opposite_interval=opposite)
+        for row, interval, opposite in zip(rows, intervals[: len(rows)], back, strict=True)
     )
     return replace(prediction, trials=trials)
 
@@ -81,13 +81,13 @@ def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[DrawsOrR
 
 def _draws(analysis: Analysis, row: TrialPrediction) -> DrawsOrReason:
     if row.stroke is None or row.mu is None or row.tau_max is None:
-        return _why(row, "sed")
+        return _reason(row, "sed")
     rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
     draws = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, analysis.bootstrap)
     return "the stroke is too short for an interval of its friction" if draws is None else draws
 
 
-def _why(row: TrialPrediction, name: str) -> str:
+def _reason(row: TrialPrediction, name: str) -> str:
     return row.reasons.get(name, "nothing was predicted")
 
 
@@ -114,48 +114,48 @@ def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrRea
     if isinstance(loads, str):
         return SedInterval(None, None, None, reason=loads)
     names, draws, means = loads
-    by, width = derivatives_by(slide, prediction.scene), prediction.scene.finger.width
+    derivatives, width = derivatives_by(slide, prediction.scene), prediction.scene.finger.width
 
-    def along(number: str, value: float) -> Array:
-        return value + (draws - means) @ [by[number][name] for name in names]
+    def carry(number: str, value: float) -> Array:
+        return value + (draws - means) @ [derivatives[number][name] for name in names]
 
-    linear = along("sed", prediction.sed_ending)
-    low, high = _ends(linear)
-    sed = by["sed"]
+    linear = carry("sed", prediction.sed_ending)
+    low, high = _bounds(linear)
+    sed = derivatives["sed"]
     slopes = sed["mu"], sed["tau_max"], sed["force"] if "force" in names else None
-    whole = SedInterval(
+    interval = SedInterval(
         low,
         high,
         "derivatives",
         *slopes,
-        normal_force=_ends(along("normal_force", prediction.normal_force * width)),
-        tangential_force=_ends(along("tangential_force", prediction.tangential_force * width)),
-        indentation=_ends(along("indentation", prediction.indentation)),
+        normal_force=_bounds(carry("normal_force", prediction.normal_force * width)),
+        tangential_force=_bounds(carry("tangential_force", prediction.tangential_force * width)),
+        indentation=_bounds(carry("indentation", prediction.indentation)),
     )
 
-    def solve_draws(which: Indices) -> Array:
-        scenes = [with_loads(prediction.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
-        seds = slide.seds([prediction.scene, *scenes])[:, 0]
+    def solve_draws(positions: Indices) -> Array:
+        loads = (dict(zip(names, draw, strict=True)) for draw in draws[positions].tolist())
+        seds = slide.seds([prediction.scene, *(with_loads(prediction.scene, draw) for draw in loads)])[:, 0]
         return prediction.sed_ending + (seds[1:] - seds[0])
 
     extremes = _extremes(linear, draws)
     errors = np.abs(solve_draws(extremes) - linear[extremes])  # nan, and so no less, where one has no settled state
     if bool((errors <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
-        return whole
+        return interval
     # Each stands for an equal share of all: the middle one, by what the derivatives carry.
     middles = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES * len(linear)).astype(np.int64)
-    some = solve_draws(np.argsort(linear, kind="stable")[middles])
-    failed = int(np.isnan(some).sum())
+    seds = solve_draws(np.argsort(linear, kind="stable")[middles])
+    failed = int(np.isnan(seds).sum())
     if failed:
         reason = (
             f"{failed} of {_SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
         )
-        return replace(whole, low=None, high=None, method="sampling", reason=reason)
-    low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
-    return replace(whole, low=low, high=high, method="sampling")
+        return replace(interval, low=None, high=None, method="sampling", reason=reason)
+    low, high = np.quantile(seds, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
+    return replace(interval, low=low, high=high, method="sampling")
 
 
-def _ends(draws: Array) -> Ends:
+def _bounds(draws: Array) -> Ends:
     low, high = np.quantile(draws, _QUANTILES).tolist()
     return low, high
 
@@ -187,8 +187,8 @@ def _extremes(linear: Array, draws: Array) -> Indices:
     spread = draws.std(axis=0)
     units = (draws - draws.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
     axes = np.linalg.svd(units, full_matrices=False)[2]
-    ranks = [round(end * (len(draws) - 1)) for end in _QUANTILES]
-    return np.unique([np.argsort(way, kind="stable")[ranks] for way in (linear, *(units @ axes.T).T)])
+    ranks = [round(quantile * (len(draws) - 1)) for quantile in _QUANTILES]
+    return np.unique([np.argsort(values, kind="stable")[ranks] for values in (linear, *(units @ axes.T).T)])
 
 
 def with_alternatives(
@@ -200,19 +200,19 @@ def with_alternatives(
     for `variant_intervals`; `analysis` is what the friction came from.
     Raises Cancelled where `progress`, called with the part done, returns False.
     """
-    kinds, options = tuple(variants(prediction.options.variants)), prediction.options
-    draws = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None
+    all_variants, options = tuple(variants(prediction.options.variants)), prediction.options
+    draws = draws_of(analysis, prediction) if all_variants and analysis is not None and options.intervals else None
 
     def draws_for(variant: Variant) -> Sequence[DrawsOrReason] | None:
         return draws if variant.kinematics == "small" or options.variant_intervals else None
 
-    count = len(kinds)
-    along = [
+    count = len(all_variants)
+    columns = [
         _along(prediction, variant, draws_for(variant), part_of(progress, n / count, (n + 1) / count))
-        for n, variant in enumerate(kinds)
+        for n, variant in enumerate(all_variants)
     ]
     trials = tuple(
-        _with_depth(replace(row, alternatives=tuple(one[number] for one in along)), options)
+        _with_depth(replace(row, alternatives=tuple(answers[number] for answers in columns)), options)
         for number, row in enumerate(prediction.trials)
     )
     return replace(prediction, trials=trials)
@@ -224,10 +224,11 @@ def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPredic
     The depth of `predict` is of a rough mesh; one question has one answer.
     """
     driven = Variant(options.kinematics, options.tau_reading, "force")
-    driven_row = next((one for one in row.alternatives if one.variant == driven and one.sed is not None), None)
+    by_force = (alternative for alternative in row.alternatives if alternative.variant == driven)
+    driven_row = next((alternative for alternative in by_force if alternative.sed is not None), None)
     if driven_row is None:
         return row
-    reasons = {name: why for name, why in row.reasons.items() if name != "matching_depth"}
+    reasons = {name: reason for name, reason in row.reasons.items() if name != "matching_depth"}
     return replace(
         row,
         matching_depth=driven_row.indentation,
@@ -242,31 +243,32 @@ def _along(
 ) -> tuple[Alternative, ...]:
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
-    trial_answers = _answers_of_prediction(prediction, variant)
+    trial_answers = _present_answers(prediction, variant)
     answers = trial_answers or _solve_variant(prediction, variant, part_of(progress, 0.0, 0.8))
-    out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, answers, strict=True)]
+    alternatives = [_alternative(row, variant, *answer) for row, answer in zip(rows, answers, strict=True)]
     if draws is not None:
-        before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
-        if trial_answers is not None and None not in before:  # they are those of the trials themselves
-            intervals: Sequence[SedInterval | None] = before
+        present = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
+        if trial_answers is not None and None not in present:  # they are those of the trials themselves
+            intervals: Sequence[SedInterval | None] = present
         else:
             scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
-            intervals = intervals_of([one for _, one in answers], draws, scale, part_of(progress, 0.8, 1.0))
-        out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
-    return tuple(out)
+            intervals = intervals_of([answer for _, answer in answers], draws, scale, part_of(progress, 0.8, 1.0))
+        pairs = zip(alternatives, intervals, strict=True)
+        alternatives = [replace(alternative, interval=interval) for alternative, interval in pairs]
+    return tuple(alternatives)
 
 
 # For each trial the tau_max [MPa] that the model got, and what of it
 _Answers = list[tuple[float | None, Prediction | str]]
 
 
-def _answers_of_prediction(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
+def _present_answers(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
     """Return the answers that the prediction holds already: at the planned depth, slid either way."""
     options = prediction.options
-    same = (variant.kinematics, variant.tau_reading) == (options.kinematics, options.tau_reading)
-    if same and variant.driven == "depth":
+    agrees = (variant.kinematics, variant.tau_reading) == (options.kinematics, options.tau_reading)
+    if agrees and variant.driven == "depth":
         return [(row.tau_max, row.prediction or row.reasons.get("sed", "")) for row in prediction.trials]
-    if same and variant.driven == "other way":
+    if agrees and variant.driven == "other way":
         return [(row.tau_max, row.opposite or row.reasons.get("opposite_sed", "")) for row in prediction.trials]
     return None
 

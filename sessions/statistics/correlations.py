@@ -48,15 +48,16 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     without = tuple((label, pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
     r = pearson(x, y)
     if r is None:
-        few = "1 point is" if n == 1 else f"{n} points are"
-        why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
-        return Relation(n, without=without, reason=why)
+        points = "1 point is" if n == 1 else f"{n} points are"
+        reason = f"{points} too few for a correlation" if n < 3 else "one of the two does not vary"
+        return Relation(n, without=without, reason=reason)
     slope, intercept = np.polyfit(x, y, 1)
     low, high = fisher_interval(r, n)
-    why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
+    reason = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
     rho = _rank_correlation(x, y)
-    ends = fisher_interval(rho, n, 1 + rho * rho / 2)  # Bonett & Wright 2000, Psychometrika 65:23, equation 4
-    return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
+    rho_interval = fisher_interval(rho, n, 1 + rho * rho / 2)  # Bonett & Wright 2000, Psychometrika 65:23, equation 4
+    line = float(slope), float(intercept)
+    return Relation(n, r, low, high, rho, *rho_interval, _exact_p(x, y, rho), *line, without, reason)
 
 
 def slope_interval(line: Relation) -> tuple[float, float] | None:
@@ -80,18 +81,18 @@ def t_quantile(dof: float) -> float:
     return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
 
 
-def jackknife(whole: ArrayLike, without: Array) -> tuple[Array, Array, Array]:
-    """Return the ends of the 95 % interval of numbers `whole` (m,), and p (m,), from those `without` each of k (k, m).
+def jackknife(estimate: ArrayLike, replicates: Array) -> tuple[Array, Array, Array]:
+    """Return the ends of the 95 % interval of `estimate` (m,), and p (m,).
 
-    The mean of the pseudo-values follows Student's t with k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika
-    61:1). An error of round-off alone gives nan: cases that are all alike tell none.
+    `replicates` (k, m) are the estimates without each of the k cases. The mean of the pseudo-values follows Student's
+    t with k - 1 degrees of freedom (Tukey; Miller 1974, Biometrika 61:1). Cases that are all alike give nan.
     """
-    k = len(without)
-    pseudo = k * np.asarray(whole, np.float64) - (k - 1) * without
-    mean, error = pseudo.mean(axis=0), pseudo.std(axis=0, ddof=1) / math.sqrt(k)
-    error = np.where(error > 1e-9 * np.abs(whole), error, np.nan)
-    half = t_quantile(k - 1) * error
-    return mean - half, mean + half, 2.0 * np.asarray(stdtr(k - 1, -np.abs(mean) / error), np.float64)
+    cases = len(replicates)
+    pseudo = cases * np.asarray(estimate, np.float64) - (cases - 1) * replicates
+    mean, error = pseudo.mean(axis=0), pseudo.std(axis=0, ddof=1) / math.sqrt(cases)
+    error = np.where(error > 1e-9 * np.abs(estimate), error, np.nan)
+    half = t_quantile(cases - 1) * error
+    return mean - half, mean + half, 2.0 * np.asarray(stdtr(cases - 1, -np.abs(mean) / error), np.float64)
 
 
 def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
@@ -132,9 +133,9 @@ def _ranks(values: Sequence[float]) -> Array:
     >>> _ranks([3.0, 1.0, 3.0])
     array([2.5, 1. , 2.5])
     """
-    parts = np.asarray(values, np.float64) / (float(np.max(np.abs(values))) or 1.0)
-    _, at, counts = np.unique(parts.round(12), return_inverse=True, return_counts=True)
-    return (np.cumsum(counts) - (counts - 1) / 2)[at]
+    relative = np.asarray(values, np.float64) / (float(np.max(np.abs(values))) or 1.0)
+    _, groups, counts = np.unique(relative.round(12), return_inverse=True, return_counts=True)
+    return (np.cumsum(counts) - (counts - 1) / 2)[groups]
 
 
 def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:
@@ -195,14 +196,16 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
     if z is None:
         return None
     half = t_quantile(math.inf) / math.sqrt(n - 3)
-    (a, b), (c, d) = ((math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)) for r in (first, second))
+    first_low, second_low = (math.tanh(math.atanh(r) - half) for r in (first, second))
+    first_high, second_high = (math.tanh(math.atanh(r) + half) for r in (first, second))
     covariance = _covariance(first, second, mutual) / ((1 - first**2) * (1 - second**2))
     difference = first - second
 
-    def reach(one: float, other: float) -> float:
-        return math.sqrt(max(one**2 + other**2 - 2 * covariance * one * other, 0.0))
+    def margin(of_first: float, of_second: float) -> float:
+        return math.sqrt(max(of_first**2 + of_second**2 - 2 * covariance * of_first * of_second, 0.0))
 
-    low, high = difference - reach(first - a, d - second), difference + reach(b - first, second - c)
+    low = difference - margin(first - first_low, second_high - second)
+    high = difference + margin(first_high - first, second - second_low)
     return Contrast(n, difference, low, high, z, math.erfc(abs(z) / math.sqrt(2.0)))
 
 
@@ -222,14 +225,14 @@ def leave_one_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
     if len(x) < 3:
         return None
     deviations = np.asarray(x, np.float64) - float(np.mean(x))
-    size = float(deviations @ deviations)
-    if size <= 1e-24 * float(np.max(np.abs(x))) ** 2:
+    sum_of_squares = float(deviations @ deviations)
+    if sum_of_squares <= 1e-24 * float(np.max(np.abs(x))) ** 2:
         return None
-    own = 1.0 - 1.0 / len(x) - deviations**2 / size
-    if float(own.min()) < 1e-9:
+    residual_share = 1.0 - 1.0 / len(x) - deviations**2 / sum_of_squares
+    if float(residual_share.min()) < 1e-9:
         return None
     values = np.asarray(y, np.float64) - float(np.mean(y))
-    errors = (values - deviations * float(deviations @ values) / size) / own
+    errors = (values - deviations * float(deviations @ values) / sum_of_squares) / residual_share
     return float(np.sqrt(np.mean(errors**2)))
 
 
@@ -244,5 +247,5 @@ def _pooled_variance(first: float, second: float, mutual: float) -> float | None
 
 def _covariance(first: float, second: float, mutual: float) -> float:
     """Return n times the covariance of two correlations with one variable (Steiger 1980, equation 3)."""
-    rest = 1 - first**2 - second**2
-    return mutual * rest - first * second * (rest - mutual**2) / 2
+    unexplained = 1 - first**2 - second**2
+    return mutual * unexplained - first * second * (unexplained - mutual**2) / 2

@@ -179,10 +179,10 @@ class StudyFindings:
         """Return it as plain data."""
         document: dict[str, Any] = {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
         # `found` and `both` are names until 2026-11-26, which stay for one release
-        document["effects"] = [msgspec.to_builtins(one) | {"found": one.estimate} for one in self.effects]
+        document["effects"] = [msgspec.to_builtins(effect) | {"found": effect.estimate} for effect in self.effects]
         for flaw in document["flaws"]:
             flaw["found"] = flaw["detected"]
-        for exponent in filter(None, (one["exponent"] for one in document["descriptors"])):
+        for exponent in filter(None, (findings["exponent"] for findings in document["descriptors"])):
             exponent["both"] = exponent["deming"]
         return document
 
@@ -250,10 +250,10 @@ def effect_recoveries(
     `ground_truth["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
     """
     return tuple(
-        EffectRecovery(one.descriptor, name, truth[name], *ends)
-        for one in descriptors
-        for truth in [_true_values(one.descriptor, ground_truth)]
-        for name, ends in _estimates(one).items()
+        EffectRecovery(findings.descriptor, name, truth[name], *interval)
+        for findings in descriptors
+        for truth in [_true_values(findings.descriptor, ground_truth)]
+        for name, interval in _estimates(findings).items()
         if name in truth
     )
 
@@ -273,22 +273,22 @@ def _true_values(descriptor: str, ground_truth: Mapping[str, Any]) -> dict[str, 
     return values
 
 
-def _estimates(one: DescriptorFindings) -> dict[str, tuple[float, float, float]]:
+def _estimates(findings: DescriptorFindings) -> dict[str, tuple[float, float, float]]:
     """Return the estimate and the ends of its interval of each effect that has a true value, by its name in `UNITS`.
 
     How scores go with SEDs has the intervals for people at large on these surfaces.
     """
     terms: list[Term] = []
     spreads: dict[str, Spread | None] = {}
-    if not isinstance(one.on_friction, str):
-        terms += one.on_friction.terms
-        if (differ := one.on_friction.spreads) is not None:
-            spreads = {LEVELS: differ.level, SLOPES: differ.slope, NOISE: differ.left}
-    if one.repeated is not None and one.repeated.people is not None:
-        terms.append(Term(WITHIN, one.repeated.r, *one.repeated.people, math.nan))
-        terms += () if isinstance(one.on_response, str) else one.on_response.terms[1:2]
-    spreads[FINGERS] = one.fingers
-    values = {name: (s.sd, s.low, s.high) for name, s in spreads.items() if s is not None}
+    if not isinstance(findings.on_friction, str):
+        terms += findings.on_friction.terms
+        if (components := findings.on_friction.spreads) is not None:
+            spreads = {LEVELS: components.level, SLOPES: components.slope, NOISE: components.left}
+    if findings.repeated is not None and findings.repeated.people is not None:
+        terms.append(Term(WITHIN, findings.repeated.r, *findings.repeated.people, math.nan))
+        terms += () if isinstance(findings.on_response, str) else findings.on_response.terms[1:2]
+    spreads[FINGERS] = findings.fingers
+    values = {name: (spread.sd, spread.low, spread.high) for name, spread in spreads.items() if spread is not None}
     return {term.name: (term.estimate, term.low, term.high) for term in terms} | values
 
 

@@ -16,8 +16,8 @@ from scipy import optimize, special
 from scipy.linalg import lapack
 
 from drivers.arrays import Array
-from sessions.statistics.correlations import CONFIDENCE, t_quantile
-from sessions.statistics.scores import sd_interval
+from sessions.statistics.correlations import TAILS, t_quantile
+from sessions.statistics.scores import indicator_columns, sd_interval
 
 _STARTS = (0.3, 3.0)  # spreads relative to what is left: the search starts from each pair, and the best end is kept
 _WIDEST = 1e3  # such a spread: scores have three figures, and a step of the search may not go beyond
@@ -53,27 +53,29 @@ class _Likelihood:
         """Values that tell the variance of e."""
         return self.n - len(self.offset) * self.reml
 
-    def reduce(self, at: Array) -> tuple[Array, Array, float]:
+    def reduce(self, theta: Array) -> tuple[Array, Array, float]:
         """Return L (c, c), `sums` weighted by the inverse covariance, and the log of the covariance's determinant."""
-        factor = np.einsum("m,mij->ij", at, self.patterns)
-        c = len(factor)
-        half, log_det = _eliminate(np.eye(c) + factor.T @ self.sums[:c, :c] @ factor, factor.T @ self.sums[:c])
+        factor = np.einsum("m,mij->ij", theta, self.patterns)
+        count = len(factor)
+        rows = factor.T @ self.sums[:count]
+        half, log_det = _eliminate(np.eye(count) + factor.T @ self.sums[:count, :count] @ factor, rows)
         return factor, self.sums - half.T @ half, log_det
 
-    def deviance(self, at: Array) -> tuple[float, Array]:
+    def deviance(self, theta: Array) -> tuple[float, Array]:
         """Return -2 log likelihood, and its gradient."""
-        factor, cross_products, value = self.reduce(at)
-        c = len(factor)
-        half, log_det = _eliminate(cross_products[c:-1, c:-1], cross_products[c:-1])
+        factor, cross_products, value = self.reduce(theta)
+        count = len(factor)
+        half, log_det = _eliminate(cross_products[count:-1, count:-1], cross_products[count:-1])
         cross_products = cross_products - half.T @ half  # by what the fixed effects leave
-        rest = float(cross_products[-1, -1])
-        by = cross_products[:c, :c] - self.dof / rest * np.outer(cross_products[:c, -1], cross_products[:c, -1])
+        residual_square = float(cross_products[-1, -1])
+        errors = cross_products[:count, -1]
+        factor_gradient = cross_products[:count, :count] - self.dof / residual_square * np.outer(errors, errors)
         if self.reml:
             value += log_det
         else:
-            by += half[:, :c].T @ half[:, :c]
-        value += self.dof * (1.0 + math.log(2.0 * math.pi * rest / self.dof))
-        return value, 2.0 * np.einsum("mij,ij->m", self.patterns, by @ factor)
+            factor_gradient += half[:, :count].T @ half[:, :count]
+        value += self.dof * (1.0 + math.log(2.0 * math.pi * residual_square / self.dof))
+        return value, 2.0 * np.einsum("mij,ij->m", self.patterns, factor_gradient @ factor)
 
     def maximum(self, starts: Sequence[Array]) -> Array:
         """Return the numbers (m,) with the greatest likelihood."""
@@ -88,23 +90,24 @@ class _Likelihood:
             )
             for start in starts
         ]
-        return self._polish(min(optima, key=lambda one: float(one.fun)).x)
+        return self._polish(min(optima, key=lambda optimum: float(optimum.fun)).x)
 
-    def _polish(self, at: Array) -> Array:
+    def _polish(self, theta: Array) -> Array:
         """Return where the gradient vanishes to round-off, by Newton's method from a point close by."""
-        value, slope = self.deviance(at)
+        value, slope = self.deviance(theta)
         for _ in range(_STEPS):
-            step = 1e-6 * np.maximum(np.abs(at), 1e-2)
-            curve = np.array(
-                [(self.deviance(at + e)[1] - self.deviance(at - e)[1]) / (2 * e.sum()) for e in np.diag(step)]
-            )
+            step = 1e-6 * np.maximum(np.abs(theta), 1e-2)
+            differences = [
+                self.deviance(theta + offset)[1] - self.deviance(theta - offset)[1] for offset in np.diag(step)
+            ]
+            curvature = np.array(differences) / (2 * step[:, None])
             # Where subjects' levels do not differ the factor may turn without changing the covariance: no step there.
-            new = at - np.linalg.lstsq(0.5 * (curve + curve.T), slope, rcond=1e-7)[0]
-            new_value, new_slope = self.deviance(new)
-            if not new_value <= value + 1e-9 * abs(value) or np.abs(new_slope).max() >= np.abs(slope).max():
+            candidate = theta - np.linalg.lstsq(0.5 * (curvature + curvature.T), slope, rcond=1e-7)[0]
+            candidate_value, candidate_slope = self.deviance(candidate)
+            if not candidate_value <= value + 1e-9 * abs(value) or np.abs(candidate_slope).max() >= np.abs(slope).max():
                 break
-            at, value, slope = new, new_value, new_slope
-        return np.where(np.abs(at) < _NOTHING, 0.0, at)
+            theta, value, slope = candidate, candidate_value, candidate_slope
+        return np.where(np.abs(theta) < _NOTHING, 0.0, theta)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,29 +123,29 @@ class Fit:
     exact: bool  # hardly anything is left
 
 
-def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, own: int) -> Fit:
-    """Return the fit of y (n) by `columns` (n, p), alike in size; their first `own` also differ between subjects."""
-    whose = _levels(subjects)
-    random = (whose[:, :, None] * columns[:, None, :own]).reshape(len(y), -1)
-    places = np.tril_indices(own)
-    units = np.zeros((len(places[0]), own, own))
-    units[(np.arange(len(units)), *places)] = 1.0
-    patterns = np.array([np.kron(np.eye(whose.shape[1]), unit) for unit in units], np.float64)
+def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, random_terms: int) -> Fit:
+    """Return the fit of y (n) by `columns` (n, p), alike in size; the first `random_terms` also differ by subject."""
+    indicators = indicator_columns(subjects)
+    random = (indicators[:, :, None] * columns[:, None, :random_terms]).reshape(len(y), -1)
+    triangle = np.tril_indices(random_terms)
+    units = np.zeros((len(triangle[0]), random_terms, random_terms))
+    units[(np.arange(len(units)), *triangle)] = 1.0
+    patterns = np.array([np.kron(np.eye(indicators.shape[1]), unit) for unit in units], np.float64)
     likelihood = _Likelihood.of(y, columns, random, patterns, reml=True)
-    at = likelihood.maximum([np.diag(spread)[places] for spread in product(_STARTS, repeat=own)])
-    factor, cross_products, _ = likelihood.reduce(at)
-    factor, cross_products = factor[:own, :own], cross_products[random.shape[1] :, random.shape[1] :]
+    theta = likelihood.maximum([np.diag(spread)[triangle] for spread in product(_STARTS, repeat=random_terms)])
+    factor, cross_products, _ = likelihood.reduce(theta)
+    factor, cross_products = factor[:random_terms, :random_terms], cross_products[random.shape[1] :, random.shape[1] :]
     inverse = np.linalg.inv(cross_products[:-1, :-1])
     beta = inverse @ cross_products[:-1, -1]
-    square = float(cross_products[-1, -1] - cross_products[-1, :-1] @ beta) / likelihood.dof
+    variance = float(cross_products[-1, -1] - cross_products[-1, :-1] @ beta) / likelihood.dof
     return Fit(
         estimates=likelihood.offset + beta,
-        errors=np.sqrt(square * np.diag(inverse)),
-        among=square * factor @ factor.T,
-        within=math.sqrt(square),
-        deviance=likelihood.deviance(at)[0],
+        errors=np.sqrt(variance * np.diag(inverse)),
+        among=variance * factor @ factor.T,
+        within=math.sqrt(variance),
+        deviance=likelihood.deviance(theta)[0],
         singular=bool(np.abs(np.diag(factor)).min() < _SINGULAR),
-        exact=bool(np.abs(at).max() >= _WIDEST),
+        exact=bool(np.abs(theta).max() >= _WIDEST),
     )
 
 
@@ -156,12 +159,6 @@ def _eliminate(matrix: Array, rows: Array) -> tuple[Array, float]:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
     half, _ = lapack.dtrtrs(root, rows, lower=True)
     return half, 2.0 * float(np.log(root.diagonal()).sum())
-
-
-def _levels(groups: Sequence[str] | Sequence[int] | Array) -> Array:
-    """Return a column for each group that marks its members (n, k)."""
-    codes = np.unique(np.asarray(groups), return_inverse=True)[1]
-    return np.eye(int(codes.max()) + 1)[codes]
 
 
 def fits_exactly(design: Array, y: Array) -> bool:
@@ -178,17 +175,18 @@ def crossed_deviance(
     By maximum likelihood. Models of the same scores with different x have as many parameters: their AICs differ as
     their deviances do. None where x does not vary, or where the fixed terms leave nothing to tell an error from.
     """
-    along = np.asarray(x, np.float64)
-    along = along - along.mean()
-    if float(np.abs(along).max()) <= 1e-12 * float(np.abs(x).max()):
+    covariate = np.asarray(x, np.float64) - np.mean(x)
+    size = float(np.abs(covariate).max())
+    if size <= 1e-12 * float(np.abs(x).max()):
         return None
-    values, levels = np.asarray(y, np.float64), [_levels(one) for one in (subjects, surfaces)]
+    covariate /= size
+    values, levels = np.asarray(y, np.float64), [indicator_columns(groups) for groups in (subjects, surfaces)]
     random = np.hstack(levels)
-    if fits_exactly(np.column_stack([random, along / np.abs(along).max()]), values):
+    if fits_exactly(np.column_stack([random, covariate]), values):
         return None
-    fixed = np.column_stack([np.ones(len(values)), along / np.abs(along).max()])
-    whose = np.repeat([0, 1], [one.shape[1] for one in levels])
-    patterns = np.array([np.diag((whose == group).astype(np.float64)) for group in (0, 1)])
+    fixed = np.column_stack([np.ones(len(values)), covariate])
+    factors = np.repeat([0, 1], [groups.shape[1] for groups in levels])
+    patterns = np.array([np.diag((factors == group).astype(np.float64)) for group in (0, 1)])
     likelihood = _Likelihood.of(values, fixed, random, patterns, reml=False)
     return likelihood.deviance(likelihood.maximum([np.array(spread) for spread in product(_STARTS, repeat=2)]))[0]
 
@@ -277,18 +275,18 @@ def mixed_model(
     scale = np.abs(columns).max(axis=0)  # covariates in any unit are fitted alike well
     if not scale.all() or np.linalg.matrix_rank(columns / scale) < len(names):
         return "a term does not vary, or others determine it"
-    varies = sum(float(np.ptp(columns[np.array(subjects) == one, 1])) > 0.0 for one in set(subjects))
+    varies = sum(float(np.ptp(columns[np.array(subjects) == subject, 1])) > 0.0 for subject in set(subjects))
     if varies < 2:
         return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
-    if fits_exactly(np.hstack([_levels(subjects), columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
+    if fits_exactly(np.hstack([indicator_columns(subjects), columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
-    fit = reml_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own=2)
+    fit = reml_fit(np.array(score, np.float64), columns / scale, np.array(subjects), random_terms=2)
     if fit.exact:
         return "each subject's scores lie on a line of their own: there is nothing to tell an error from"
     level_sd, slope_sd = (np.sqrt(np.diag(fit.among)) / scale[:2]).tolist()
-    rest = max(len(score) - len(names) - (count - 1) - (varies - 1), 1)
-    free = [count - 1, varies - 1, *([rest] * (len(names) - 2))]
-    terms = map(_term, names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free)
+    residual_dof = max(len(score) - len(names) - (count - 1) - (varies - 1), 1)
+    dofs = [count - 1, varies - 1, *([residual_dof] * (len(names) - 2))]
+    terms = map(_term, names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), dofs)
     first, *common = covariates.values()
     return MixedModel(
         terms=tuple(terms),
@@ -320,19 +318,16 @@ def spreads(
     subjects have unlike trials (Thomas & Hultquist 1978, Ann. Stat. 6:582). Subjects with too few trials for a line of
     their own do not count. None for fewer than three subjects, or where covariates determine each other.
     """
-    own = 1 if x is None else 2
-    codes, whole = np.unique(np.array(subjects), return_inverse=True)
-    trials = np.bincount(whole, minlength=len(codes))
-    usable = trials[whole] > own
-    subject_numbers = np.unique(whole[usable])
-    k = len(subject_numbers)
-    if k < 3:
+    line_terms = 1 if x is None else 2
+    _, members, trials = np.unique(np.array(subjects), return_inverse=True, return_counts=True)
+    usable = trials[members] > line_terms
+    count = int((trials > line_terms).sum())
+    if count < 3:
         return None
-    who = (whole[usable][:, None] == subject_numbers[None, :]).astype(np.float64)  # (n, k)
-    lines = who
+    lines = indicators = indicator_columns(members[usable])
     if x is not None:
-        along = np.array(x, np.float64)[usable]
-        lines = np.hstack([who, who * (along - along.mean())[:, None]])
+        covariate = np.array(x, np.float64)[usable]
+        lines = np.hstack([indicators, indicators * (covariate - covariate.mean())[:, None]])
     covariates = np.array(common, np.float64).reshape(len(common), len(y))[:, usable].T
     design = np.hstack([lines, covariates])
     scale = np.abs(design).max(axis=0)
@@ -349,31 +344,27 @@ def spreads(
     coefficients, errors = inverse @ values / scale, inverse @ inverse.T / np.outer(scale, scale)
 
     def between(first: int) -> Spread:
-        part = slice(first, first + k)
-        error = errors[part, part]
-        share = float(np.trace(error) - error.mean(axis=0).sum()) / (k - 1)  # of `square` in the mean square
-        return difference_of_squares(float(coefficients[part].var(ddof=1)), k - 1, share * square, dof)
+        block = slice(first, first + count)
+        error = errors[block, block]
+        share = float(np.trace(error) - error.mean(axis=0).sum()) / (count - 1)  # of `square` in the mean square
+        return difference_of_squares(float(coefficients[block].var(ddof=1)), count - 1, share * square, dof)
 
     sd = math.sqrt(square)
-    return Spreads(between(0), None if x is None else between(k), Spread(sd, *sd_interval(sd, dof + 1)), k, dof)
+    return Spreads(between(0), None if x is None else between(count), Spread(sd, *sd_interval(sd, dof + 1)), count, dof)
 
 
-def difference_of_squares(first: float, n: int, second: float, m: int) -> Spread:
-    """Return the root of `first` (n degrees of freedom) less `second` (m), two independent mean squares.
+def difference_of_squares(first: float, first_dof: int, second: float, second_dof: int) -> Spread:
+    """Return the root of `first` less `second`, two independent mean squares.
 
     Its lower end is 0 exactly where an F test does not tell the two apart.
     """
-    tail = (1 - CONFIDENCE) / 2
-    difference = first - second
 
-    def over(q: float, dof: int) -> float:
-        return dof / float(special.chdtri(dof, 1 - q))
+    def margin(tail: float, opposite: float) -> float:
+        ratio = float(special.fdtri(first_dof, second_dof, opposite))
+        first_excess = first_dof / float(special.chdtri(first_dof, tail)) - 1
+        second_excess = second_dof / float(special.chdtri(second_dof, opposite)) - 1
+        bound = ((ratio - 1) ** 2 - (first_excess * ratio) ** 2 - second_excess**2) / ratio
+        return math.sqrt(max((first_excess * first) ** 2 + (second_excess * second) ** 2 + bound * first * second, 0.0))
 
-    f, g, h = float(special.fdtri(n, m, 1 - tail)), 1 - over(1 - tail, n), over(tail, m) - 1
-    bound = ((f - 1) ** 2 - (g * f) ** 2 - h * h) / f
-    low = difference - math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + bound * first * second, 0.0))
-    f, g, h = float(special.fdtri(n, m, tail)), over(tail, n) - 1, 1 - over(1 - tail, m)
-    bound = ((1 - f) ** 2 - (g * f) ** 2 - h * h) / f
-    high = difference + math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + bound * first * second, 0.0))
-    sd, least, greatest = (math.sqrt(max(square, 0.0)) for square in (difference, low, high))
-    return Spread(sd, least, greatest)
+    squares = first - second, first - second - margin(*TAILS), first - second + margin(*TAILS[::-1])
+    return Spread(*(math.sqrt(max(square, 0.0)) for square in squares))

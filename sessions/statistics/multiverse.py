@@ -70,9 +70,9 @@ class Path:
 
     def usual(self, rule: str, kinematics: str, law: AreaLaw = FIXED) -> bool:
         """Say whether it is the way that every other number went, mu computed by `rule` and tau_max by `law`."""
-        first = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
-        own = (self.filter, self.window, self.receptor, _AREAS[self.area])
-        return own == first and self.mu == rule and self.kinematics == kinematics
+        usual = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
+        choices = (self.filter, self.window, self.receptor, _AREAS[self.area])
+        return choices == usual and self.mu == rule and self.kinematics == kinematics
 
 
 CHOICE_LABELS: Mapping[str, str] = {  # of the fields of a path
@@ -109,16 +109,16 @@ def trial_paths(
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
     steady = replace(prediction.options, course="steady")
     analyses = _analyses(recording)
-    usual = {one.trial: one for one in next(iter(analyses.values())).friction}
+    usual = {friction.trial: friction for friction in next(iter(analyses.values())).friction}
     scenes: dict[Path, Mapping[int, Scene]] = {}  # whichever receptor answers
     for path in paths:
         if path.receptor == RECEPTORS[0]:
-            kind = replace(steady, kinematics=path.kinematics)
-            scenes[path] = scenes_of(_analysis_of_path(analyses, path, usual), recording.plan, kind)
-    targets = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
+            options = replace(steady, kinematics=path.kinematics)
+            scenes[path] = scenes_of(_path_analysis(analyses, path, usual), recording.plan, options)
+    targets = dict.fromkeys(scene for by_trial in scenes.values() for scene in by_trial.values())
     predictions = [row.prediction for row in prediction.trials if row.prediction is not None]
     answers = _solve_scenes(tuple(targets), predictions, quantity, progress)
-    trials = sorted({trial for of_path in scenes.values() for trial in of_path})
+    trials = sorted({trial for by_trial in scenes.values() for trial in by_trial})
 
     def value(trial: int, path: Path) -> float | None:
         scene = scenes[replace(path, receptor=RECEPTORS[0])].get(trial)
@@ -130,17 +130,17 @@ def trial_paths(
 
 def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
     """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
-    first, *laws = dict.fromkeys(law for law, _ in _AREAS.values())
-    cases = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], laws)]
+    planned, *laws = dict.fromkeys(law for law, _ in _AREAS.values())
+    cases = [*product(FILTERS, WINDOWS, [planned]), *product(FILTERS, list(WINDOWS)[:1], laws)]
 
-    def settings(f: str, w: str, law: AreaLaw) -> AnalysisSettings:
-        steady = SteadySettings(steady_rule=WINDOWS[w])
-        return AnalysisSettings(filter=FilterSettings(cut_off=FILTERS[f]), steady=steady, area=law)
+    def settings(filter_name: str, window: str, law: AreaLaw) -> AnalysisSettings:
+        steady = SteadySettings(steady_rule=WINDOWS[window])
+        return AnalysisSettings(filter=FilterSettings(cut_off=FILTERS[filter_name]), steady=steady, area=law)
 
     return {case: analyse(recording, settings(*case)) for case in cases}
 
 
-def _analysis_of_path(
+def _path_analysis(
     analyses: Mapping[tuple[str, str, AreaLaw], Analysis],
     path: Path,
     usual: Mapping[int | None, FrictionParameters],
@@ -150,12 +150,12 @@ def _analysis_of_path(
     analysis = analyses[path.filter, path.window, _AREAS[next(iter(_AREAS))][0]]
     bounds = analyses[path.filter, window, law].strokes
     friction: list[FrictionParameters] = []
-    for one in analysis.friction:
-        stroke, bound = analysis.strokes[one.stroke], bounds[one.stroke].tau_max
+    for parameters in analysis.friction:
+        stroke, bound = analysis.strokes[parameters.stroke], bounds[parameters.stroke].tau_max
         mu = stroke.mu_max if path.mu == "maximum" else stroke.mu_dynamic
         tau_max = None if bound is None else bound / share
-        same = usual.get(one.trial, one)
-        friction.append(replace(one, mu=mu, tau_max=tau_max, direction=same.direction, speed=same.speed))
+        base = usual.get(parameters.trial, parameters)
+        friction.append(replace(parameters, mu=mu, tau_max=tau_max, direction=base.direction, speed=base.speed))
     return replace(analysis, friction=tuple(friction))
 
 
@@ -167,24 +167,24 @@ def _solve_scenes(
     Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
     friction, which is solved; where that fails they are solved themselves.
     """
-    by_friction = sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf))
-    alike = by_key((_kind(scene), scene) for scene in by_friction)
-    first = {kind: group[0] for kind, group in alike.items()}
-    solutions = {kind: one for one in predictions if (kind := _kind(one.scene)) in first}
-    new = [kind for kind in first if kind not in solutions]
-    answers = settled_predictions([first[kind] for kind in new], part_of(progress, 0.0, 0.5))
-    solutions |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
+    in_order = sorted(scenes, key=lambda scene: (scene.friction.mu, scene.friction.tau_max or math.inf))
+    by_setup = by_key((_setup(scene), scene) for scene in in_order)
+    references = {setup: group[0] for setup, group in by_setup.items()}
+    solutions = {setup: prediction for prediction in predictions if (setup := _setup(prediction.scene)) in references}
+    unsolved = [setup for setup in references if setup not in solutions]
+    answers = settled_predictions([references[setup] for setup in unsolved], part_of(progress, 0.0, 0.5))
+    solutions |= {setup: answer for setup, answer in zip(unsolved, answers, strict=True) if answer is not None}
     pairs: dict[Scene, Pair | None] = {}
-    for kind, slide in zip(solutions, slides(list(solutions.values()), part_of(progress, 0.5, 0.7)), strict=True):
-        pairs |= _near(slide, alike[kind], quantity)
-    rest = [scene for scene in scenes if scene not in pairs]
-    answers = [answer for answer in settled_predictions(rest, part_of(progress, 0.7, 0.9)) if answer is not None]
+    for setup, slide in zip(solutions, slides(list(solutions.values()), part_of(progress, 0.5, 0.7)), strict=True):
+        pairs |= _pairs(slide, by_setup[setup], quantity)
+    missing = [scene for scene in scenes if scene not in pairs]
+    answers = [answer for answer in settled_predictions(missing, part_of(progress, 0.7, 0.9)) if answer is not None]
     for answer, slide in zip(answers, slides(answers, part_of(progress, 0.9, 1.0)), strict=True):
-        pairs |= _near(slide, [answer.scene], quantity)
+        pairs |= _pairs(slide, [answer.scene], quantity)
     return pairs
 
 
-def _near(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) -> Mapping[Scene, Pair]:
+def _pairs(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) -> Mapping[Scene, Pair]:
     """Return a quantity over the ending and at its middle of those scenes that a slide leads to."""
     if slide is None:
         return {}
@@ -192,7 +192,7 @@ def _near(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) -> 
     return {scene: (ending, point) for scene, (ending, point) in zip(scenes, pairs, strict=True) if ending == ending}
 
 
-def _kind(scene: Scene) -> Scene:
+def _setup(scene: Scene) -> Scene:
     """Return a scene settled and without friction: the same of all that differ in that alone."""
     return replace(scene, friction=Friction(0.0), solve=replace(scene.solve, course="steady"))
 
@@ -242,15 +242,15 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
     pairs = [(trial.subject, value, score) for trial, value, score in points]
     values = surface_means([(trial.subject, trial.index, value) for trial, value, _ in points]) or {}
     scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
-    inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
-    low, high = (None, None) if inner is None or inner.people is None else inner.people
+    repeated = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
+    low, high = (None, None) if repeated is None or repeated.people is None else repeated.people
     return PathFinding(
         path=path,
         usual=usual,
         surfaces=len({trial.index for trial, _ in with_value}),
         trials=len(with_value),
         r=pearson(list(values.values()), list(scores.values())),
-        within=None if inner is None else inner.r,
+        within=None if repeated is None else repeated.r,
         low=low,
         high=high,
     )
@@ -272,15 +272,15 @@ class Spread:
 def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
     """Return the correlation of each path: within subjects where any path has that, else of the means."""
     paths = list(findings)
-    inner = any(one.within is not None for one in paths)
-    return [one.within if inner else one.r for one in paths]
+    within = any(finding.within is not None for finding in paths)
+    return [finding.within if within else finding.r for finding in paths]
 
 
 def spread(values: Sequence[float | None]) -> Spread | None:
     """Return the distribution of correlations; None where there is none.
 
-    >>> of = spread([0.5, None, 0.7, 0.701])
-    >>> of.median, of.correlated, of.distinct
+    >>> distribution = spread([0.5, None, 0.7, 0.701])
+    >>> distribution.median, distribution.correlated, distribution.distinct
     (0.7, 3, 2)
     """
     numbers = sorted(value for value in values if value is not None)
@@ -302,9 +302,9 @@ def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread |
     values = correlations(findings)
     rows: list[tuple[str, str, Spread | None, bool]] = []
     for choice in CHOICES:
-        names = dict.fromkeys(getattr(one.path, choice) for one in findings)
-        usual = {getattr(one.path, choice) for one in findings if one.usual}
+        names = dict.fromkeys(getattr(finding.path, choice) for finding in findings)
+        usual = {getattr(finding.path, choice) for finding in findings if finding.usual}
         for name in names:
-            subset = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
+            subset = [r for finding, r in zip(findings, values, strict=True) if getattr(finding.path, choice) == name]
             rows.append((choice, name, spread(subset), name in usual))
     return tuple(rows)

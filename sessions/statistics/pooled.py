@@ -36,8 +36,8 @@ from sessions.statistics.scales import (
     Judgement,
     PairedScale,
     consistence,
-    of_comparisons,
-    of_judgements,
+    latent_comparisons,
+    latent_judgements,
     paired_scale,
     stevens_exponent,
 )
@@ -54,6 +54,7 @@ from sessions.statistics.scores import (
 )
 from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions, exclusion_of, scores_of
 from sessions.statistics.within_subjects import (
+    RepeatedCorrelation,
     Table,
     agreement,
     differences,
@@ -81,27 +82,25 @@ def pool_visits(
     `ground_truth` is that of a synthetic study; nothing but the comparison uses it.
     """
     in_order = tuple(sorted(visits, key=lambda visit: visit.session))
-    same = by_key((visit.sha256, visit.session) for visit in in_order if visit.sha256)
-    copies = {session: first for first, *more in same.values() for session in more}
-    unique_visits = [visit for visit in in_order if visit.session not in copies]
-    rows = ((v, row) for v in unique_visits for row in v.rows)
-    trials = [(v, row) for v, row in rows if exclusion_of(exclusions, v.subject, row.descriptor) is None]
-    tables = [scores_of(visit, [row for v, row in trials if v is visit]) for visit in unique_visits]
+    same_files = by_key((visit.sha256, visit.session) for visit in in_order if visit.sha256)
+    copies = {session: original for original, *repeats in same_files.values() for session in repeats}
+    included = [
+        (visit, [row for row in visit.rows if exclusion_of(exclusions, visit.subject, row.descriptor) is None])
+        for visit in in_order
+        if visit.session not in copies
+    ]
+    tables = [scores_of(visit, rows) for visit, rows in included]
+    trials = by_key((row.descriptor, (visit, row)) for visit, rows in included for row in rows)
     options = options or VisitOptions()
-    descriptors = _with_holm(
-        [
-            _descriptor(name, options, quantity, tables, [(v, row) for v, row in trials if row.descriptor == name])
-            for name in dict.fromkeys(row.descriptor for _, row in trials)
-        ]
-    )
+    descriptors = _with_holm([_descriptor(name, options, quantity, tables, trials[name]) for name in trials])
     simulated = sum(bool(visit.simulated) for visit in in_order)
-    head = f"SIMULATED: {simulated} of the {len(in_order)} sessions of this study are simulated"
+    sentence = f"SIMULATED: {simulated} of the {len(in_order)} sessions of this study are simulated"
     return StudyFindings(
-        simulated=head if simulated else "",
+        simulated=sentence if simulated else "",
         options=options,
         visits=in_order,
         failed=tuple(sorted(failed)),
-        copies=tuple((v.session, copies[v.session]) for v in in_order if v.session in copies),
+        copies=tuple((visit.session, copies[visit.session]) for visit in in_order if visit.session in copies),
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=descriptors,
@@ -114,21 +113,23 @@ def pool_visits(
 
 
 def _with_holm(descriptors: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
-    ps = {one.descriptor: one.repeated.people_p for one in descriptors if one.repeated is not None}
-    p_values = {descriptor: p for descriptor, p in ps.items() if p is not None}
+    within = {findings.descriptor: findings.repeated for findings in descriptors if findings.repeated is not None}
+    p_values = {name: repeated.people_p for name, repeated in within.items() if repeated.people_p is not None}
     adjusted = dict(zip(p_values, holm(list(p_values.values())), strict=True))
-    return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in descriptors)
+    return tuple(replace(findings, repeated_holm=adjusted.get(findings.descriptor)) for findings in descriptors)
 
 
 def _descriptor(
     name: str, options: VisitOptions, quantity: Quantity, tables: Sequence[ScoreTable], trials: Trials
 ) -> DescriptorFindings:
-    indices = tuple(sorted({row.index for _, row in trials}))
+    by_index = by_key((row.index, (visit, row)) for visit, row in trials)
+    indices = tuple(sorted(by_index))
     matrix = score_matrix(tables, name)
-    rows = [(v.subject, r, r.response(quantity.name), r.score) for v, r in trials]
+    rows = [(visit.subject, row, row.response(quantity.name), row.score) for visit, row in trials]
     score_rows = [(subject, row, score) for subject, row, _, score in rows if score is not None]
-    points = [(subject, r, x, score) for subject, r, x, score in rows if x is not None and score is not None]
+    points = [(subject, row, x, score) for subject, row, x, score in rows if x is not None and score is not None]
     plain = tuple((subject, row.index, x, score) for subject, row, x, score in points)
+    responses = [(subject, x, score) for subject, _, x, score in points]
     pairs = choices(trials)
     scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
     comparisons = constant_stimuli(trials)
@@ -139,15 +140,15 @@ def _descriptor(
         scores=tuple(mean for mean in mean_scores(tables) if mean.descriptor == name),
         within=within_means(matrix),
         agreement=agreement(matrix),
-        surfaces=tuple(_surface(i, quantity.name, [(v, r) for v, r in trials if r.index == i]) for i in indices),
+        surfaces=tuple(_surface(index, quantity.name, by_index[index]) for index in indices),
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=plain,
         mean_relation=_relation(plain),
-        repeated=repeated_correlation([p[0] for p in plain], [p[2] for p in plain], [p[3] for p in plain]),
+        repeated=_within(responses),
         repeated_holm=None,
         rivals=rivals_within(rival_trials, quantity.label),
         rivals_of_means=rivals_of_surfaces(rival_trials, quantity.label),
-        without_subject=_without_subject([(subject, x, score) for subject, _, x, score in plain]),
+        without_subject=_without_subject(responses),
         normalised=_normalise(z_scores(matrix), plain),
         differences=differences(matrix),
         estimates=estimates(trials, quantity.name),
@@ -158,10 +159,10 @@ def _descriptor(
             [(subject, row, score) for subject, row, _, score in points], quantity, response_term(quantity)
         ),
         on_index=_model(score_rows, quantity, INDEX),
-        on_friction=_model([one for one in score_rows if one[1].mu is not None], quantity, INDEX, FRICTION),
-        fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
+        on_friction=_model([trial for trial in score_rows if trial[1].mu is not None], quantity, INDEX, FRICTION),
+        fingers=_fingers([(visit.subject, row.index, row.mu) for visit, row in trials if row.mu is not None]),
         paths=path_findings(
-            [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
+            [PathTrial(visit.subject, row.index, row.score, row.rule, row.paths) for visit, row in trials],
             options.prediction.kinematics,
             options.area,
             within=True,
@@ -187,17 +188,17 @@ def response_term(quantity: Quantity) -> str:
     return f"{quantity.label} [{quantity.shown_unit[0]}]"
 
 
-def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *what: str) -> MixedModel | str:
-    """Return the mixed model of scores on `what`, drift and carry-over, or why there is none.
+def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *terms: str) -> MixedModel | str:
+    """Return the mixed model of scores on `terms`, drift and carry-over, or why there is none.
 
-    Trials are subject, row and score. Subjects have slopes of their own on the first of `what`.
+    Trials are subject, row and score. Subjects have slopes of their own on the first of `terms`.
     """
-    subjects, rows, scores = [one[0] for one in trials], [one[1] for one in trials], [one[2] for one in trials]
-    count = len(set(subjects))
+    count = len({subject for subject, _, _ in trials})
     if count < 3:
-        own = "scores" if what == (INDEX,) else "scores and strokes of their own"
-        there = "there is 1" if count == 1 else f"there are {count or 'none'}"
-        return f"it takes three subjects with {own}, and {there}"
+        requirement = "scores" if terms == (INDEX,) else "scores and strokes of their own"
+        count_text = "there is 1" if count == 1 else f"there are {count or 'none'}"
+        return f"it takes three subjects with {requirement}, and {count_text}"
+    subjects, rows, scores = zip(*trials, strict=True)
     columns = {
         INDEX: [row.index - 50.0 for row in rows],
         response_term(quantity): [quantity.shown_unit[1] * (row.response(quantity.name) or 0.0) for row in rows],
@@ -206,13 +207,13 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *w
         CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],
     }
     order = [name for name in (DRIFT, CARRY_OVER) if np.ptp(columns[name]) > 0.0]
-    return mixed_model(subjects, scores, {name: columns[name] for name in (*what, *order)})
+    return mixed_model(subjects, scores, {name: columns[name] for name in (*terms, *order)})
 
 
 def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
     """Return how far subjects' friction differs from one another, of trials' subject, index and mu."""
     indices = sorted({index for _, index, _ in trials})
-    surfaces = [[float(index == one) for _, index, _ in trials] for one in indices[1:]]
+    surfaces = [[float(index == surface) for _, index, _ in trials] for surface in indices[1:]]
     variances = spreads([subject for subject, _, _ in trials], [math.log(mu) for _, _, mu in trials], surfaces)
     return None if variances is None else variances.level
 
@@ -221,8 +222,8 @@ def _surface(index: int, quantity: str, trials: Trials) -> SurfaceMean:
     """Return means over subjects, each subject's own repeats averaged first."""
 
     def over_subjects(value: Callable[[TrialRow], float | None]) -> Average | None:
-        own = by_key((v.subject, number) for v, row in trials if (number := value(row)) is not None)
-        return average([float(np.mean(values)) for values in own.values()])
+        by_subject = by_key((visit.subject, number) for visit, row in trials if (number := value(row)) is not None)
+        return average([float(np.mean(values)) for values in by_subject.values()])
 
     response = over_subjects(lambda row: row.response(quantity))
     names = ("mu", "normal_force", "model_normal_force", "matching_depth")
@@ -239,12 +240,16 @@ def _relation(points: Sequence[tuple[str, int, float, float]]) -> Relation | Non
     return relation(list(responses.values()), list(scores.values()), list(responses))
 
 
+def _within(points: Sequence[tuple[str, float, float]]) -> RepeatedCorrelation | None:
+    """Return the correlation within subjects of points of subject, x and y."""
+    return repeated_correlation(*zip(*points, strict=True)) if points else None
+
+
 def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
     """Return the correlation within subjects when each subject in turn is left out."""
     rows: list[tuple[str, float]] = []
     for subject in dict.fromkeys(point[0] for point in points):
-        rest = [point for point in points if point[0] != subject]
-        repeated = repeated_correlation(*zip(*rest, strict=True)) if rest else None
+        repeated = _within([point for point in points if point[0] != subject])
         rows += [] if repeated is None else [(subject, repeated.r)]
     return tuple(rows)
 
@@ -252,7 +257,7 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
 def _normalise(table: Table, points: Sequence[tuple[str, int, float, float]]) -> NormalisedScores:
     """Return statistics of standardised scores; `points` are subject, index, response to its own stroke, score."""
     pairs = [(subject, i, x, table[subject][i]) for subject, i, x, _ in points if i in table.get(subject, {})]
-    within = repeated_correlation([p[0] for p in pairs], [p[2] for p in pairs], [p[3] for p in pairs])
+    within = _within([(subject, x, score) for subject, _, x, score in pairs])
     return NormalisedScores(_averages(table), _relation(pairs), within)
 
 
@@ -267,25 +272,19 @@ def _averages(table: Table) -> dict[int, Average]:
 
 def estimates(trials: Trials, quantity: str) -> Estimates | None:
     """Return what magnitude estimates say, beside that quantity of the model; None where nobody gave any."""
-    rows = [
-        (v.subject, row.index, row.estimate, row.response(quantity)) for v, row in trials if row.estimate is not None
-    ]
+    rows = [(visit.subject, row, row.estimate) for visit, row in trials if row.estimate is not None]
     if not rows:
         return None
-    no_logarithm = {subject for subject, _, value, _ in rows if value <= 0.0}
-    logs = [(subject, i, math.log(value), x) for subject, i, value, x in rows if subject not in no_logarithm]
-    own = by_key((subject, (index, log)) for subject, index, log, _ in logs)
+    no_logarithm = {subject for subject, _, value in rows if value <= 0.0}
+    logs = [(subject, row, math.log(value)) for subject, row, value in rows if subject not in no_logarithm]
+    by_subject = by_key((subject, (row.index, log)) for subject, row, log in logs)
     table = {
         subject: {index: float(np.mean(values)) for index, values in by_key(pairs).items()}
-        for subject, pairs in sorted(own.items())
+        for subject, pairs in sorted(by_subject.items())
     }
-    pairs = [(subject, x, log) for subject, _, log, x in logs if x is not None]
-    return Estimates(
-        _averages(table),
-        _averages(equal_moduli(table)),
-        repeated_correlation(*zip(*pairs, strict=True)) if pairs else None,
-        tuple(sorted(no_logarithm)),
-    )
+    responses = [(subject, x, log) for subject, row, log in logs if (x := row.response(quantity)) is not None]
+    left_out = tuple(sorted(no_logarithm))
+    return Estimates(_averages(table), _averages(equal_moduli(table)), _within(responses), left_out)
 
 
 def exponent(trials: Trials) -> Exponent | None:
@@ -317,21 +316,24 @@ def choices(trials: Trials) -> list[Choice]:
 def constant_stimuli(trials: Trials) -> ConstantStimuli | None:
     """Return the psychometric function of each subject who compared with a standard; None where nobody did."""
     by_subject = by_key((visit.subject, (visit, row)) for visit, row in trials if row.standard is not None)
-    own_trials = {subject: own for subject, own in sorted(by_subject.items()) if any(row.choice for _, row in own)}
-    if not own_trials:
+    functions = {
+        subject: subject_function(answers)
+        for subject, answers in sorted(by_subject.items())
+        if any(row.choice for _, row in answers)
+    }
+    if not functions:
         return None
-    functions = {subject: subject_function(own) for subject, own in own_trials.items()}
-    pse = [one.pse.value for one in functions.values() if one.pse is not None]
-    jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
+    pse = [function.pse.value for function in functions.values() if function.pse is not None]
+    jnd = [math.log(jnd.value) for function in functions.values() if (jnd := function.jnd) is not None and jnd.value]
     return ConstantStimuli(functions, average(pse), average(jnd))
 
 
 def subject_function(trials: Trials) -> Psychometric:
     """Return the psychometric function of one subject's trials with a standard."""
-    friction = by_key(((v.session, row.index), row.mu) for v, row in trials if row.mu is not None and row.mu > 0.0)
+    friction = by_key(((visit.session, row.index), row.mu) for visit, row in trials if row.mu and row.mu > 0.0)
     answers = [
-        (v.session, row.standard, (row.before, row.index), row.choice)
-        for v, row in trials
+        (visit.session, row.standard, (row.before, row.index), row.choice)
+        for visit, row in trials
         if row.standard is not None and row.choice is not None and row.before is not None
     ]
     return function_of(answers, friction)
@@ -341,12 +343,13 @@ def latent_scales(
     trials: Trials, scales: Sequence[PairedScale], comparisons: ConstantStimuli | None
 ) -> Mapping[Judgement, Mapping[int, IntervalEstimate]]:
     """Return the latent values of each surface by every kind of judgement that has some."""
-    scores = [(v.subject, row.index, row.score) for v, row in trials if row.score is not None]
-    logs = [(v.subject, row.index, math.log(row.estimate)) for v, row in trials if row.estimate and row.estimate > 0.0]
+    scores = [(visit.subject, row.index, row.score) for visit, row in trials if row.score is not None]
+    estimates = [(visit.subject, row.index, row.estimate) for visit, row in trials if row.estimate is not None]
+    logs = [(subject, index, math.log(estimate)) for subject, index, estimate in estimates if estimate > 0.0]
     jnd = None if comparisons is None else comparisons.jnd
     by_judgement: dict[Judgement, Mapping[int, IntervalEstimate]] = {
-        "scores": of_judgements(scores),
-        "estimates": of_judgements(logs),
+        "scores": latent_judgements(scores),
+        "estimates": latent_judgements(logs),
     }
     for scale in scales:
         if scale.model == "Thurstone V":
@@ -354,5 +357,5 @@ def latent_scales(
     if jnd is not None and jnd.low is not None and jnd.high is not None:
         log_mu = by_key((row.index, math.log(row.mu)) for _, row in trials if row.standard is not None and row.mu)
         middle = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(log_mu.items())}
-        by_judgement["comparisons"] = of_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
+        by_judgement["comparisons"] = latent_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
     return {judgement: values for judgement, values in by_judgement.items() if values}

@@ -75,14 +75,14 @@ def power(
     paper, and all subjects meet the same ones. Scores end at 0 and 100.
     """
     designs = [(people, count) for people in subjects for count in surfaces]
-    out: list[Power] = []
+    powers: list[Power] = []
     for number, (people, count) in enumerate(designs):
         rng = np.random.default_rng([seed, people, count])
         verdicts = [_verdict(*_study(effects, people, count, rng)) for _ in range(studies)]
         sign = math.copysign(1.0, effects.effect)
-        out.append(Power(people, count, verdicts.count(sign), verdicts.count(-sign), studies))
+        powers.append(Power(people, count, verdicts.count(sign), verdicts.count(-sign), studies))
         progress((number + 1) / len(designs))
-    return out
+    return powers
 
 
 def _study(
@@ -90,12 +90,12 @@ def _study(
 ) -> tuple[list[str], Array, Array]:
     """Return subject, µ as measured and score of each trial."""
     mu = np.linspace(*MU_RANGE, count)
-    own = mu * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
+    stroke_mu = mu * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
     slope = effects.effect * (1.0 + effects.slope_sd * rng.standard_normal((people, 1))) / (MU_RANGE[1] - MU_RANGE[0])
     level = _MIDDLE + effects.level_sd * rng.standard_normal((people, 1))
-    scores = level + slope * (own - np.mean(MU_RANGE)) + effects.noise * rng.standard_normal((people, count))
+    scores = level + slope * (stroke_mu - np.mean(MU_RANGE)) + effects.noise * rng.standard_normal((people, count))
     names = [f"P{number}" for number in range(people) for _ in range(count)]
-    return names, own.ravel(), np.clip(scores, *SCORE_SCALE).ravel()
+    return names, stroke_mu.ravel(), np.clip(scores, *SCORE_SCALE).ravel()
 
 
 def _verdict(subjects: Sequence[str], mu: Array, scores: Array) -> float:
@@ -134,9 +134,9 @@ def recovery(
     """Return how often studies of so many of the people in `strokes` prefer the quantity that scores follow."""
     surfaces = strokes[quantity].shape[1] // len(depths)
     weights = [study_weights(strokes, people, surfaces, quantity, effects, draw) for _ in range(studies)]
-    alike, first = twins(strokes, quantity), preferred_rivals(weights)
-    shares = first.count(quantity) / studies, sum(name in alike for name in first) / studies
-    return Recovery(people, surfaces, depths, quantity, tuple(sorted(alike - {quantity})), *shares, studies)
+    twin_names, preferred = twins(strokes, quantity), preferred_rivals(weights)
+    shares = preferred.count(quantity) / studies, sum(name in twin_names for name in preferred) / studies
+    return Recovery(people, surfaces, depths, quantity, tuple(sorted(twin_names - {quantity})), *shares, studies)
 
 
 def study_weights(
@@ -151,8 +151,8 @@ def study_weights(
 
     Trials go surface by surface within depths.
     """
-    own = draw.choice(len(strokes[quantity]), people, replace=False)
-    values = {name: all_of[own] for name, all_of in strokes.items()}
+    sample = draw.choice(len(strokes[quantity]), people, replace=False)
+    values = {name: population[sample] for name, population in strokes.items()}
     usable = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     finite: Array = strokes[quantity][np.isfinite(strokes[quantity])]
     level, noise = draw.standard_normal((people, 1)), draw.standard_normal(usable.shape)
@@ -162,9 +162,9 @@ def study_weights(
     scores: Array = slope * (values[quantity] - finite.mean()) / finite.std()
     scores += _MIDDLE + effects.level_sd * level + effects.noise * noise
     subjects, trials = np.nonzero(usable)
-    at = (trials % surfaces).tolist()
+    surface_numbers = (trials % surfaces).tolist()
     deviances = {
-        name: crossed_deviance(list(map(str, subjects)), at, scores[usable].tolist(), x[usable].tolist())
+        name: crossed_deviance(list(map(str, subjects)), surface_numbers, scores[usable].tolist(), x[usable].tolist())
         for name, x in values.items()
     }
     known_deviances = {name: value for name, value in deviances.items() if value is not None}
@@ -173,11 +173,11 @@ def study_weights(
 
 def preferred_rivals(weights: Sequence[Mapping[str, float]]) -> list[str]:
     """Return the rival of the greatest weight in each study."""
-    return [max(one, key=one.__getitem__) for one in weights]
+    return [max(study, key=study.__getitem__) for study in weights]
 
 
 def twins(strokes: Mapping[str, Array], quantity: str) -> set[str]:
     """Return the quantity and those that go with it over all strokes."""
     finite = np.isfinite(np.stack(list(strokes.values()))).all(axis=0)
-    size = {name: abs(float(np.corrcoef(x[finite], strokes[quantity][finite])[0, 1])) for name, x in strokes.items()}
-    return {name for name, r in size.items() if r >= TWIN} | {quantity}
+    y = strokes[quantity][finite]
+    return {name for name, x in strokes.items() if abs(np.corrcoef(x[finite], y)[0, 1]) >= TWIN} | {quantity}

@@ -15,17 +15,17 @@ drops by where a normal law of unknown variance has Student's interval.
 """
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from operator import itemgetter
 
 import numpy as np
 from scipy import optimize, special
 
 from drivers.arrays import Array
 from sessions.statistics.correlations import CONFIDENCE
-from sessions.statistics.scores import IntervalEstimate
+from sessions.statistics.scores import IntervalEstimate, by_key
 
 QUARTILE = float(special.ndtri(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
 LEAST_LEVELS = 3  # of x: two fit any PSE and JND, and tell nothing of lapses
@@ -72,59 +72,57 @@ class Psychometric:
 
 def psychometric(levels: Sequence[Level]) -> Psychometric:
     """Return the function fitted to answers."""
-    levels = [one for one in levels if one.presented]
-    none = Psychometric(sum(one.presented for one in levels))
-    ratios = {one.log_ratio for one in levels}
+    levels = [level for level in levels if level.presented]
+    none = Psychometric(sum(level.presented for level in levels))
+    ratios = {level.log_ratio for level in levels}
     if len(ratios) < LEAST_LEVELS:
         return replace(none, reason=f"it takes {LEAST_LEVELS} comparisons of different friction")
-    task = _Task(levels)
-    if task.flat:
+    fit = _ProfileLikelihood(levels)
+    if fit.flat:
         return replace(none, reason="answers hardly go with friction: the JND lies beyond all comparisons")
-    slope = task.profile(_SLOPE)
+    slope = fit.estimate(_SLOPE)
     return replace(
         none,
-        pse=task.profile(_PSE),
-        jnd=_jnd(slope, task.steepest, task.reach),
-        lapse=task.profile(_LAPSE),
-        correlation=_correlation(task.profile(_SCATTER)) if task.scatters else None,
-        order=task.profile(_ORDER) if task.ordered else None,
+        pse=fit.estimate(_PSE),
+        jnd=_jnd(slope, fit.steepest, fit.reach),
+        lapse=fit.estimate(_LAPSE),
+        correlation=_correlation(fit.estimate(_SCATTER)) if fit.scatters else None,
+        order=fit.estimate(_ORDER) if fit.ordered else None,
         rises=slope.value > 0.0,
-        log_likelihood=task.likelihood,
-        deviance=task.deviance(),
-        freedom=len(levels) - task.parameters,
+        log_likelihood=fit.likelihood,
+        deviance=binomial_deviance(fit.choices, fit.n, fit.chances(fit.best)[0]),
+        freedom=len(levels) - fit.parameters,
     )
 
 
 def binomial_deviance(k: Array, n: Array, p: Array) -> float:
-    """Return the deviance of chances p from k of n answers, against a chance of its own for each."""
+    """Return the deviance of chances p from k of n answers, against the saturated model k / n."""
     return 2.0 * float((special.rel_entr(k, n * p) + special.rel_entr(n - k, n * (1.0 - p))).sum())
 
 
-class _Task:
+class _ProfileLikelihood:
     """The likelihood of answers, its maximum, and its profiles."""
 
     def __init__(self, levels: Sequence[Level]) -> None:
-        self.x = np.array([one.log_ratio for one in levels])
-        self.side = np.array([float(one.order) for one in levels])
-        self.k = np.array([float(one.choices) for one in levels])
-        self.n = np.array([float(one.presented) for one in levels])
+        self.x = np.array([level.log_ratio for level in levels])
+        self.orders = np.array([float(level.order) for level in levels])
+        self.choices = np.array([float(level.choices) for level in levels])
+        self.n = np.array([float(level.presented) for level in levels])
         # Of every answer: level, how many came before, whether the comparison was chosen, and how many like it before.
-        self.level = np.repeat(np.arange(len(levels)), [one.presented for one in levels])
-        self.place = np.concatenate([np.arange(float(one.presented)) for one in levels])
-        self.yes = self.place < self.k[self.level]
-        self.before = np.where(self.yes, self.place, self.place - self.k[self.level])
+        self.level = np.repeat(np.arange(len(levels)), [level.presented for level in levels])
+        self.trial = np.concatenate([np.arange(float(level.presented)) for level in levels])
+        self.is_chosen = self.trial < self.choices[self.level]
+        self.earlier = np.where(self.is_chosen, self.trial, self.trial - self.choices[self.level])
         self.spread = float(np.std(self.x))
         self.steepest = STEEPEST / self.spread
-        self.ordered = len(set(self.side.tolist())) > 1
-        self.reach = far = float(np.ptp(self.x))
-        order = (-far, far) if self.ordered else (0.0, 0.0)
-        scatter = (0.0, MOST_SCATTER) if self.n.max() > 1.0 else (0.0, 0.0)
+        self.ordered = len(set(self.orders.tolist())) > 1
+        self.reach = reach = float(np.ptp(self.x))
         self.bounds = (
-            (float(self.x.min()) - far, float(self.x.max()) + far),
+            (float(self.x.min()) - reach, float(self.x.max()) + reach),
             (-self.steepest, self.steepest),
-            order,
+            (-reach, reach) if self.ordered else (0.0, 0.0),
             (0.0, MOST_LAPSES),
-            scatter,
+            (0.0, MOST_SCATTER if self.n.max() > 1.0 else 0.0),
         )
         self.scale = np.array([self.spread, 1.0 / self.spread, self.spread, 0.1, 0.1])
         self.parameters = sum(low < high for low, high in self.bounds[:_SCATTER])
@@ -133,30 +131,26 @@ class _Task:
         self.drop = math.sqrt(free / 2.0 * math.log1p(float(special.fdtri(1, free, CONFIDENCE)) / free))
         self.best, self.likelihood = self._search()
         with_scatter = np.append(self.best[:_SCATTER], _SOME_SCATTER)
-        tops = [self._at({}, start, _PRECISE, adjusted=True) for start in (self.best, with_scatter)]
-        self.top, self.adjusted = max(tops, key=lambda one: one[1])
+        optima = [self._fit({}, start, _PRECISE, adjusted=True) for start in (self.best, with_scatter)]
+        self.top, self.adjusted = max(optima, key=itemgetter(1))
 
     @property
     def flat(self) -> bool:
         """Say whether all answers are alike, or the JND lies beyond everything that was compared."""
-        return self.k.sum() in (0.0, self.n.sum()) or abs(float(self.best[_SLOPE])) * self.reach < QUARTILE
+        return self.choices.sum() in (0.0, self.n.sum()) or abs(float(self.best[_SLOPE])) * self.reach < QUARTILE
 
     @property
     def scatters(self) -> bool:
         """Say whether the likelihood depends on the scatter: neither a step does nor single answers."""
-        none, most = (self._at({_SCATTER: end}, self.best)[1] for end in (0.0, self.bounds[_SCATTER][1]))
+        none, most = (self._fit({_SCATTER: theta}, self.best)[1] for theta in self.bounds[_SCATTER])
         return abs(most - none) > _SAME
 
-    def profile(self, which: int) -> IntervalEstimate:
+    def estimate(self, parameter: int) -> IntervalEstimate:
         """Return a parameter with its interval of the profile likelihood."""
-        value = float(self.best[which])
-        low, high = self._end(which, -1.0), self._end(which, 1.0)
+        value = float(self.best[parameter])
+        low, high = self._limit(parameter, -1.0), self._limit(parameter, 1.0)
         low, high = None if low is None else min(low, value), None if high is None else max(high, value)
         return IntervalEstimate(value, low, high)
-
-    def deviance(self) -> float:
-        """Return the binomial deviance of the chances that were fitted."""
-        return binomial_deviance(self.k, self.n, self._chances(self.best)[0])
 
     def _search(self) -> tuple[Array, float]:
         """Return the best parameters and their log likelihood.
@@ -164,115 +158,115 @@ class _Task:
         The likelihood has several maxima: of each steepness and share of lapses the likeliest of a grid is followed.
         """
         levels = np.unique(self.x)
-        places = np.concatenate([levels, (levels[1:] + levels[:-1]) / 2.0])
+        points = np.concatenate([levels, (levels[1:] + levels[:-1]) / 2.0])
         orders = (-0.5, 0.0, 0.5) if self.ordered else (0.0,)
         optima: list[tuple[Array, float]] = []
         for steep, lapse in product(_SLOPES, _LAPSES):
             grid = [
-                np.array([place, way * steep / self.spread, order * self.spread, lapse, _SOME_SCATTER])
-                for place, way, order in product(places, (-1.0, 1.0), orders)
+                np.array([pse, sign * steep / self.spread, order * self.spread, lapse, _SOME_SCATTER])
+                for pse, sign, order in product(points, (-1.0, 1.0), orders)
             ]
-            optima.append(self._at({}, max(grid, key=lambda at: self._log_likelihood(at)[0]), _PRECISE))
-        best, likelihood = max(optima, key=lambda one: one[1])
-        step = self._at({_SLOPE: math.copysign(self.steepest, best[_SLOPE])}, best)
+            optima.append(self._fit({}, max(grid, key=lambda values: self._log_likelihood(values)[0]), _PRECISE))
+        best, likelihood = max(optima, key=itemgetter(1))
+        step = self._fit({_SLOPE: math.copysign(self.steepest, best[_SLOPE])}, best)
         return step if step[1] > likelihood - _SAME else (best, likelihood)
 
-    def _end(self, which: int, sense: float) -> float | None:
-        """Return where the adjusted likelihood has dropped to an end; the edge of what may be; None beyond."""
-        edge = self.bounds[which][1 if sense > 0.0 else 0]
-        value, near = float(self.top[which]), self.top
-        beyond = None if which in (_PSE, _ORDER) else edge
+    def _limit(self, parameter: int, sense: float) -> float | None:
+        """Return the bound of an interval towards `sense`: its edge where the likelihood drops too little, or None."""
+        edge = self.bounds[parameter][1 if sense > 0.0 else 0]
+        value, start = float(self.top[parameter]), self.top
+        beyond = None if parameter in (_PSE, _ORDER) else edge
         if value == edge:
             return beyond
         drops = {value: -self.drop}
 
-        def drop(at: float) -> float:
-            nonlocal near
-            if at not in drops:
-                there, likelihood = self._at({which: at}, near, adjusted=True)
-                drops[at] = math.sqrt(max(self.adjusted - likelihood, 0.0)) - self.drop  # nearly a straight line
-                near = there if drops[at] < 0.0 else near  # beyond the interval a fit may lie far off
-            return drops[at]
+        def drop(trial: float) -> float:
+            nonlocal start
+            if trial not in drops:
+                optimum, likelihood = self._fit({parameter: trial}, start, adjusted=True)
+                drops[trial] = math.sqrt(max(self.adjusted - likelihood, 0.0)) - self.drop  # nearly a straight line
+                start = optimum if drops[trial] < 0.0 else start  # beyond the interval a fit may lie far off
+            return drops[trial]
 
-        inner, step = value, float(self.scale[which]) / 4.0
+        inner, step = value, float(self.scale[parameter]) / 4.0
         for _ in range(_DOUBLINGS):
             outer = min(inner + step, edge) if sense > 0.0 else max(inner - step, edge)
             if drop(outer) > 0.0:
-                return float(optimize.brentq(drop, inner, outer, xtol=1e-3 * self.scale[which]))
+                return float(optimize.brentq(drop, inner, outer, xtol=1e-3 * self.scale[parameter]))
             if outer == edge:
                 break
             inner, step = outer, 2.0 * step
         return beyond
 
-    def _at(
+    def _fit(
         self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False
     ) -> tuple[Array, float]:
         """Return the best parameters with some held, and their log likelihood, or their adjusted one."""
-        bounds = [(fixed[n], fixed[n]) if n in fixed else ends for n, ends in enumerate(self.bounds)]
+        bounds = [(fixed[n], fixed[n]) if n in fixed else pair for n, pair in enumerate(self.bounds)]
         low, high = np.array(bounds).T / self.scale
-        begin = np.clip(start / self.scale, low, high)
+        start = np.clip(start / self.scale, low, high)
+        bounds = list(zip(low, high, strict=True))
 
         def loss(scaled: Array) -> tuple[float, Array]:
             value, slope = self._log_likelihood(scaled * self.scale)
             theta = float(scaled[_SCATTER] * self.scale[_SCATTER])
-            more, by_theta = self._adjustment(theta) if adjusted else (0.0, 0.0)
-            slope[_SCATTER] += by_theta
-            return -value - more, -slope * self.scale
+            adjustment, theta_slope = self._adjustment(theta) if adjusted else (0.0, 0.0)
+            slope[_SCATTER] += theta_slope
+            return -value - adjustment, -slope * self.scale
 
-        ends = list(zip(low, high, strict=True))
         optimum = optimize.minimize(
-            loss, begin, jac=True, method="L-BFGS-B", bounds=ends, options={"ftol": precision, "gtol": 1e-9}
+            loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": precision, "gtol": 1e-9}
         )
         return np.asarray(optimum.x, np.float64) * self.scale, -float(optimum.fun)
 
-    def _chances(self, at: Array) -> tuple[Array, Array]:
+    def chances(self, parameters: Array) -> tuple[Array, Array]:
         """Return the chance of each level (n,), kept off 0 and 1, and its derivatives by the first four (n, 4)."""
-        pse, slope, order, lapse, _ = at.tolist()
-        off = self.x - pse + order * self.side
-        eta = slope * off
-        whole = np.asarray(special.ndtr(eta), np.float64)
+        pse, slope, order, lapse, _ = parameters.tolist()
+        offset = self.x - pse + order * self.orders
+        eta = slope * offset
+        attentive = np.asarray(special.ndtr(eta), np.float64)
         rise = (1.0 - lapse) * np.exp(-(eta**2) / 2.0) / math.sqrt(2.0 * math.pi)
-        tiny = 1e-12
-        p = np.clip(lapse / 2.0 + (1.0 - lapse) * whole, tiny, 1.0 - tiny)
-        return p, np.stack([-slope * rise, off * rise, slope * self.side * rise, 0.5 - whole], axis=1)
+        p = np.clip(lapse / 2.0 + (1.0 - lapse) * attentive, 1e-12, 1.0 - 1e-12)
+        return p, np.stack([-slope * rise, offset * rise, slope * self.orders * rise, 0.5 - attentive], axis=1)
 
-    def _log_likelihood(self, at: Array) -> tuple[float, Array]:
+    def _log_likelihood(self, parameters: Array) -> tuple[float, Array]:
         """Return the beta-binomial log likelihood without its coefficient, and its derivatives (5,).
 
         With theta 0 it is the binomial one (Griffiths 1973, Biometrics 29, 637).
         """
-        p, slopes = self._chances(at)
-        theta = float(at[_SCATTER])
-        parts = np.where(self.yes, p[self.level], 1.0 - p[self.level]) + theta * self.before
-        wholes = 1.0 + theta * self.place
-        pull = np.where(self.yes, 1.0, -1.0) / parts
-        by_p = np.bincount(self.level, pull, len(p)) @ slopes
-        by_theta = (self.before / parts).sum() - (self.place / wholes).sum()
-        return float(np.log(parts).sum() - np.log(wholes).sum()), np.append(by_p, by_theta)
+        p, slopes = self.chances(parameters)
+        theta = float(parameters[_SCATTER])
+        numerators = np.where(self.is_chosen, p[self.level], 1.0 - p[self.level]) + theta * self.earlier
+        denominators = 1.0 + theta * self.trial
+        p_slope = np.bincount(self.level, np.where(self.is_chosen, 1.0, -1.0) / numerators, len(p))
+        theta_slope = (self.earlier / numerators).sum() - (self.trial / denominators).sum()
+        value = float(np.log(numerators).sum() - np.log(denominators).sum())
+        return value, np.append(p_slope @ slopes, theta_slope)
 
     def _adjustment(self, theta: float) -> tuple[float, float]:
-        """Return what is added to the log likelihood for the parameters that were fitted, and its derivative by theta.
+        """Return the Cox-Reid adjustment of the log likelihood for the fitted parameters, and its derivative by theta.
 
-        Answers to a level of n tell of the function as n (1 + theta) / (1 + n theta) independent ones.
+        n answers to a level hold as much information as n (1 + theta) / (1 + n theta) independent ones.
         """
-        wide = 1.0 + self.n * theta
-        free = self.n * (1.0 + theta) / wide
-        by_theta = self.n * (1.0 - self.n) / wide**2
-        half = self.parameters / 2.0
-        return -half * math.log(float(free.sum() / self.n.sum())), -half * float(by_theta.sum() / free.sum())
+        inflation = 1.0 + self.n * theta
+        independent = self.n * (1.0 + theta) / inflation
+        slope = self.n * (1.0 - self.n) / inflation**2
+        half, total = self.parameters / 2.0, independent.sum()
+        return -half * math.log(float(total / self.n.sum())), -half * float(slope.sum() / total)
 
 
 def _jnd(slope: IntervalEstimate, steepest: float, reach: float) -> IntervalEstimate:
     """Return the JND that a slope of either sign makes: 0 where it may be a step, without a bound beyond the reach."""
     steeper, flatter = (slope.high, slope.low) if slope.value > 0.0 else (slope.low, slope.high)
     flat = flatter is None or flatter * slope.value <= 0.0 or abs(flatter) * reach < QUARTILE
-    low, value = (0.0 if end is None or abs(end) >= steepest else QUARTILE / abs(end) for end in (steeper, slope.value))
+    slopes = (math.inf if steeper is None else abs(steeper), abs(slope.value))
+    low, value = (0.0 if size >= steepest else QUARTILE / size for size in slopes)
     return IntervalEstimate(value, low, None if flat or flatter is None else QUARTILE / abs(flatter))
 
 
 def _correlation(scatter: IntervalEstimate) -> IntervalEstimate:
     """Return the correlation of answers, theta / (1 + theta)."""
-    low, high = (None if end is None else end / (1.0 + end) for end in (scatter.low, scatter.high))
+    low, high = (None if bound is None else bound / (1.0 + bound) for bound in (scatter.low, scatter.high))
     return IntervalEstimate(scatter.value / (1.0 + scatter.value), low, high)
 
 
@@ -287,20 +281,17 @@ def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int]
     both surfaces have one. Answers of one session to one surface in one order make a level.
     """
     log_mu = {key: float(np.mean(np.log(values))) for key, values in friction.items() if values}
-    presented: Counter[tuple[str, int, int, bool]] = Counter()
-    choices: Counter[tuple[str, int, int, bool]] = Counter()
-    for session, standard, (first, second), choice in answers:
-        after = first == standard  # the comparison was stroked after the standard
-        index = second if after else first
-        if (session, index) in log_mu and (session, standard) in log_mu:
-            presented[session, standard, index, after] += 1
-            choices[session, standard, index, after] += choice == ("second" if after else "first")
-    if answers and not presented:
+    levels = by_key(
+        ((session, standard, index, order), choice == comparison)
+        for session, standard, (first, second), choice in answers
+        for index, comparison, order in [(second, "second", 1) if first == standard else (first, "first", -1)]
+        if (session, index) in log_mu and (session, standard) in log_mu
+    )
+    if answers and not levels:
         return Psychometric(0, reason="no friction was measured of the standard and of what it was compared with")
     return psychometric(
         [
-            Level(log_mu[session, index] - log_mu[session, standard], choices[key], count, 1 if after else -1)
-            for key, count in sorted(presented.items())
-            for session, standard, index, after in [key]
+            Level(log_mu[session, index] - log_mu[session, standard], sum(replies), len(replies), order)
+            for (session, standard, index, order), replies in sorted(levels.items())
         ]
     )

@@ -83,20 +83,20 @@ def rivals_of_means(
     """
     if model not in series:
         return ()
-    return tuple(_of_means(name, model, scores, series) for name in _model_first(model) if name in series)
+    return tuple(_mean_rival(name, model, scores, series) for name in _model_first(model) if name in series)
 
 
 def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
     """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
-    own_trials = [trial for trial in trials if model in trial.values]
+    model_trials = [trial for trial in trials if model in trial.values]
 
     def means(value: Callable[[RivalTrial], float | None]) -> Mapping[int, float]:
-        points = [(t.subject, t.index, v) for t in own_trials if (v := value(t)) is not None]
-        return surface_means(points) or {}
+        numbers = [(trial.subject, trial.index, value(trial)) for trial in model_trials]
+        return surface_means([(subject, index, x) for subject, index, x in numbers if x is not None]) or {}
 
-    names = [name for name in RIVAL_NAMES if any(name in trial.values for trial in own_trials)]
-    series = {name: means(lambda t, name=name: t.values.get(name)) for name in names}
-    return rivals_of_means(means(lambda t: t.score), series, model)
+    names = [name for name in RIVAL_NAMES if any(name in trial.values for trial in model_trials)]
+    series = {name: means(lambda trial, name=name: trial.values.get(name)) for name in names}
+    return rivals_of_means(means(lambda trial: trial.score), series, model)
 
 
 def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
@@ -105,16 +105,16 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple
     Differences and partial correlations have the jackknife's intervals over subjects: those of other people on these
     very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
     """
-    own_trials = [trial for trial in trials if model in trial.values]
-    names = [name for name in _model_first(model) if any(name in trial.values for trial in own_trials)]
-    if not own_trials:
+    model_trials = [trial for trial in trials if model in trial.values]
+    names = [name for name in _model_first(model) if any(name in trial.values for trial in model_trials)]
+    if not model_trials:
         return ()
-    deviances = {name: _deviance(name, own_trials) for name in names}
-    whole = {name: value for name, value in deviances.items() if not isinstance(value, str)}
-    weights = dict(zip(whole, akaike_weights(list(whole.values())), strict=True)) if whole else {}
+    deviances = {name: _deviance(name, model_trials) for name in names}
+    comparable = {name: value for name, value in deviances.items() if not isinstance(value, str)}
+    weights = dict(zip(comparable, akaike_weights(list(comparable.values())), strict=True)) if comparable else {}
     return tuple(
         _because(
-            replace(_within(name, model, own_trials), weight=weights.get(name)),
+            replace(_within(name, model, model_trials), weight=weights.get(name)),
             weight=deviance if isinstance(deviance, str) else None,
         )
         for name, deviance in deviances.items()
@@ -125,16 +125,16 @@ def _model_first(model: str) -> tuple[str, ...]:
     return (model, *(name for name in RIVAL_NAMES if name != model))
 
 
-def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:
+def _mean_rival(name: str, model: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:
     quantities = [name, model, *([MODEL_MU] if MODEL_MU in series else [])]
-    own = [index for index in scores if index in series[name]]
-    x, y = [series[name][i] for i in own], [scores[i] for i in own]
-    fit, error = relation(x, y, own), leave_one_out_error(x, y)
-    rival = Rival(name, len(own), fit.pearson, fit.low, fit.high, left_out_error=error)
+    shared = [index for index in scores if index in series[name]]
+    x, y = [series[name][i] for i in shared], [scores[i] for i in shared]
+    fit, error = relation(x, y, shared), leave_one_out_error(x, y)
+    rival = Rival(name, len(shared), fit.pearson, fit.low, fit.high, left_out_error=error)
     rival = _because(rival, r=fit.reason, left_out_error=_NO_LINE if error is None else None)
-    indices = [i for i in scores if all(i in series[one] for one in quantities)]
+    indices = [i for i in scores if all(i in series[quantity] for quantity in quantities)]
     score = [scores[i] for i in indices]
-    values = {one: [series[one][i] for i in indices] for one in quantities}
+    values = {quantity: [series[quantity][i] for i in indices] for quantity in quantities}
     if name != model:
         rival = _compare(rival, values[model], values[name], score)
     if MODEL_MU not in quantities or name == MODEL_MU:
@@ -165,24 +165,25 @@ def _compare(rival: Rival, model: Sequence[float], values: Sequence[float], scor
 
 def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     quantities = [*dict.fromkeys((name, model, MODEL_MU))]
-    mine = [trial for trial in trials if name in trial.values]
-    x, y = [trial.values[name] for trial in mine], [trial.score for trial in mine]
-    within, error = repeated_correlation([trial.subject for trial in mine], x, y), _leave_surface_out_error(mine, name)
+    rival_trials = [trial for trial in trials if name in trial.values]
+    x, y = [trial.values[name] for trial in rival_trials], [trial.score for trial in rival_trials]
+    within = repeated_correlation([trial.subject for trial in rival_trials], x, y)
+    error = _leave_surface_out_error(rival_trials, name)
     low, high = (within.people if within is not None else None) or (None, None)
-    rival = Rival(name, len(mine), None if within is None else within.r, low, high, left_out_error=error)
+    rival = Rival(name, len(rival_trials), None if within is None else within.r, low, high, left_out_error=error)
     no_r = "too few trials within subjects, or no variation" if within is None else None
     rival = _because(rival, r=no_r, left_out_error=_NO_LINE if error is None else None)
-    complete = [trial for trial in mine if all(one in trial.values for one in quantities)]
+    complete = [trial for trial in rival_trials if all(quantity in trial.values for quantity in quantities)]
     covariances = _covariances(complete, quantities)
     if covariances is None:
-        few = f"it takes {LEAST_CASES} subjects with two trials or more that have all of them"
-        return _because(rival, partial=few, contrast=None if name == model else few)
+        reason = f"it takes {LEAST_CASES} subjects with two trials or more that have all of them"
+        return _because(rival, partial=reason, contrast=None if name == model else reason)
     if name != model:
-        own, models = (_correlations(covariances, 0, column) for column in (1, 2))
-        steps = np.sign(models[0]) * models - np.sign(own[0]) * own
-        if math.isfinite(steps[0]):
-            low, high, p = _finite_or_none(*jackknife(steps[0], steps[1:]))
-            rival = replace(rival, contrast=Contrast(len(complete), float(steps[0]), low, high, None, p))
+        rival_r, model_r = (_correlations(covariances, 0, column) for column in (1, 2))
+        differences = np.sign(model_r[0]) * model_r - np.sign(rival_r[0]) * rival_r
+        if math.isfinite(differences[0]):
+            low, high, p = _finite_or_none(*jackknife(differences[0], differences[1:]))
+            rival = replace(rival, contrast=Contrast(len(complete), float(differences[0]), low, high, None, p))
         else:
             rival = _because(rival, contrast="one of them does not vary within subjects")
     if name == MODEL_MU:
@@ -203,14 +204,15 @@ def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | 
     One with a single trial tells nothing of what goes on within subjects. None of too few others.
     """
     rows = by_key((trial.subject, [trial.score, *(trial.values[name] for name in names)]) for trial in trials)
-    columns = [np.array(own) for own in rows.values() if len(own) > 1]
+    columns = [np.array(table) for table in rows.values() if len(table) > 1]
     if len(columns) < LEAST_CASES:
         return None
     scale = np.abs(np.concatenate(columns)).max(axis=0, initial=1e-300)
-    deviations = [own / scale - (own / scale).mean(axis=0) for own in columns]
-    products = np.array([own.T @ own for own in (own * (np.abs(own) > 1e-12) for own in deviations)])  # no round-off
-    whole = products.sum(axis=0, keepdims=True)
-    return np.concatenate([whole, whole - products])
+    deviations = [table / scale - (table / scale).mean(axis=0) for table in columns]
+    without_noise = [table * (np.abs(table) > 1e-12) for table in deviations]  # of round-off
+    products = np.array([table.T @ table for table in without_noise])
+    total = products.sum(axis=0, keepdims=True)
+    return np.concatenate([total, total - products])
 
 
 def _correlations(covariances: Array, first: int, second: int) -> Array:
@@ -221,25 +223,26 @@ def _correlations(covariances: Array, first: int, second: int) -> Array:
 
 def _finite_or_none(*numbers: Array) -> list[float | None]:
     """Return numbers, None for each that is not known."""
-    return [float(one) if math.isfinite(one) else None for one in numbers]
+    return [float(number) if math.isfinite(number) else None for number in numbers]
 
 
 def _leave_surface_out_error(trials: Sequence[RivalTrial], name: str) -> float | None:
     """Return the error of each surface's scores by levels of subjects and one slope, fitted to the other surfaces."""
-    subjects, whose = np.unique([trial.subject for trial in trials], return_inverse=True)
+    subjects, members = np.unique([trial.subject for trial in trials], return_inverse=True)
     surfaces = np.array([trial.index for trial in trials])
     x, y = np.array([trial.values[name] for trial in trials]), np.array([trial.score for trial in trials])
     errors: list[float] = []
     for surface in np.unique(surfaces):
         training = surfaces != surface
-        count = np.bincount(whose[training], minlength=len(subjects))
-        levels = (np.bincount(whose[training], v[training], len(subjects)) / np.maximum(count, 1) for v in (x, y))
-        off_x, off_y = (v - level[whose] for v, level in zip((x, y), levels, strict=True))
+        count = np.bincount(members[training], minlength=len(subjects))
+        sums = (np.bincount(members[training], variable[training], len(subjects)) for variable in (x, y))
+        level_x, level_y = (total / np.maximum(count, 1) for total in sums)
+        off_x, off_y = x - level_x[members], y - level_y[members]
         size = float(off_x[training] @ off_x[training])
         if size <= 1e-24 * float(np.max(x[training] ** 2, initial=1e-300)):
             return None
         slope = float(off_x[training] @ off_y[training]) / size
-        errors += (off_y - slope * off_x)[~training & (count[whose] > 0)].tolist()
+        errors += (off_y - slope * off_x)[~training & (count[members] > 0)].tolist()
     return math.sqrt(float(np.mean(np.square(errors)))) if errors else None
 
 
@@ -258,4 +261,4 @@ def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
 
 def _because(rival: Rival, **reasons: str | None) -> Rival:
     """Return the rival with why it lacks a number, under the name of the field."""
-    return replace(rival, reasons=rival.reasons | {what: why for what, why in reasons.items() if why is not None})
+    return replace(rival, reasons=rival.reasons | {name: text for name, text in reasons.items() if text is not None})

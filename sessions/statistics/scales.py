@@ -77,29 +77,29 @@ class Consistence:
 
 def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") -> PairedScale:
     """Return the scale of choices, with the jackknife's intervals over subjects."""
-    indices = sorted({index for one in choices for index in (one.first, one.second)})
-    subjects = sorted({one.subject for one in choices})
+    indices = sorted({index for choice in choices for index in (choice.first, choice.second)})
+    subjects = sorted({choice.subject for choice in choices})
     none = PairedScale(model, len(choices), len(subjects))
     if len(indices) < 2:
         return replace(none, reason="there are no two surfaces to compare")
     counts = _counts(choices, indices, subjects)
-    whole = counts.sum(axis=0)
-    if why := _why_none(whole, indices):
-        return replace(none, reason=why)
-    fitted = _fit(whole, model)
+    total = counts.sum(axis=0)
+    if reason := _no_scale(total, indices):
+        return replace(none, reason=reason)
+    fitted = _fit(total, model)
     if fitted is None:
         return replace(none, reason="the likelihood has no finite maximum")
-    without, why = _without_each(counts, model, fitted)
-    ends = [IntervalEstimate(value, None, None) for value in fitted.tolist()] if why else _estimates(fitted, without)
-    deviance, freedom = _deviance(whole, fitted, model)
+    without, reason = _without_each(counts, model, fitted)
+    estimates = _estimates(fitted, without)
+    deviance, freedom = _deviance(total, fitted, model)
     return replace(
         none,
-        values=dict(zip(indices, ends, strict=False)),
-        first=ends[-1],
+        values=dict(zip(indices, estimates, strict=False)),
+        first=estimates[-1],
         deviance=deviance,
         freedom=freedom,
         p=float(special.chdtrc(freedom, deviance)) if freedom > 0 else None,
-        interval_reason=why,
+        interval_reason=reason,
     )
 
 
@@ -108,31 +108,32 @@ def consistence(choices: Sequence[Choice]) -> Mapping[str, Consistence]:
 
     A pair chosen equally often both ways leaves its subject out, for it has no direction.
     """
-    out: dict[str, Consistence] = {}
-    for subject, own in sorted(by_key((one.subject, one) for one in choices).items()):
-        won = Counter((one.first, one.second) if one.first_chosen else (one.second, one.first) for one in own)
+    results: dict[str, Consistence] = {}
+    pairs = ((choice.subject, (choice.first, choice.second)[:: 1 if choice.first_chosen else -1]) for choice in choices)
+    for subject, answers in sorted(by_key(pairs).items()):
+        won = Counter(answers)  # by the surface that was chosen and the other
         indices = sorted({index for pair in won for index in pair})
-        leads = {(a, b): won[a, b] - won[b, a] for a, b in combinations(indices, 2)}
+        leads = {pair: won[pair] - won[pair[::-1]] for pair in combinations(indices, 2)}
         if len(indices) < 3 or not all(leads.values()):
             continue
-        wins = Counter(a if lead > 0 else b for (a, b), lead in leads.items())
+        wins = Counter(pair[0] if lead > 0 else pair[1] for pair, lead in leads.items())
         n = len(indices)
-        circles = math.comb(n, 3) - sum(math.comb(wins[index], 2) for index in indices)
+        triads = math.comb(n, 3) - sum(math.comb(wins[index], 2) for index in indices)
         most = (n**3 - n) // 24 if n % 2 else (n**3 - 4 * n) // 24
-        out[subject] = Consistence(circles, most, 1.0 - circles / most)
-    return out
+        results[subject] = Consistence(triads, most, 1.0 - triads / most)
+    return results
 
 
 def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequence[str]) -> Array:
     """Return how often each subject met each ordered pair, and chose its first (s, 2, n, n)."""
-    out = np.zeros((len(subjects), 2, len(indices), len(indices)))
-    for one in choices:
-        own = out[subjects.index(one.subject), :, indices.index(one.first), indices.index(one.second)]
-        own += (1.0, one.first_chosen)
-    return out
+    counts = np.zeros((len(subjects), 2, len(indices), len(indices)))
+    for choice in choices:
+        cell = counts[subjects.index(choice.subject), :, indices.index(choice.first), indices.index(choice.second)]
+        cell += (1.0, choice.first_chosen)
+    return counts
 
 
-def _why_none(counts: Array, indices: Sequence[int]) -> str:
+def _no_scale(counts: Array, indices: Sequence[int]) -> str:
     """Return why there are no values, "" where they are finite (Ford 1957, Am. Math. Mon. 64(8), 28)."""
     meetings, wins = counts
     beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen and b was not
@@ -149,9 +150,9 @@ def _why_none(counts: Array, indices: Sequence[int]) -> str:
 def _design(count: int) -> Array:
     """Return what makes differences (n, n, n) of n - 1 values, the last 0, and the first's advantage."""
     unit = np.concatenate([np.eye(count)[:, : count - 1], np.zeros((count, 1))], axis=1)
-    out = unit[:, None, :] - unit[None, :, :]
-    out[:, :, -1] = 1.0
-    return out
+    differences = unit[:, None, :] - unit[None, :, :]
+    differences[:, :, -1] = 1.0
+    return differences
 
 
 def _chances(eta: Array, model: Model) -> tuple[Array, Array]:
@@ -162,22 +163,22 @@ def _chances(eta: Array, model: Model) -> tuple[Array, Array]:
     return np.asarray(special.ndtr(eta), np.float64), np.exp(-(eta**2) / 2.0) / math.sqrt(2.0 * math.pi)
 
 
-def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | None:
+def _fit(counts: Array, model: Model, start: Array | None = None) -> Array | None:
     """Return the values about their mean and then the first's advantage (n + 1,); None without a finite maximum."""
     meetings, wins = counts
     design = _design(len(meetings))
     pairs = meetings > 0
     x, n, y = design[pairs], meetings[pairs], wins[pairs]
     beta = np.zeros(x.shape[1])
-    if begin is not None:
-        beta = np.append(begin[:-2] - begin[-2], begin[-1])
+    if start is not None:
+        beta = np.append(start[:-2] - start[-2], start[-1])
     for _ in range(_STEPS):
         chance, slope = _chances(x @ beta, model)
         spread = np.maximum(chance * (1.0 - chance), np.finfo(float).tiny)
         weight = n * slope**2 / spread
-        information, pull = x.T @ (weight[:, None] * x), x.T @ ((y - n * chance) * slope / spread)
+        information, gradient = x.T @ (weight[:, None] * x), x.T @ ((y - n * chance) * slope / spread)
         try:
-            step = np.asarray(np.linalg.solve(information, pull), np.float64)
+            step = np.asarray(np.linalg.solve(information, gradient), np.float64)
         except np.linalg.LinAlgError:
             return None
         beta = beta + step
@@ -189,23 +190,23 @@ def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | Non
     return None
 
 
-def _without_each(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
+def _without_each(counts: Array, model: Model, start: Array) -> tuple[Array, str]:
     """Return the fits without each subject (s, n + 1), and why they make no interval, "" where they do."""
     if len(counts) < LEAST_CASES:
         return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_CASES} of them"
-    indices, rest = range(counts.shape[2]), counts.sum(axis=0) - counts
-    fits = [None if _why_none(own, indices) else _fit(own, model, begin) for own in rest]
+    indices, totals = range(counts.shape[2]), counts.sum(axis=0) - counts
+    fits = [None if _no_scale(total, indices) else _fit(total, model, start) for total in totals]
     scales = [fit for fit in fits if fit is not None]
     if len(scales) < len(fits):
         return np.zeros((0, 0)), "without one of the subjects the others have no finite scale"
     return np.array(scales), ""
 
 
-def _estimates(whole: Array, without: Array) -> list[IntervalEstimate]:
-    """Return numbers (m,) with the jackknife's intervals, from the same without each subject (k, m)."""
-    low, high, _ = jackknife(whole, without)
-    ends = [(a, b) if math.isfinite(a) else (None, None) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
-    return [IntervalEstimate(value, *two) for value, two in zip(whole.tolist(), ends, strict=True)]
+def _estimates(estimates: Array, replicates: Array) -> list[IntervalEstimate]:
+    """Return `estimates` (m,) with the jackknife's intervals, from those without each of k >= 0 subjects (k, m)."""
+    low, high, _ = jackknife(estimates, replicates) if len(replicates) else np.full((3, len(estimates)), np.nan)
+    columns = zip(estimates.tolist(), low.tolist(), high.tolist(), strict=True)
+    return [IntervalEstimate(value, *(pair if math.isfinite(pair[0]) else (None, None))) for value, *pair in columns]
 
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
@@ -242,35 +243,35 @@ def stevens_exponent(
     The interval of Deming's slope is the jackknife's over subjects. Others must have left out what is not above 0.
     """
     y, x = np.log(np.asarray(answers, np.float64)), np.log(np.asarray(magnitudes, np.float64))
-    people = sorted(set(subjects))
-    if len(people) < LEAST_CASES or len(set(surfaces)) < LEAST_CASES:
-        why = f"it takes {LEAST_CASES} subjects and {LEAST_CASES} surfaces"
-        return Exponent(len(people), len(y), None, reason=why)
+    result = Exponent(len(set(subjects)), len(y), None)
+    if result.subjects < LEAST_CASES or len(set(surfaces)) < LEAST_CASES:
+        return replace(result, reason=f"it takes {LEAST_CASES} subjects and {LEAST_CASES} surfaces")
     model = mixed_model(subjects, y.tolist(), {NAME: x.tolist()})
-    plain = None if isinstance(model, str) else model.term(NAME)
     reason = model if isinstance(model, str) else ""
+    result = replace(result, plain=None if isinstance(model, str) else model.term(NAME), reason=reason)
     cells = _cells(subjects, surfaces, y, x)
     if cells is None:
-        return Exponent(len(people), len(y), plain, reason=reason or "some subject missed a surface")
-    here = _deming(cells)
-    if here is None:
-        return Exponent(len(people), len(y), plain, reason=reason or "magnitudes or answers do not vary over surfaces")
+        return replace(result, reason=reason or "some subject missed a surface")
+    estimate = _deming(cells)
+    if estimate is None:
+        return replace(result, reason=reason or "magnitudes or answers do not vary over surfaces")
+    slope, ratio = estimate
     without = [_deming(np.delete(cells, n, axis=0)) for n in range(len(cells))]
-    slopes = [one[0] for one in without if one is not None]
+    slopes = [replicate[0] for replicate in without if replicate is not None]
     if len(slopes) < len(cells):
-        return Exponent(len(people), len(y), plain, reason=reason or "without one of the subjects nothing varies")
-    low, high, _ = map(float, jackknife(here[0], np.array(slopes)))
-    slope = (here[0], low, high) if math.isfinite(low) else (here[0], None, None)
-    return Exponent(len(people), len(y), plain, slope, here[1] if math.isfinite(here[1]) else None, reason)
+        return replace(result, reason=reason or "without one of the subjects nothing varies")
+    (deming,) = _estimates(np.array([slope]), np.array(slopes)[:, None])
+    error_ratio = ratio if math.isfinite(ratio) else None
+    return replace(result, deming=(slope, deming.low, deming.high), error_ratio=error_ratio)
 
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:
     """Return log answers and magnitudes (s, k, 2), each subject's mean taken away; None where a cell is empty."""
-    by_cell = by_key(zip(zip(subjects, surfaces, strict=True), zip(y.tolist(), x.tolist(), strict=True), strict=True))
+    answers = by_key(zip(zip(subjects, surfaces, strict=True), zip(y.tolist(), x.tolist(), strict=True), strict=True))
     people, indices = sorted(set(subjects)), sorted(set(surfaces))
-    if len(by_cell) < len(people) * len(indices):
+    if len(answers) < len(people) * len(indices):
         return None
-    cells = np.array([[np.mean(by_cell[subject, index], axis=0) for index in indices] for subject in people])
+    cells = np.array([[np.mean(answers[subject, index], axis=0) for index in indices] for subject in people])
     return cells - cells.mean(axis=1, keepdims=True)
 
 
@@ -280,59 +281,59 @@ def _deming(cells: Array) -> tuple[float, float] | None:
     The errors are what subjects differ by on one surface, levels taken away.
     """
     means = cells.mean(axis=0)
-    rest = cells - means
-    error_y, error_x = np.sum(rest**2, axis=(0, 1)).tolist()
+    errors = cells - means
+    error_y, error_x = np.sum(errors**2, axis=(0, 1)).tolist()
     (yy, xy), (_, xx) = (means.T @ means).tolist()
     if not (error_x > 0.0 and xy != 0.0):
         return (xy / xx, math.inf) if xx > 0.0 and error_x == 0.0 else None
     ratio = error_y / error_x
-    off = yy - ratio * xx
-    root = math.hypot(off, 2.0 * math.sqrt(ratio) * xy)
-    return (off + root) / (2.0 * xy) if off > 0.0 else 2.0 * ratio * xy / (root - off), ratio
+    excess = yy - ratio * xx
+    root = math.hypot(excess, 2.0 * math.sqrt(ratio) * xy)
+    return (excess + root) / (2.0 * xy) if excess > 0.0 else 2.0 * ratio * xy / (root - excess), ratio
 
 
 Judgement = Literal["scores", "estimates", "choices", "comparisons"]
 JUDGEMENTS: tuple[Judgement, ...] = ("scores", "estimates", "choices", "comparisons")
 
 
-def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, IntervalEstimate]:
+def latent_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
 
     Intervals are the jackknife's over subjects. Subjects who missed a surface that another judged do not count. Nothing
     of fewer than three others, of fewer than two surfaces, and where nothing is left to tell a unit from.
     """
-    own = by_key((subject, (index, value)) for subject, index, value in points)
+    by_subject = by_key((subject, (index, value)) for subject, index, value in points)
     indices = sorted({index for _, index, _ in points})
-    whole = [[row[i] for i in indices] for row in map(by_key, own.values()) if len(row) == len(indices)]
-    if len(whole) < LEAST_CASES or len(indices) < 2:
+    complete = [[row[i] for i in indices] for row in map(by_key, by_subject.values()) if len(row) == len(indices)]
+    if len(complete) < LEAST_CASES or len(indices) < 2:
         return {}
-    cells = np.array([[np.mean(cell) for cell in row] for row in whole])
+    cells = np.array([[np.mean(cell) for cell in row] for row in complete])
     table = _AnswerTable(
         cells - cells.mean(axis=1, keepdims=True),
-        np.array([[float(len(cell)) for cell in row] for row in whole]),
-        np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in whole]),
+        np.array([[float(len(cell)) for cell in row] for row in complete]),
+        np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in complete]),
     )
-    people = np.arange(len(whole))
-    here = table.values(people[None])[0]
+    people = np.arange(len(complete))
+    values = table.values(people[None])[0]
     without = table.values(np.array([np.delete(people, n) for n in people]))
-    if not np.isfinite([here, *without]).all():
+    if not np.isfinite([values, *without]).all():
         return {}
-    return dict(zip(indices, _estimates(here, without), strict=True))
+    return dict(zip(indices, _estimates(values, without), strict=True))
 
 
-def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:
+def latent_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from its µ and the logarithm of the JND and of its ends.
 
     The JND is a difference of log µ. The interval is the JND's: µ is taken as exact.
     """
     logs = {index: math.log(value) for index, value in mu.items()}
     middle = sum(logs.values()) / max(len(logs), 1)
-    value, *ends = (QUARTILE / math.exp(one) for one in log_jnd)
-    out: dict[int, IntervalEstimate] = {}
+    value, *bounds = (QUARTILE / math.exp(log_value) for log_value in log_jnd)
+    estimates: dict[int, IntervalEstimate] = {}
     for index, log_mu in logs.items():
-        low, high = sorted((log_mu - middle) * end for end in ends)
-        out[index] = IntervalEstimate((log_mu - middle) * value, low, high)
-    return out
+        low, high = sorted((log_mu - middle) * bound for bound in bounds)
+        estimates[index] = IntervalEstimate((log_mu - middle) * value, low, high)
+    return estimates
 
 
 class _AnswerTable(NamedTuple):
@@ -342,11 +343,11 @@ class _AnswerTable(NamedTuple):
     counts: Array  # (s, k) repeats
     within: Array  # (s,) sum of squares of repeats about their means
 
-    def values(self, who: Indices) -> Array:
-        """Return means over the subjects `who` (b, s) by √2 s: (b, k); nan where nothing scatters about them."""
-        cells, counts = self.cells[who], self.counts[who]
+    def values(self, samples: Indices) -> Array:
+        """Return means over the subjects `samples` (b, s) by √2 s: (b, k); nan where nothing scatters about them."""
+        cells, counts = self.cells[samples], self.counts[samples]
         means = cells.mean(axis=1)
-        squares = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[who].sum(axis=1)
+        squares = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[samples].sum(axis=1)
         freedom = counts.sum(axis=(1, 2)) - cells.shape[1] - cells.shape[2] + 1
         unit = np.sqrt(2.0 * squares / freedom)[:, None]
         varies = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from scipy.special import chdtri
 
+from drivers.arrays import Array, Indices
 from sessions.recording.log import TrialRecord
 from sessions.statistics.correlations import TAILS, pearson, t_quantile
 
@@ -115,19 +116,19 @@ def _other_answers(recording: "Recording") -> str:
     choices = sum(record.choice is not None for record in recording.trials)
     if not numbers and not choices:
         return ""
-    several = "" if numbers + choices == 1 else "s"
-    what = f"{numbers} number{several} on a scale of the subject's own"
+    plural = "" if numbers + choices == 1 else "s"
+    answers = f"{numbers} number{plural} on a scale of the subject's own"
     if not numbers:
-        what = f"{choices} choice{several} of one of two"
+        answers = f"{choices} choice{plural} of one of two"
     return (
-        f"The answers of {recording.plan.subject} in {recording.folder.name} are {what}: they are kept, and no mean or "
-        "correlation of scores between 0 and 100 is taken of them."
+        f"The answers of {recording.plan.subject} in {recording.folder.name} are {answers}: they are kept, and no mean "
+        "or correlation of scores between 0 and 100 is taken of them."
     )
 
 
 def distinct_sessions(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
     """Return each session once, in the order first met."""
-    return tuple(same[0] for same in by_key((table.session, table) for table in tables).values())
+    return tuple(copies[0] for copies in by_key((table.session, table) for table in tables).values())
 
 
 def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
@@ -136,7 +137,7 @@ def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
     Trials are not subjects; pooling them would make intervals too narrow.
     """
     answers = by_key(
-        ((table.subject, one.descriptor, one.index), one.score) for table in tables for one in table.scores
+        ((table.subject, score.descriptor, score.index), score.score) for table in tables for score in table.scores
     )
     return tuple(Score(*key, score=float(np.mean(values))) for key, values in answers.items())
 
@@ -146,7 +147,7 @@ def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
 
     Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects, as far as they lie on the scale.
     """
-    by_descriptor = by_key((one.descriptor, (one.index, one.score)) for one in subject_scores(tables))
+    by_descriptor = by_key((score.descriptor, (score.index, score.score)) for score in subject_scores(tables))
     return tuple(
         _mean(descriptor, index, values)
         for descriptor, scores in by_descriptor.items()
@@ -156,17 +157,16 @@ def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
 
 def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, float], ...]:
     """Return (subject, descriptor, r) of all whose scores fall as the index rises; nothing is turned round for them."""
-    points = by_key(((one.subject, one.descriptor), (one.index, one.score)) for one in subject_scores(tables))
-    rs = ((key, pearson(*zip(*pairs, strict=True))) for key, pairs in points.items())
-    return tuple((*key, r) for key, r in rs if r is not None and r < 0)
+    points = by_key(((score.subject, score.descriptor), (score.index, score.score)) for score in subject_scores(tables))
+    correlations = ((key, pearson(*zip(*pairs, strict=True))) for key, pairs in points.items())
+    return tuple((*key, r) for key, r in correlations if r is not None and r < 0)
 
 
 def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, Mapping[int, float]]:
     """Return subject -> index -> score of one descriptor, subjects sorted."""
-    scores = [one for one in subject_scores(tables) if one.descriptor == descriptor]
-    return {
-        subject: dict(row) for subject, row in sorted(by_key((s.subject, (s.index, s.score)) for s in scores).items())
-    }
+    scores = [score for score in subject_scores(tables) if score.descriptor == descriptor]
+    rows = by_key((score.subject, (score.index, score.score)) for score in scores)
+    return {subject: dict(row) for subject, row in sorted(rows.items())}
 
 
 def average(values: Sequence[float]) -> Average | None:
@@ -196,9 +196,9 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
 
 
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
-    of = _average(values)
-    low, high = (None if end is None else min(max(end, SCORE_SCALE[0]), SCORE_SCALE[1]) for end in (of.low, of.high))
-    return MeanScore(descriptor, index, of.n, of.mean, of.sd, low, high, no_interval(of))
+    mean = _average(values)
+    low, high = (None if bound is None else float(np.clip(bound, *SCORE_SCALE)) for bound in (mean.low, mean.high))
+    return MeanScore(descriptor, index, mean.n, mean.mean, mean.sd, low, high, no_interval(mean))
 
 
 def no_interval(mean: Average) -> str | None:
@@ -206,6 +206,12 @@ def no_interval(mean: Average) -> str | None:
     if mean.low is not None:
         return None
     return "one subject alone has no interval" if mean.n == 1 else "no interval: subjects who are all alike tell none"
+
+
+def indicator_columns(groups: Sequence[str] | Sequence[int] | Array | Indices) -> Array:
+    """Return a column for each group, in order, that marks its members (n, k)."""
+    codes = np.unique(np.asarray(groups), return_inverse=True)[1]
+    return np.eye(int(codes.max()) + 1)[codes]
 
 
 def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] | None:
@@ -221,16 +227,14 @@ def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] 
     >>> {index: round(mean, 9) for index, mean in means.items()}
     {0: 6.0, 50: 7.0}
     """
-    own = by_key(((subject, index), value) for subject, index, value in points)
-    if not own:
+    repeats = by_key(((subject, index), value) for subject, index, value in points)
+    if not repeats:
         return None
-    subjects, indices = sorted({subject for subject, _ in own}), sorted({index for _, index in own})
-    values = np.array([float(np.mean(all_of)) for all_of in own.values()])
-    if len(own) == len(subjects) * len(indices):
-        return {index: float(values[[one == index for _, one in own]].mean()) for index in indices}
-    whose = np.array([[float(subject == one) for one in subjects] for subject, _ in own])
-    which = np.array([[float(index == one) for one in indices] for _, index in own])
-    design = np.hstack([whose, which])
+    subjects, indices = sorted({subject for subject, _ in repeats}), sorted({index for _, index in repeats})
+    values = np.array([float(np.mean(numbers)) for numbers in repeats.values()])
+    if len(repeats) == len(subjects) * len(indices):
+        return {index: float(values[[surface == index for _, surface in repeats]].mean()) for index in indices}
+    design = np.hstack([indicator_columns(labels) for labels in zip(*repeats, strict=True)])
     if np.linalg.matrix_rank(design) < len(subjects) + len(indices) - 1:
         return None
     coefficients = np.linalg.lstsq(design, values, rcond=None)[0]
@@ -262,5 +266,6 @@ def _sentence(answers: dict[int, float]) -> str:
     answer_list = ", ".join(f"{index}: {answer:g}" for index, answer in sorted(answers.items()))
     if len(answers) < 2:
         return f"too few answers to see a grading ({answer_list})"
-    wrong = [f"{b} was judged no higher than {a}" for a, b in pairwise(sorted(answers)) if answers[b] <= answers[a]]
+    pairs = pairwise(sorted(answers))
+    wrong = [f"{high} was judged no higher than {low}" for low, high in pairs if answers[high] <= answers[low]]
     return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({answer_list})"

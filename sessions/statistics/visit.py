@@ -58,7 +58,8 @@ def exclusions_in(folder: Path) -> tuple[Exclusion, ...]:
 
 def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: str) -> Exclusion | None:
     """Return the decision that excludes a subject's trials on a descriptor, None where there is none."""
-    return next((e for e in exclusions if e.subject == subject and e.descriptor in ("", descriptor)), None)
+    of_subject = (exclusion for exclusion in exclusions if exclusion.subject == subject)
+    return next((exclusion for exclusion in of_subject if exclusion.descriptor in ("", descriptor)), None)
 
 
 Number = float | None
@@ -244,10 +245,11 @@ def _row(
         choice=record.choice,
         standard=None if block.standard is None else block.standard.known_index,
     )
-    flaw_names = (str(one.name) for one in analysis.flaws if one.trial == trial.number and one.grade != "note")
+    flaw_names = (str(flaw.name) for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note")
     flaws = tuple(dict.fromkeys(flaw_names))
-    friction = next((one for one in analysis.friction if one.trial == trial.number), None)
-    answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
+    friction = next((stroke for stroke in analysis.friction if stroke.trial == trial.number), None)
+    predictions = () if prediction is None else prediction.trials
+    answer = next((answer for answer in predictions if answer.trial == trial.number), None)
     if friction is None:
         why = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
         why = "The trial was not done." if record.outcome == "open" else why

@@ -51,11 +51,11 @@ class Agreement:
     page_p: float  # of no rise with the index (Page's L, one-sided)
 
 
-def complete(table: Table) -> tuple[tuple[str, ...], tuple[int, ...], Array]:
-    """Return subjects who scored every stimulus, indices in order, and their scores (subjects, indices)."""
-    indices = tuple(sorted({index for row in table.values() for index in row}))
-    whole = tuple(subject for subject, row in table.items() if len(row) == len(indices))
-    return whole, indices, np.array([[table[s][i] for i in indices] for s in whole]).reshape(len(whole), len(indices))
+def _complete(table: Table) -> tuple[list[int], Array]:
+    """Return the indices in order, and the scores (subjects, indices) of subjects who scored every stimulus."""
+    indices = sorted({index for row in table.values() for index in row})
+    rows = [[row[index] for index in indices] for row in table.values() if len(row) == len(indices)]
+    return indices, np.array(rows).reshape(len(rows), len(indices))
 
 
 def within_means(table: Table) -> tuple[WithinMean, ...]:
@@ -65,16 +65,18 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
     These intervals are for comparing stimuli; they say nothing of the mean's own uncertainty. Only subjects who scored
     every stimulus count. Empty for fewer than two of them or of stimuli.
     """
-    subjects, indices, scores = complete(table)
-    n, c = scores.shape
-    if n < 2 or c < 2:
+    indices, scores = _complete(table)
+    n, stimuli = scores.shape
+    if n < 2 or stimuli < 2:
         return ()
     means = scores.mean(axis=0).tolist()
     adjusted = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
-    deviation = adjusted.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
+    deviation = adjusted.std(axis=0, ddof=1) * math.sqrt(stimuli / (stimuli - 1))
     half = t_quantile(n - 1) * deviation / math.sqrt(n)
-    ends = [(m - h, m + h) if h > 1e-9 * abs(m) else (None, None) for m, h in zip(means, half.tolist(), strict=True)]
-    return tuple(WithinMean(i, len(subjects), m, *two) for i, m, two in zip(indices, means, ends, strict=True))
+    return tuple(
+        WithinMean(index, n, mean, *((mean - margin, mean + margin) if margin > 1e-9 * abs(mean) else (None, None)))
+        for index, mean, margin in zip(indices, means, half.tolist(), strict=True)
+    )
 
 
 def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequence[float]) -> RepeatedCorrelation | None:
@@ -97,16 +99,17 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
         return None
     r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
     several = np.bincount(codes) > 1
-    k = int(several.sum())
+    count = int(several.sum())
     if 1.0 - abs(r) < 1e-12:
-        return RepeatedCorrelation(r, r, r, 0.0, dof, k, None, None)
+        return RepeatedCorrelation(r, r, r, 0.0, dof, count, None, None)
     t = r * math.sqrt(dof / (1.0 - r * r))
     p = 2.0 * float(special.stdtr(dof, -abs(t)))
-    xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
+    products = np.array([left_x * left_y, left_x**2, left_y**2])
+    xy, xx, yy = (np.bincount(codes, product).astype(np.float64)[several] for product in products)
     people, people_p = _jackknife(xy, xx, yy) or (None, None)
     half = t_quantile(math.inf) / math.sqrt(dof - 1)
     low, high = (math.tanh(math.atanh(r) + step) for step in (-half, half))
-    return RepeatedCorrelation(r, low, high, p, dof, k, people, people_p)
+    return RepeatedCorrelation(r, low, high, p, dof, count, people, people_p)
 
 
 def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], float] | None:
@@ -114,9 +117,9 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
 
     None of two subjects, of subjects who are all alike, or where r is ±1 without one of them.
     """
-    k = len(xy)
+    count = len(xy)
     others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
-    if k < LEAST_CASES or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
+    if count < LEAST_CASES or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     low, high, p = map(float, jackknife(z, np.arctanh(others_xy / size)))
@@ -125,17 +128,16 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
 
 def agreement(table: Table) -> Agreement | None:
     """Return how far subjects agree on the order; None for fewer than two subjects or three stimuli, or all ties."""
-    subjects, _, scores = complete(table)
-    scores = scores.round(9)  # means of repeats that tie differ by round-off
-    n, c = scores.shape
-    if n < 2 or c < 3 or np.all(np.ptp(scores, axis=1) == 0):
+    scores = _complete(table)[1].round(9)  # means of repeats that tie differ by round-off
+    n, stimuli = scores.shape
+    if n < 2 or stimuli < 3 or np.all(np.ptp(scores, axis=1) == 0):
         return None
     from scipy import stats  # slow to load, and a window that opens waits for it
 
     friedman = stats.friedmanchisquare(*scores.T)
     page = stats.page_trend_test(scores)
-    kendall_w = float(friedman.statistic) / (n * (c - 1))
-    return Agreement(len(subjects), kendall_w, float(friedman.pvalue), float(page.pvalue))
+    kendall_w = float(friedman.statistic) / (n * (stimuli - 1))
+    return Agreement(n, kendall_w, float(friedman.pvalue), float(page.pvalue))
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,22 +158,21 @@ def differences(table: Table) -> tuple[Difference, ...]:
     """Return the difference of each pair of stimuli, of the subjects who scored both; at least three of them."""
     indices = sorted({index for row in table.values() for index in row})
     rows: list[Difference] = []
-    for a, b in itertools.combinations(indices, 2):
-        of = average([round(row[b] - row[a], 9) for row in table.values() if a in row and b in row])
-        if of is not None and of.n > 2 and of.sd and (ends := bounds(of.low, of.high)) is not None:
-            p = 2.0 * float(special.stdtr(of.n - 1, -abs(of.mean) * math.sqrt(of.n) / of.sd))
-            rows.append(Difference(a, b, of.n, of.mean, *ends, p, p))
-    adjusted = holm([one.p for one in rows])
-    return tuple(replace(one, p_holm=p) for one, p in zip(rows, adjusted, strict=True))
+    for lower, higher in itertools.combinations(indices, 2):
+        steps = [round(row[higher] - row[lower], 9) for row in table.values() if lower in row and higher in row]
+        step = average(steps)
+        if step is not None and step.n > 2 and step.sd and (ends := bounds(step.low, step.high)) is not None:
+            p = 2.0 * float(special.stdtr(step.n - 1, -abs(step.mean) * math.sqrt(step.n) / step.sd))
+            rows.append(Difference(lower, higher, step.n, step.mean, *ends, p, p))
+    adjusted = holm([row.p for row in rows])
+    return tuple(replace(row, p_holm=p) for row, p in zip(rows, adjusted, strict=True))
 
 
 def holm(ps: Sequence[float]) -> tuple[float, ...]:
     """Return p values that allow for there being several (Holm 1979, Scand. J. Stat. 6:65)."""
-    adjusted, greatest = [0.0] * len(ps), 0.0
-    for rank, place in enumerate(sorted(range(len(ps)), key=lambda i: ps[i])):
-        greatest = max(greatest, min(1.0, (len(ps) - rank) * ps[place]))
-        adjusted[place] = greatest
-    return tuple(adjusted)
+    order = np.argsort(ps, kind="stable")
+    multiples = np.arange(len(ps), 0, -1) * np.array(ps, np.float64)[order]
+    return tuple(np.maximum.accumulate(np.minimum(multiples, 1.0))[np.argsort(order)].tolist())
 
 
 def z_scores(table: Table) -> dict[str, dict[int, float]]:

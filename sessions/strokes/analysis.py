@@ -96,12 +96,12 @@ def analyse(
     return _with_intervals(replace(analysis, flaws=(*analysis.flaws, *_assumed_tilt_flaw(analysis))))
 
 
-def analyse_blocks(parts: Blocks, context: TrialContext) -> Analysis:
+def analyse_blocks(blocks: Blocks, context: TrialContext) -> Analysis:
     """Return the strokes in the readings of trials."""
-    return _with_intervals(_without_intervals(parts, context, ()))
+    return _with_intervals(_without_intervals(blocks, context, ()))
 
 
-def _without_intervals(parts: Blocks, context: TrialContext, flaws_before: Iterable[Flaw]) -> Analysis:
+def _without_intervals(blocks: Blocks, context: TrialContext, flaws_before: Iterable[Flaw]) -> Analysis:
     """Return an analysis whose intervals are not drawn yet: they depend on all presses of a session."""
     plan, info, settings, decisions = context
     strokes: list[Stroke] = []
@@ -109,20 +109,20 @@ def _without_intervals(parts: Blocks, context: TrialContext, flaws_before: Itera
     presses: list[Press] = []
     flaws = [*flaws_before, *(Flaw(FlawName.DECISION, problem, "doubtful") for problem in decisions.problems)]
     filtered = ""
-    for trial, block in parts:
-        part = analyse_trial(trial, block, context)
-        number = None if trial is None else trial.number
+    for trial, block in blocks:
+        result = analyse_trial(trial, block, context)
+        trial_number = None if trial is None else trial.number
         flaws += [
-            replace(flaw, trial=number, stroke=None if flaw.stroke is None else flaw.stroke + len(strokes))
-            for flaw in part.flaws
+            replace(flaw, trial=trial_number, stroke=None if flaw.stroke is None else flaw.stroke + len(strokes))
+            for flaw in result.flaws
         ]
         friction += [
             friction_parameters(stroke, len(strokes) + stroke.number - 1, trial, plan.contact_area)
-            for stroke in strokes_for_model(part.strokes, trial, decisions)
+            for stroke in strokes_for_model(result.strokes, trial, decisions)
         ]
-        strokes += part.strokes
-        presses += part.presses
-        filtered = filtered or part.filtered
+        strokes += result.strokes
+        presses += result.presses
+        filtered = filtered or result.filtered
     flaws += _decisions_without_stroke(decisions, strokes)
     results = tuple(strokes), tuple(friction), tuple(flaws), filtered, settings, decisions.in_force, tuple(presses)
     return Analysis(info.simulated, *results)
@@ -130,7 +130,7 @@ def _without_intervals(parts: Blocks, context: TrialContext, flaws_before: Itera
 
 def _with_intervals(analysis: Analysis) -> Analysis:
     bootstrap = analysis.bootstrap
-    intervals = tuple(stroke_intervals(stroke, at, bootstrap) for at, stroke in enumerate(analysis.strokes))
+    intervals = tuple(stroke_intervals(stroke, position, bootstrap) for position, stroke in enumerate(analysis.strokes))
     strokes = tuple(
         replace(stroke, mu_dynamic_interval=interval.mu_dynamic)
         for stroke, interval in zip(analysis.strokes, intervals, strict=True)
@@ -158,15 +158,15 @@ def _assumed_tilt_flaw(analysis: Analysis) -> Iterable[Flaw]:
 
 def _decisions_without_stroke(decisions: Decisions, strokes: Iterable[Stroke]) -> Iterable[Flaw]:
     """Yield a flaw for each decision about a stroke that does not exist, or that is left out."""
-    is_kept: dict[tuple[int | None, Value], bool] = {(one.trial, one.number): one.kept for one in strokes}
-    for one in decisions.in_force:
-        if one.what in OF_SESSION:
+    is_kept: dict[tuple[int | None, Value], bool] = {(stroke.trial, stroke.number): stroke.kept for stroke in strokes}
+    for decision in decisions.in_force:
+        if decision.what in OF_SESSION:
             continue
-        stroke = (one.trial, one.new if one.what == "choice" else one.stroke)
-        if stroke not in is_kept or (one.what == "choice" and not is_kept[stroke]):
-            what = "left out, or not found" if stroke in is_kept else "not found"
-            sentence = f"Stroke {stroke[1]} is {what}, so nothing is changed by {one.sentence}."
-            yield Flaw(FlawName.DECISION, sentence, "doubtful", trial=one.trial)
+        stroke = (decision.trial, decision.new if decision.what == "choice" else decision.stroke)
+        if stroke not in is_kept or (decision.what == "choice" and not is_kept[stroke]):
+            state = "left out, or not found" if stroke in is_kept else "not found"
+            sentence = f"Stroke {stroke[1]} is {state}, so nothing is changed by {decision.sentence}."
+            yield Flaw(FlawName.DECISION, sentence, "doubtful", trial=decision.trial)
 
 
 def with_present(analysis: Analysis, decision: Decision) -> Decision:
@@ -177,28 +177,28 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
         return replace(decision, old=analysis.settings.tilt)
     strokes = [stroke for stroke in analysis.strokes if stroke.trial == decision.trial]
     if decision.stroke is None:
-        position = next((one.stroke for one in analysis.friction if one.trial == decision.trial), None)
+        position = next((row.stroke for row in analysis.friction if row.trial == decision.trial), None)
         return replace(decision, old=None if position is None else analysis.strokes[position].number)
     for stroke in strokes:
         if stroke.number == decision.stroke:
             stick = None if None in (stroke.onset, stroke.break_away) else (stroke.onset, stroke.break_away)
             return replace(decision, old=stick if decision.what == "stick" else getattr(stroke, decision.what))
-    there = f"it has {len(strokes)}" if strokes else "none was found in it"
-    raise DecisionError(f"there is no {decision.of}: {there}")
+    count = f"it has {len(strokes)}" if strokes else "none was found in it"
+    raise DecisionError(f"there is no {decision.target_text}: {count}")
 
 
-def preview(recording: "Recording", decision: Decision, before: Decisions, now: Analysis) -> Analysis:
-    """Return the analysis as it would be with a decision more; `now` is that without it.
+def preview(recording: "Recording", decision: Decision, decisions: Decisions, present: Analysis) -> Analysis:
+    """Return the analysis as it would be with a decision more; `present` is that without it.
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    settings = replace(now.settings, tilt=(0.0, 0.0))  # the decisions tell it
-    after = analyse(recording, settings, before.with_line(decision))
-    earlier = {flaw.sentence for flaw in now.flaws}
-    for flaw in after.flaws:
-        if flaw.name is FlawName.DECISION and flaw.sentence not in earlier and decision.undoes is None:
+    settings = replace(present.settings, tilt=(0.0, 0.0))  # the decisions tell it
+    changed = analyse(recording, settings, decisions.with_line(decision))
+    present_sentences = {flaw.sentence for flaw in present.flaws}
+    for flaw in changed.flaws:
+        if flaw.name is FlawName.DECISION and flaw.sentence not in present_sentences and decision.undoes is None:
             raise DecisionError(flaw.sentence)
-    return after
+    return changed
 
 
 # What documents of older programs lack: before 2026-11-23 the first four were not drawn, before 2026-11-25 the others

@@ -35,23 +35,23 @@ class SystematicDraws:
         gain, cross_talk = accuracy
         self.gain_t, self.gain_n, self.gain_torque = 1.0 + gain * draw.standard_normal((3, repeats))
         into_drag, into_normal = (cross_talk * draw.standard_normal((repeats, 2)) for _ in range(2))
-        off = draw.standard_normal((repeats, 2))
+        deviates = draw.standard_normal((repeats, 2))
         if presses:
-            off /= np.sqrt(draw.chisquare(presses - 1, (repeats, 2)) / (presses - 1))
-        lean_draws: Array = np.radians(np.array(lean) + np.array(lean_error) * off)
+            deviates /= np.sqrt(draw.chisquare(presses - 1, (repeats, 2)) / (presses - 1))
+        lean_draws: Array = np.radians(np.array(lean) + np.array(lean_error) * deviates)
         if presses:
             lean_draws -= into_drag
-        self._of_normal: Array = into_drag + lean_draws
-        self._of_drag: Array = into_normal - lean_draws
+        self._normal_shares: Array = into_drag + lean_draws
+        self._drag_shares: Array = into_normal - lean_draws
 
     def shares(self, along: Array) -> tuple[Array, Array]:
         """Return a and b (repeats,) [-] for a drag that points along a unit vector (2,)."""
-        return self._of_normal @ along, self._of_drag @ along
+        return self._normal_shares @ along, self._drag_shares @ along
 
     def ratio(self, value: float | Array, along: Array) -> Array:
         """Return what T/N (repeats,) [-] truly was where it was measured as `value`."""
-        of_normal, of_drag = self.shares(along)
-        return (value * self.gain_t + of_normal) / (self.gain_n + of_drag * value)
+        normal_share, drag_share = self.shares(along)
+        return (value * self.gain_t + normal_share) / (self.gain_n + drag_share * value)
 
 
 def drag_direction(force: Array) -> Array:
@@ -93,13 +93,13 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
     """Return the intervals of the stroke at position `number`; the same stroke and seed give the same bits."""
     settings = settings or BootstrapSettings()
     repeats = _repeats(stroke, number, settings)
-    ends = (1 - settings.confidence) / 2, (1 + settings.confidence) / 2
+    tails = (1 - settings.confidence) / 2, (1 + settings.confidence) / 2
 
     def interval(name: str) -> Interval | None:
         value = getattr(stroke, name)
         if name not in repeats or value is None:
             return None
-        low, high = np.quantile(repeats[name], ends).tolist()
+        low, high = np.quantile(repeats[name], tails).tolist()
         # An instant found at the end of the stretch in which it may lie, as by the first reading after it, is one too.
         # A lean that is known and was not levelled moves the truth off the reported number: it lies within as well.
         within = name in ("onset", "slide_onset") or settings.tilt != (0.0, 0.0)
@@ -114,7 +114,7 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
 
 def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:
     """Return intervals as plain data, with what they are and the settings they were drawn with."""
-    rows = [asdict(one) for one in intervals]
+    rows = [asdict(interval) for interval in intervals]
     return {"kind": settings.kind, "kinds": dict(settings.kinds), "settings": asdict(settings), "strokes": rows}
 
 
@@ -122,7 +122,7 @@ def _repeats(stroke: Stroke, number: int, settings: BootstrapSettings) -> Mappin
     """Return the numbers (repeats,) of the stroke at position `number`, by name; none of a curve that is too short."""
     if stroke.curve is None or len(stroke.curve.time) < 3:
         return {}
-    return _Repeats(stroke, stroke.curve, settings, np.random.default_rng([settings.seed, number])).all()
+    return _Repeats(stroke, stroke.curve, settings, np.random.default_rng([settings.seed, number])).numbers()
 
 
 class FrictionDraws(NamedTuple):
@@ -155,14 +155,14 @@ def mean_inflation(blocks: Array, settings: BootstrapSettings) -> tuple[float, f
     small by (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), which is put right here.
     """
     n = len(blocks)
-    off = blocks - blocks.mean()
-    squares = float(off @ off)
-    lag_one = 0.0 if squares == 0.0 else float(off[1:] @ off[:-1]) / squares
-    alike = settings.most_alike
+    deviations = blocks - blocks.mean()
+    squares = float(deviations @ deviations)
+    lag_one = 0.0 if squares == 0.0 else float(deviations[1:] @ deviations[:-1]) / squares
+    correlation = settings.most_alike
     if n > 4:
-        alike = min(max((lag_one + 1.0 / n) / (1.0 - 4.0 / n), 0.0), alike)
-    further = ((1.0 + alike) / (1.0 - alike)) ** 0.5
-    return further, max(n / further**2 - 1.0, settings.least_free)
+        correlation = min(max((lag_one + 1.0 / n) / (1.0 - 4.0 / n), 0.0), correlation)
+    inflation = ((1.0 + correlation) / (1.0 - correlation)) ** 0.5
+    return inflation, max(n / inflation**2 - 1.0, settings.least_free)
 
 
 class _Repeats:
@@ -181,37 +181,37 @@ class _Repeats:
         self._noise_t, self._noise_n = curve.noise
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
         drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
-        few = np.sqrt(max(1.0, curve.quiet / settings.block))
-        self._zero_t_sd = float(np.hypot(drift, self._noise_t / few))
+        independent = np.sqrt(max(1.0, curve.quiet / settings.block))
+        self._zero_t_sd = float(np.hypot(drift, self._noise_t / independent))
         self._zero_t = self._zero_t_sd * draw.standard_normal(n)
-        self._zero_n = np.hypot(drift, self._noise_n / few) * draw.standard_normal(n)
+        self._zero_n = np.hypot(drift, self._noise_n / independent) * draw.standard_normal(n)
 
-    def all(self) -> dict[str, Array]:
+    def numbers(self) -> dict[str, Array]:
         """Return the numbers (repeats,) of each repeat, by name."""
         numbers, stroke, curve = dict[str, Array](), self._stroke, self._curve
         if stroke.tau_max is not None and stroke.peak_tangential:
             area = stroke.contact_area or stroke.peak_tangential / stroke.tau_max
             if curve.crests is None:
-                at, top = int(np.nanargmax(curve.tangential)), self._top(curve.tangential, self._noise_t)
+                crest, top = int(np.nanargmax(curve.tangential)), self._top(curve.tangential, self._noise_t)
             else:
                 above_crest = curve.crest_gap * self._draw.uniform(size=self._settings.repeats)
-                at = int(np.nanargmax(curve.crests))
+                crest = int(np.nanargmax(curve.crests))
                 top = self._top(curve.crests, curve.crest_noise, filtered=False) + above_crest
-            of_normal, _ = self._systematic.shares(drag_direction(curve.force[at : at + 1]))
-            shift = self._zero_t + top + of_normal * curve.normal[at]
-            peak = stroke.tau_max * area * self._gain_t + shift
+            normal_share, _ = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
+            offset = self._zero_t + top + normal_share * curve.normal[crest]
+            peak = stroke.tau_max * area * self._gain_t + offset
             numbers["tau_max"] = peak / (area * self._gain_n**stroke.area_exponent)
-            numbers["peak_tangential"] = stroke.peak_tangential * self._gain_t + shift
+            numbers["peak_tangential"] = stroke.peak_tangential * self._gain_t + offset
         for name in ("mu_static", "mu_max"):
             value = getattr(stroke, name)
             if value is not None:
                 numbers[name] = self._single(value)
         numbers |= self._window()
         if stroke.peak_normal is not None:
-            top, at = self._top(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
-            _, of_drag = self._systematic.shares(drag_direction(curve.force[at : at + 1]))
-            shift = self._zero_n + of_drag * curve.tangential[at]
-            numbers["peak_normal"] = stroke.peak_normal * self._gain_n + shift + top
+            top, crest = self._top(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
+            _, drag_share = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
+            offset = self._zero_n + drag_share * curve.tangential[crest]
+            numbers["peak_normal"] = stroke.peak_normal * self._gain_n + offset + top
         return numbers | self._instants(numbers.get("speed")) | self._onset()
 
     def _top(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
@@ -229,13 +229,13 @@ class _Repeats:
     def _single(self, value: float) -> Array:
         """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
         ratio = self._curve.ratio
-        at = int(np.nanargmin(np.abs(ratio - value)))
-        normal = float(self._curve.normal[at])
+        nearest = int(np.nanargmin(np.abs(ratio - value)))
+        normal = float(self._curve.normal[nearest])
         noise = np.hypot(self._noise_t, value * self._noise_n) / normal
         from_zero = (self._zero_t - value * self._zero_n) / normal
-        along = drag_direction(self._curve.force[at : at + 1])
+        direction = drag_direction(self._curve.force[nearest : nearest + 1])
         scatter = noise * self._draw.standard_normal(len(self._gain_t))
-        return self._systematic.ratio(value, along) + from_zero + scatter
+        return self._systematic.ratio(value, direction) + from_zero + scatter
 
     def _window(self) -> dict[str, Array]:
         """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
@@ -244,47 +244,48 @@ class _Repeats:
             return {}
         curve = self._curve
         inside = (curve.time >= steady[0]) & (curve.time <= steady[1]) & np.isfinite(curve.ratio)
-        parts = (curve.ratio, 1.0 / np.where(inside, curve.normal, 1.0), curve.time, curve.position, curve.normal)
-        window = np.column_stack([*parts, curve.tangential, curve.force])[inside]
+        columns = (curve.ratio, 1.0 / np.where(inside, curve.normal, 1.0), curve.time, curve.position, curve.normal)
+        window = np.column_stack([*columns, curve.tangential, curve.force])[inside]
         length = max(1, round(settings.block / self._step))
         count = len(window) // length
         if count < settings.fewest_blocks:
             return {}
         blocks = window[: count * length].reshape(count, length, window.shape[1]).mean(axis=1)
-        positions, weight, own = self._sample(count)
+        positions, weight, inside_window = self._sample(count)
         sample = blocks[positions]  # (repeats, blocks, 9)
         total = weight.sum(axis=1)
         means = np.einsum("rbc,rb->rc", sample, weight) / total[:, None]
         # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
-        further, free = mean_inflation(blocks[:, 0], settings)
-        further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
+        inflation, dof = mean_inflation(blocks[:, 0], settings)
+        inflation *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * dof / self._draw.chisquare(dof, len(total)))
         lightness = float(blocks[:, 1].mean())
-        mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further
-        along = drag_direction(curve.force[inside])
-        of_normal, of_drag = self._systematic.shares(along)
+        mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * inflation
+        direction = drag_direction(curve.force[inside])
+        normal_share, drag_share = self._systematic.shares(direction)
         from_zero = (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
-        numbers = {"mu_dynamic": self._systematic.ratio(mu, along) + from_zero}
+        numbers = {"mu_dynamic": self._systematic.ratio(mu, direction) + from_zero}
         if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
             # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
             # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
-            other = own @ blocks[:, 5:7] / total[:, None]
-            other -= other.mean(axis=0)
+            force_means = inside_window @ blocks[:, 5:7] / total[:, None]
+            force_means -= force_means.mean(axis=0)
             normal, tangential = self._stroke.normal_force, self._stroke.tangential_force
-            shared_n, shared_t = of_drag * tangential + self._zero_n, of_normal * normal + self._zero_t
-            numbers["normal_force"] = (normal + other[:, 0]) * self._gain_n + shared_n
-            numbers["tangential_force"] = (tangential + other[:, 1]) * self._gain_t + shared_t
-        way = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
+            shared_n, shared_t = drag_share * tangential + self._zero_n, normal_share * normal + self._zero_t
+            numbers["normal_force"] = (normal + force_means[:, 0]) * self._gain_n + shared_n
+            numbers["tangential_force"] = (tangential + force_means[:, 1]) * self._gain_t + shared_t
+        velocity = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
         if self._stroke.speed is not None and np.isfinite(blocks[:, 3:5]).all():
-            way = self._slopes(sample, weight) * self._systematic.gain_torque[:, None]
-            numbers["speed"] = np.hypot(way[:, 0], way[:, 1]) / (self._gain_n + of_drag * self._stroke.mu_dynamic)
+            velocity = self._slopes(sample, weight) * self._systematic.gain_torque[:, None]
+            normal_gain = self._gain_n + drag_share * self._stroke.mu_dynamic
+            numbers["speed"] = np.hypot(velocity[:, 0], velocity[:, 1]) / normal_gain
         if self._stroke.heading is not None:
-            numbers["heading"] = self._headings(way, self._stroke.heading)
+            numbers["heading"] = self._headings(velocity, self._stroke.heading)
         return numbers
 
-    def _headings(self, way: Array, heading: float) -> Array:
-        """Return the angles (repeats,) [degrees] of ways (repeats, 2), as near that reported as whole turns allow."""
-        uneven = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(way))  # of two gains
-        angle = np.degrees(np.arctan2(way[:, 1] * uneven, way[:, 0]))
+    def _headings(self, velocity: Array, heading: float) -> Array:
+        """Return the angles (repeats,) [degrees] of velocities (repeats, 2), by whole turns nearest to `heading`."""
+        gain_ratio = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(velocity))
+        angle = np.degrees(np.arctan2(velocity[:, 1] * gain_ratio, velocity[:, 0]))
         return heading + (angle - heading + 180.0) % 360.0 - 180.0
 
     def _instants(self, speed: Array | None) -> dict[str, Array]:
@@ -294,18 +295,18 @@ class _Repeats:
             return instants
         inside = (curve.time >= stroke.steady[0]) & (curve.time <= stroke.steady[1])
         if stroke.break_away is not None and "stick" not in stroke.decided:
-            part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
-            columns = (curve.time[part], curve.ratio[part], curve.normal[part])
+            stretch = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
+            columns = (curve.time[stretch], curve.ratio[stretch], curve.normal[stretch])
             shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
             zero = (self._zero_t, self._zero_n)
             peaked = stroke.mu_static is not None
             draws = break_away_draws(columns, shortest, zero, self._settings, self._draw, peaked=peaked)
             instants |= {} if draws is None else {"break_away": draws}
         if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
-            part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
+            stretch = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
             noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
             threshold = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
-            draws = slide_onset_draws(curve.time[part], curve.speed[part], threshold, noise, self._draw)
+            draws = slide_onset_draws(curve.time[stretch], curve.speed[stretch], threshold, noise, self._draw)
             instants |= {} if draws is None else {"slide_onset": draws}
         return instants
 
@@ -321,8 +322,8 @@ class _Repeats:
         noise = float(quiet.std())
         # How large the noise is, and with it the threshold, is estimated from these readings too.
         band = self._settings.detector.leave_noise * noise / np.sqrt(2.0 * len(quiet))
-        wrong = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
-        draws = onset_draws((curve.time, curve.unfiltered), onset, noise, wrong, self._settings, self._draw)
+        zero_error = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
+        draws = onset_draws((curve.time, curve.unfiltered), onset, noise, zero_error, self._settings, self._draw)
         return {} if draws is None else {"onset": draws}
 
     def _sample(self, count: int) -> tuple[Indices, Array, Array]:
@@ -335,13 +336,14 @@ class _Repeats:
         length = stop - first
         positions = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * length[:, None])
         weight = (np.arange(count) < length[:, None]).astype(np.float64)
-        places = np.arange(count)
-        own = (places >= first[:, None]) & (places < stop[:, None])
-        return np.clip(positions, 0, count - 1).astype(np.int64), weight, own.astype(np.float64)
+        blocks = np.arange(count)
+        in_window = (blocks >= first[:, None]) & (blocks < stop[:, None])
+        return np.clip(positions, 0, count - 1).astype(np.int64), weight, in_window.astype(np.float64)
 
     def _slopes(self, sample: Array, weight: Array) -> Array:
         """Return the slope of position on time (repeats, 2) [mm/s] over the blocks drawn."""
         total = weight.sum(axis=1)[:, None]
-        time, place = sample[:, :, 2], sample[:, :, 3:5]
-        t = time - (time * weight).sum(axis=1)[:, None] / total
-        return ((t * weight)[:, :, None] * place).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]
+        time, position = sample[:, :, 2], sample[:, :, 3:5]
+        centred_time = time - (time * weight).sum(axis=1)[:, None] / total
+        spread = np.maximum((centred_time**2 * weight).sum(axis=1), 1e-9)[:, None]
+        return ((centred_time * weight)[:, :, None] * position).sum(axis=1) / spread

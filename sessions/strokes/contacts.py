@@ -70,7 +70,7 @@ class ContactDetector:
 
     def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
         """Take readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return what they tell."""
-        events = (self._take_reading(t, force) for t, force in zip(time.tolist(), normal_force.tolist(), strict=True))
+        events = map(self._take_reading, time.tolist(), normal_force.tolist())
         return tuple(event for event in events if event is not None)
 
     def _take_reading(self, t: float, force: float) -> ContactEvent | None:
@@ -78,8 +78,8 @@ class ContactDetector:
             return self._still_touching(t, force)
         if self._has_zero:
             above = force - self._level
-            self._noise_exit = _since(self._noise_exit, t, on=above > self._noise_band)
-            self._above = _since(self._above, t, on=above > self._threshold)
+            self._noise_exit = _since(self._noise_exit, t, holds=above > self._noise_band)
+            self._above = _since(self._above, t, holds=above > self._threshold)
             if self._above is not None:
                 return self._touch(self._above, t)
             if self._follows:
@@ -98,7 +98,7 @@ class ContactDetector:
         return onset
 
     def _still_touching(self, t: float, force: float) -> ContactEvent | None:
-        self._below = _since(self._below, t, on=force - self._level < self._lift)
+        self._below = _since(self._below, t, holds=force - self._level < self._lift)
         if self._below is None or t - self._below < self._settings.lift_hold - _ROUNDING:
             return None
         lift = Lift(self._below, t)
@@ -109,7 +109,7 @@ class ContactDetector:
 
     def _notice_pull(self, t: float, above: float) -> None:
         """Forget a zero that was taken in contact."""
-        self._pull_start = _since(self._pull_start, t, on=above < -self._threshold)
+        self._pull_start = _since(self._pull_start, t, holds=above < -self._threshold)
         if self._pull_start is not None and t - self._pull_start >= self._settings.baseline / 2:
             self._pull_start, self._has_zero = None, False
             self._start_gathering()
@@ -126,7 +126,7 @@ class ContactDetector:
             self._bins.append(self._bin)
             self._bin, self._bin_start = [], t
             if len(self._bins) == self._bins.maxlen:
-                stretch = [reading for part in list(self._bins)[:-1] for reading in part]
+                stretch = [reading for values in list(self._bins)[:-1] for reading in values]
                 if is_quiet(stretch, self._settings):
                     self._take(Baseline(fmean(stretch), _spread(stretch)))
         self._bin.append(force)
@@ -142,9 +142,9 @@ class ContactDetector:
 _ROUNDING = 1e-9  # times are sums of ticks [s]
 
 
-def _since(began: float | None, t: float, *, on: bool) -> float | None:
+def _since(start: float | None, t: float, *, holds: bool) -> float | None:
     """Return since when something has been so without a break, None where it is not so at `t` [s]."""
-    return None if not on else t if began is None else began
+    return None if not holds else t if start is None else start
 
 
 def onset_threshold(noise: float, settings: DetectorSettings) -> float:
@@ -163,7 +163,7 @@ def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
     """
     if len(stretch) < settings.baseline_readings:
         return False
-    steps = [abs(b - a) for a, b in pairwise(stretch)]
+    steps = [abs(next_force - force) for force, next_force in pairwise(stretch)]
     noise = NORMAL_STEP * median(steps)
     return _spread(stretch) <= max(settings.quiet_noise * noise, settings.quiet_floor)
 
@@ -210,13 +210,16 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     inside = slice(contact.start, contact.stop)
     force = np.maximum(_bridge_gaps(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
     with_ends = np.concatenate([[0.0], force, [0.0]])
-    places, prominences = peaks(with_ends)
-    tops = places[prominences >= (1.0 - settings.contact.valley) * with_ends[places]] - 1
-    tops = tops[force[tops] >= settings.contact.light_share * force.max(initial=0.0)]
-    between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(tops)]
+    positions, prominences = peaks(with_ends)
+    crests = positions[prominences >= (1.0 - settings.contact.valley) * with_ends[positions]] - 1
+    crests = crests[force[crests] >= settings.contact.light_share * force.max(initial=0.0)]
     # Peaks of exactly the same height stand out of everything but one another.
-    deep = settings.contact.valley
-    valleys = [contact.start + at for a, b, at in between if force[at] < deep * min(force[a], force[b])]
+    valleys = [
+        contact.start + lowest
+        for first, second in pairwise(crests)
+        for lowest in [int(first + np.argmin(force[first:second]))]
+        if force[lowest] < settings.contact.valley * min(force[first], force[second])
+    ]
     if not valleys:
         return (contact,)
     bounds = [contact.start, *valleys, contact.stop]
@@ -229,10 +232,10 @@ def _bridge_gaps(time: Array, force: Array, longest: float) -> Array:
     if not len(finite):
         return np.zeros_like(force)
     gaps = np.concatenate([[0], np.cumsum(np.diff(time) > longest)])  # before each reading
-    number = np.arange(len(force))
-    after = finite[np.minimum(np.searchsorted(finite, number), len(finite) - 1)]
-    before = finite[np.maximum(np.searchsorted(finite, number, "right") - 1, 0)]
-    return np.where(gaps[after] == gaps[before], np.interp(number, finite, force[finite]), np.nan_to_num(force))
+    numbers = np.arange(len(force))
+    following = finite[np.minimum(np.searchsorted(finite, numbers), len(finite) - 1)]
+    preceding = finite[np.maximum(np.searchsorted(finite, numbers, "right") - 1, 0)]
+    return np.where(gaps[following] == gaps[preceding], np.interp(numbers, finite, force[finite]), np.nan_to_num(force))
 
 
 def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, settings: AnalysisSettings) -> Contact:
@@ -251,7 +254,7 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
 
 
 class _DragRun(NamedTuple):
-    """Readings in which the drag points one way, or turns slowly."""
+    """Consecutive readings in which the drag keeps its side, or turns slowly."""
 
     first: int
     last: int
@@ -275,9 +278,9 @@ def split_at_reversals(
     the shortest stroke and a share of the longest way, and no light touch beside the others). A drag that turns slowly,
     as in circles, is not cut.
     """
-    part = wrench[contact.start : contact.stop]
-    ways = _drag_runs(part, time[contact.start : contact.stop], unsure, settings)
-    reversals = [contact.start + _reversal(part, one, other) for one, other in pairwise(ways)]
+    stretch = wrench[contact.start : contact.stop]
+    runs = _drag_runs(stretch, time[contact.start : contact.stop], unsure, settings)
+    reversals = [contact.start + _reversal(stretch, run, following) for run, following in pairwise(runs)]
     if not reversals:
         return (contact,)
     bounds = [contact.start, *reversals, contact.stop]
@@ -296,48 +299,49 @@ def split_at_reversals(
 
 
 def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_DragRun]:
-    """Return the ways of the drag in a wrench (n, 6); those that are too short or too weak are left out."""
+    """Return the runs of the drag in a wrench (n, 6) without those that are too short or too weak."""
     rule, normal = settings.contact, -wrench[:, 2]
     floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
-    at = np.flatnonzero(normal >= floor)
-    if len(at) < 2:
+    pressed = np.flatnonzero(normal >= floor)
+    if len(pressed) < 2:
         return []
-    block_number = np.floor((time[at] - time[at[0]]) / rule.turn_block)
+    block_number = np.floor((time[pressed] - time[pressed[0]]) / rule.turn_block)
     firsts = np.flatnonzero(np.diff(block_number, prepend=-1.0))
-    counts = np.diff(np.append(firsts, len(at)))
-    force, load = (np.add.reduceat(column[at], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
+    counts = np.diff(np.append(firsts, len(pressed)))
+    force, load = (np.add.reduceat(column[pressed], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
     if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag gives no number
         return []
     least = rule.turn_share * float(np.median(drag / load)) * load
     strong = np.flatnonzero((drag >= least) & (drag > rule.turn_unsure * unsure))
-    lasts = at[np.append(firsts[1:], len(at)) - 1]
+    lasts = pressed[np.append(firsts[1:], len(pressed)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
         if runs and float(force[:, runs[-1][-rule.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
             runs[-1].append(block)
         else:
             runs.append([block])
-    ends = [(int(at[firsts[run[0]]]), int(lasts[run[-1]])) for run in runs]
-    every_run = [_DragRun(*two, force[:, run].sum(axis=1), len(run)) for two, run in zip(ends, runs, strict=True)]
-    greatest = max((way.drag for way in every_run), default=0.0)
-    longest = max((float(time[way.last] - time[way.first]) for way in every_run), default=0.0)
+    bounds = [(int(pressed[firsts[run[0]]]), int(lasts[run[-1]])) for run in runs]
+    every_run = [_DragRun(*pair, force[:, run].sum(axis=1), len(run)) for pair, run in zip(bounds, runs, strict=True)]
+    greatest = max((run.drag for run in every_run), default=0.0)
+    longest = max((float(time[run.last] - time[run.first]) for run in every_run), default=0.0)
     shortest = max(rule.shortest_stroke - rule.turn_block, rule.turn_shortest * longest)
-    ways: list[_DragRun] = []
-    dropped = False  # since the last way
-    for way in every_run:
-        short = bool(time[way.last] - time[way.first] < shortest or way.drag < rule.light_share * greatest)
-        if not short and ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
-            ways[-1] = _DragRun(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)
+    long_runs: list[_DragRun] = []
+    dropped = False  # since the last kept run
+    for run in every_run:
+        short = bool(time[run.last] - time[run.first] < shortest or run.drag < rule.light_share * greatest)
+        if not short and long_runs and dropped and float(long_runs[-1].push @ run.push) >= 0.0:
+            first, _, push, blocks = long_runs.pop()
+            long_runs.append(_DragRun(first, run.last, push + run.push, blocks + run.blocks))
         elif not short:
-            ways.append(way)
+            long_runs.append(run)
         dropped = short
-    return ways
+    return long_runs
 
 
-def _reversal(wrench: Array, one: _DragRun, other: _DragRun) -> int:
-    """Return the reading of a wrench (n, 6) from which on the drag points the `other` way."""
-    across = other.push / np.hypot(*other.push) - one.push / np.hypot(*one.push)
-    between = wrench[one.first : other.last + 1, :2] @ across
-    until = between[: other.first - one.first + 1]
-    return one.first + int(np.flatnonzero(until < 0.0)[-1]) + 1
+def _reversal(wrench: Array, run: _DragRun, following: _DragRun) -> int:
+    """Return the reading of a wrench (n, 6) from which on the drag points the `following` way."""
+    turn = following.push / np.hypot(*following.push) - run.push / np.hypot(*run.push)
+    components = wrench[run.first : following.last + 1, :2] @ turn
+    before_next = components[: following.first - run.first + 1]
+    return run.first + int(np.flatnonzero(before_next < 0.0)[-1]) + 1

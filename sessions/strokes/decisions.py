@@ -86,15 +86,15 @@ class Decision:
     made_utc: str = ""
 
     @property
-    def place(self) -> tuple[int | None, int | None, str]:
+    def target(self) -> tuple[int | None, int | None, str]:
         """What it sets: of two in force for one place the later one acts."""
         return self.trial, self.stroke, self.what
 
     @property
-    def of(self) -> str:
+    def target_text(self) -> str:
         """Where it belongs, for people.
 
-        >>> Decision("E02", "", "kept", trial=3, stroke=1).of
+        >>> Decision("E02", "", "kept", trial=3, stroke=1).target_text
         'stroke 1 of trial 3'
         """
         trial = "the recording" if self.trial is None else f"trial {self.trial}"
@@ -107,12 +107,13 @@ class Decision:
         >>> Decision("E02", "a ramp", "steady", 3, 1, (1.0, 2.0), (1.2, 2.0), number=4).sentence
         'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 and 2 (it was 1 and 2): a ramp'
         """
-        head = f"decision {self.number} by {self.by}: "
+        opening = f"decision {self.number} by {self.by}: "
         if self.undoes is not None:
-            return f"{head}decision {self.undoes} is undone: {self.why}"
+            return f"{opening}decision {self.undoes} is undone: {self.why}"
         if self.what == "kept":
-            return f"{head}{self.of} is {'kept' if self.new else 'left out'}: {self.why}"
-        return f"{head}{self.what} of {self.of} is {value_text(self.new)} (it was {value_text(self.old)}): {self.why}"
+            return f"{opening}{self.target_text} is {'kept' if self.new else 'left out'}: {self.why}"
+        values = f"is {value_text(self.new)} (it was {value_text(self.old)})"
+        return f"{opening}{self.what} of {self.target_text} {values}: {self.why}"
 
     @property
     def leaves_out(self) -> bool:
@@ -122,15 +123,15 @@ class Decision:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, as its line holds it."""
         document = asdict(self)
-        head = {name: document.pop(name) for name in ("number", "made_utc", "by", "why")}
+        record = {name: document.pop(name) for name in ("number", "made_utc", "by", "why")}
         undoes = document.pop("undoes")
-        return {**head, "undoes": undoes} if undoes is not None else {**head, **document}
+        return {**record, "undoes": undoes} if undoes is not None else {**record, **document}
 
 
 def value_text(value: Value) -> str:
     """Return a value for people."""
     if isinstance(value, tuple):
-        return " and ".join(f"{part:.6g}" for part in value)
+        return " and ".join(f"{number:.6g}" for number in value)
     return "not known" if value is None else f"{value:.6g}"
 
 
@@ -138,15 +139,15 @@ def value_text(value: Value) -> str:
 class StrokeDecisions:
     """What is in force of one stroke."""
 
-    of: Mapping[str, Decision]  # by what
+    by_name: Mapping[str, Decision]  # by what
 
-    def value(self, what: str) -> Any:  # noqa: ANN401 - of the kind that `OF_STROKE` names
+    def value(self, name: str) -> Any:  # noqa: ANN401 - of the kind that `OF_STROKE` names
         """Return what was decided, None where nothing was."""
-        return self.of[what].new if what in self.of else None
+        return self.by_name[name].new if name in self.by_name else None
 
-    def instant(self, what: str) -> float | None:
+    def instant(self, name: str) -> float | None:
         """Return an instant [s] that was decided."""
-        return float(self.value(what)) if what in self.of else None
+        return float(self.value(name)) if name in self.by_name else None
 
     @property
     def is_kept(self) -> bool:
@@ -156,7 +157,7 @@ class StrokeDecisions:
     @property
     def sentences(self) -> dict[str, str]:
         """Return for each thing decided who decided it, and why."""
-        return {what: decision.sentence for what, decision in self.of.items()}
+        return {name: decision.sentence for name, decision in self.by_name.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,7 @@ class Decisions:
     @property
     def in_force(self) -> tuple[Decision, ...]:
         """Return the decisions that act, by number: not undone (undoing can be undone too), nor set anew since."""
-        latest = {decision.place: decision for decision in self.standing if decision.undoes is None}
+        latest = {decision.target: decision for decision in self.standing if decision.undoes is None}
         return tuple(sorted(latest.values(), key=lambda decision: decision.number))
 
     @property
@@ -186,17 +187,18 @@ class Decisions:
 
     def of_stroke(self, trial: int | None, stroke: int) -> StrokeDecisions:
         """Return what is in force of a stroke, its number counted within the trial from 1."""
-        of_stroke = [one for one in self.in_force if (one.trial, one.stroke) == (trial, stroke)]
-        return StrokeDecisions({decision.what: decision for decision in of_stroke})
+        about = (decision for decision in self.in_force if (decision.trial, decision.stroke) == (trial, stroke))
+        return StrokeDecisions({decision.what: decision for decision in about})
 
     def choice(self, trial: int | None) -> Decision | None:
         """Return the decision which stroke of a trial the model gets, None where nobody decided."""
-        return next((one for one in self.in_force if one.trial == trial and one.what == "choice"), None)
+        choices = (decision for decision in self.in_force if decision.what == "choice")
+        return next((decision for decision in choices if decision.trial == trial), None)
 
     @property
     def tilt(self) -> Span | None:
         """Return how far the face leans to +x and to +y [degrees], where that was decided."""
-        return next((cast("Span", one.new) for one in self.in_force if one.what == "tilt"), None)
+        return next((cast("Span", decision.new) for decision in self.in_force if decision.what == "tilt"), None)
 
     def with_line(self, decision: Decision) -> "Decisions":
         """Return them with one more, not recorded, to see what it would do. Raises DecisionError where it cannot be."""
@@ -217,16 +219,16 @@ def parse(content: bytes) -> Decisions:
     """Return the decisions in the bytes of a file."""
     lines: list[Decision] = []
     problems: list[str] = []
-    *complete, rest = content.split(b"\n")
-    for place, line in enumerate(complete, 1):
+    *complete, tail = content.split(b"\n")
+    for number, line in enumerate(complete, 1):
         decision = _decision(line)
         if isinstance(decision, str):
-            problems.append(f"line {place} of {DECISIONS} is left out: {decision}")
+            problems.append(f"line {number} of {DECISIONS} is left out: {decision}")
         elif decision is not None and lines and decision.number <= lines[-1].number:
-            problems.append(f"line {place} of {DECISIONS} is left out: its number, {decision.number}, comes before it")
+            problems.append(f"line {number} of {DECISIONS} is left out: its number, {decision.number}, comes before it")
         elif decision is not None:
             lines.append(decision)
-    if rest:
+    if tail:
         problems.append(f"the last line of {DECISIONS} is torn and left out: it was never acknowledged, or was cut off")
     gaps = sorted({*range(1, max((line.number for line in lines), default=0))} - {line.number for line in lines})
     if gaps and not problems:
@@ -271,20 +273,21 @@ def _decision(line: bytes) -> Decision | str | None:
     return decision if document.keys() <= asdict(decision).keys() else "it holds no decision"
 
 
-def _check(decision: Decision, before: Decisions) -> None:
+def _check(decision: Decision, decisions: Decisions) -> None:
     """Raise DecisionError unless a decision can be recorded after those before it."""
     if not decision.by.strip() or not decision.why.strip():
         raise DecisionError("a decision says who decides and why: give both")
     if decision.undoes is not None:
-        if decision.undoes not in {line.number for line in before.standing}:
+        if decision.undoes not in {line.number for line in decisions.standing}:
             raise DecisionError(f"decision {decision.undoes} is not in force: there is nothing to undo")
         return
+    target = decision.target_text
     kinds = OF_STROKE if decision.stroke is not None else OF_SESSION if decision.trial is None else OF_TRIAL
     if decision.what not in kinds:
-        raise DecisionError(f"nobody decides {decision.what!r} of {decision.of}: give one of {', '.join(kinds)}")
-    kind = kinds[decision.what]
-    if not _fits(decision.new, kind.form):
-        raise DecisionError(f"{decision.what} of {decision.of} cannot be {decision.new!r}: {kind.sentence}")
+        raise DecisionError(f"nobody decides {decision.what!r} of {target}: give one of {', '.join(kinds)}")
+    value_kind = kinds[decision.what]
+    if not _fits(decision.new, value_kind.form):
+        raise DecisionError(f"{decision.what} of {target} cannot be {decision.new!r}: {value_kind.sentence}")
 
 
 def _fits(value: Value, form: object) -> bool:

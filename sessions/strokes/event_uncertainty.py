@@ -30,25 +30,25 @@ def onset_draws(
     """
     time, force = columns
     fewest, detector = settings.onset_fewest, settings.detector
-    at = int(np.searchsorted(time, onset))
-    if at == 0 or len(time) < at + fewest or force[at - 1] > onset_threshold(noise, detector):
+    index = int(np.searchsorted(time, onset))
+    if index == 0 or len(time) < index + fewest or force[index - 1] > onset_threshold(noise, detector):
         return None
-    rise = force[at:] < 2.0 * max(detector.leave_noise * noise, float(force[at]))
-    part = slice(at - 1, at + max(fewest, int(np.argmin(rise)) + 1))
-    step = float(np.median(np.diff(time[part])))
+    rise = force[index:] < 2.0 * max(detector.leave_noise * noise, float(force[index]))
+    rise_slice = slice(index - 1, index + max(fewest, int(np.argmin(rise)) + 1))
+    step = float(np.median(np.diff(time[rise_slice])))
     # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
-    bend, slope, _ = np.polyfit(time[part] - (onset - step / 2.0), force[part], 2).tolist()
-    chord = float(np.polyfit(time[part], force[part], 1)[0])
+    bend, slope, _ = np.polyfit(time[rise_slice] - (onset - step / 2.0), force[rise_slice], 2).tolist()
+    chord = float(np.polyfit(time[rise_slice], force[rise_slice], 1)[0])
     slope = max(slope if bend > 0.0 else chord, settings.onset_steep * chord)
     if slope <= 0.0:
         return None
     reach = min(settings.onset_reach * noise / slope, settings.onset_most * step / 2.0)
-    places = np.arange(-reach, reach + step, step)
+    offsets = np.arange(-reach, reach + step, step)
     # Readings of each repeat, counted from the crossing: the first lies anywhere within a step.
-    since = places + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
-    within = slope * since + noise * draw.standard_normal(since.shape) <= 0.0
-    last = np.where(within.any(axis=1), since.shape[1] - 1 - np.argmax(within[:, ::-1], axis=1), -1)
-    crossing = since[:, 0] + (last + 1) * step  # the reading after the last within the noise
+    times = offsets + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
+    in_noise = slope * times + noise * draw.standard_normal(times.shape) <= 0.0
+    last_in_noise = np.where(in_noise.any(axis=1), times.shape[1] - 1 - np.argmax(in_noise[:, ::-1], axis=1), -1)
+    crossing = times[:, 0] + (last_in_noise + 1) * step  # the reading after the last within the noise
     return onset - crossing + zero / slope
 
 
@@ -67,7 +67,7 @@ def break_away_draws(
     of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
     [N]. `peaked` where a static peak was found. A repeat's deviations move the break-away as the fit, to first order.
     """
-    last = float(columns[0][-1])
+    last_instant = float(columns[0][-1])
     finite = np.isfinite(columns[1])
     time, ratio, normal = (column[finite] for column in columns)
 
@@ -75,13 +75,13 @@ def break_away_draws(
         t, y, n = (thin(column[time <= until], settings.climb.climb_most) for column in (time, ratio, normal))
         return ClimbReadings(t, y, settings.climb), n
 
-    climb = readings(last)[0].fit(settings.block, peaked=peaked)
+    climb = readings(last_instant)[0].fit(settings.block, peaked=peaked)
     if climb is None:
         return None
     bends = climb.bend != 1.0
     draws: list[Array] = []
-    for number, part in enumerate(np.array_split(np.arange(len(zero[0])), settings.climb_ends)):
-        series, n = readings(last + (shortest - last) * number / (settings.climb_ends - 1))
+    for number, repeats in enumerate(np.array_split(np.arange(len(zero[0])), settings.climb_ends)):
+        series, n = readings(last_instant + (shortest - last_instant) * number / (settings.climb_ends - 1))
         t, y = series.time, series.ratio
         fit = series.refine(climb, bends=bends)
         if fit.rise <= 0.0:
@@ -89,15 +89,15 @@ def break_away_draws(
         edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / settings.block), prepend=-1.0))
         blocks = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
         # Two or three numbers were fitted to the climb's few blocks: what is left is less, and tells little of itself.
-        free = max(blocks - 2.0 - bends, 1.0)
-        scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(free, len(part)))[:, None]
-        factors = scale * draw.standard_normal((len(part), len(edges)))
-        slopes, residual = fit.slopes(t), y - fit.at(t)
+        dof = max(blocks - 2.0 - bends, 1.0)
+        scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(dof, len(repeats)))[:, None]
+        factors = scale * draw.standard_normal((len(repeats), len(edges)))
+        slopes, residual = fit.slopes(t), y - fit.ratio(t)
         numbers = series.free_numbers(fit, slopes, residual, bends=bends)
         moves = np.linalg.pinv(slopes[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
-        by_blocks = np.add.reduceat(moves * residual, edges)
-        zero_t, zero_n = (each[part] for each in zero)
-        draws.append(fit.meets + factors @ by_blocks + zero_t * (moves @ (1.0 / n)) - zero_n * (moves @ (y / n)))
+        block_moves = np.add.reduceat(moves * residual, edges)
+        zero_t, zero_n = (errors[repeats] for errors in zero)
+        draws.append(fit.meets + factors @ block_moves + zero_t * (moves @ (1.0 / n)) - zero_n * (moves @ (y / n)))
     return np.concatenate(draws)
 
 
@@ -111,9 +111,9 @@ def slide_onset_draws(
     it was as fast as that when its speed was first known, it may have begun to slide at any instant before.
     """
     slow = np.flatnonzero(~np.isfinite(speed))
-    first = int(slow[-1]) + 1 if len(slow) else 0
-    if len(speed) - first < 2:
+    start = int(slow[-1]) + 1 if len(slow) else 0
+    if len(speed) - start < 2:
         return None
-    least = np.minimum.accumulate(speed[first:][::-1])[::-1]  # the least speed from each instant on
-    onsets = np.interp(least_speed - noise, least, time[first:])
-    return np.where(least_speed - noise < least[0], draw.uniform(time[0], time[first], len(least_speed)), onsets)
+    least = np.minimum.accumulate(speed[start:][::-1])[::-1]  # the least speed from each instant on
+    onsets = np.interp(least_speed - noise, least, time[start:])
+    return np.where(least_speed - noise < least[0], draw.uniform(time[0], time[start], len(least_speed)), onsets)

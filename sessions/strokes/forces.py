@@ -24,19 +24,19 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are
     carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them.
     """
-    bent = float(np.tan(np.pi * cut_off / rate))
-    whole = 1.0 + np.sqrt(2.0) * bent + bent * bent
-    gain = bent * bent / whole
-    back, further = 2.0 * (bent * bent - 1.0) / whole, (1.0 - np.sqrt(2.0) * bent + bent * bent) / whole
-    sections = np.array([[gain, 2.0 * gain, gain, 1.0, back, further]])
+    warped = float(np.tan(np.pi * cut_off / rate))
+    denominator = 1.0 + np.sqrt(2.0) * warped + warped * warped
+    gain = warped * warped / denominator
+    a1, a2 = 2.0 * (warped * warped - 1.0) / denominator, (1.0 - np.sqrt(2.0) * warped + warped * warped) / denominator
+    sections = np.array([[gain, 2.0 * gain, gain, 1.0, a1, a2]])
     kernel = _compiled_filter()
     if kernel is None:
         from scipy import signal
 
         return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
-    first, last = 2.0 * values[:1] - values[padding:0:-1], 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
-    rows = np.ascontiguousarray(np.concatenate([first, values, last]).T)  # (k, n + 2 padding), filtered in place
-    state = np.array([1.0 - gain, gain - further])  # what the filter holds of a value that never changed
+    lead, trail = 2.0 * values[:1] - values[padding:0:-1], 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
+    rows = np.ascontiguousarray(np.concatenate([lead, values, trail]).T)  # (k, n + 2 padding), filtered in place
+    state = np.array([1.0 - gain, gain - a2])  # what the filter holds of a value that never changed
     for _ in range(2):
         kernel(sections, rows, (rows[:, :1] * state)[:, None, :])
         rows = np.ascontiguousarray(rows[:, ::-1])
@@ -67,15 +67,15 @@ def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:
     firsts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     lasts = np.append(firsts[1:], len(values)) - 1
     level = values[firsts]
-    top = 1 + np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:]))
-    places = (firsts[top] + lasts[top]) // 2
+    tops = 1 + np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:]))
+    positions = (firsts[tops] + lasts[tops]) // 2
 
-    def base(side: Array, peak: float) -> float:
-        higher = np.flatnonzero(side > peak)
-        return float(side[: higher[0] if len(higher) else None].min())
+    def base(neighbours: Array, peak: float) -> float:
+        higher = np.flatnonzero(neighbours > peak)
+        return float(neighbours[: higher[0] if len(higher) else None].min())
 
-    bases = [max(base(values[at::way], float(values[at])) for way in (-1, 1)) for at in places.tolist()]
-    return places, values[places] - np.array(bases)
+    bases = [max(base(values[top::step], float(values[top])) for step in (-1, 1)) for top in positions.tolist()]
+    return positions, values[positions] - np.array(bases)
 
 
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -144,8 +144,8 @@ def level(wrench: Array, lean: tuple[float, float]) -> Array:
     angle = float(np.hypot(x, y))
     axis = np.array([y, -x, 0.0]) / angle  # turns the normal back to z
     skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    turn = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
-    return np.hstack([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T])
+    rotation = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
+    return np.hstack([wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T])
 
 
 def normal_force(wrench: Array, frame: Frame) -> Array:

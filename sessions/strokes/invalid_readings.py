@@ -22,44 +22,39 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
             continue
         noise = NORMAL_STEP * float(np.median(steps))
         floor = max(settings.wild_noise * noise, settings.wild_coarse * float(changes.min()))
-        spikes_found = [
-            (at, w)
-            for w in range(1, settings.wild_widest + 1)
-            for at in _candidates(np.diff(column), w, floor, settings).tolist()
+        candidates = [
+            (start, width)
+            for width in range(1, settings.wild_widest + 1)
+            for start in _candidates(np.diff(column), width, floor, settings).tolist()
         ]
-        alike = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
-        for at, width in spikes_found:
-            alike[at : at + width] = True
-        for at, width in spikes_found:
-            if not marks[at : at + width, axis].any() and _stands_out(column, alike, at, width, settings):
-                marks[at : at + width, axis] = True
+        suspect = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
+        for start, width in candidates:
+            suspect[start : start + width] = True
+        for start, width in candidates:
+            if not marks[start : start + width, axis].any() and _stands_out(column, suspect, start, width, settings):
+                marks[start : start + width, axis] = True
     return marks
 
 
 def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> Indices:
     """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
-    there, back = steps[:-width], steps[width:]
-    places = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
-    return places[(places >= settings.wild_neighbours) & (places + width + settings.wild_neighbours <= len(steps) + 1)]
+    jump, return_jump = steps[:-width], steps[width:]
+    starts = np.flatnonzero((np.minimum(np.abs(jump), np.abs(return_jump)) > floor) & (jump * return_jump < 0.0)) + 1
+    return starts[(starts >= settings.wild_neighbours) & (starts + width + settings.wild_neighbours <= len(steps) + 1)]
 
 
-def _stands_out(column: Array, alike: Mask, at: int, width: int, settings: SignalSettings) -> bool:
-    """Say whether readings stand out by far more than any step around them between readings that are not `alike`."""
-    before = _sound(column, alike, range(at - 1, max(-1, at - 1 - settings.wild_around), -1))
-    after = _sound(column, alike, range(at + width, min(len(column), at + width + settings.wild_around)))
-    usual = np.abs(np.concatenate([np.diff(before), np.diff(after)]))
-    if len(usual) < settings.wild_fewest or min(len(before), len(after)) < settings.wild_neighbours:
+def _stands_out(column: Array, suspect: Mask, start: int, width: int, settings: SignalSettings) -> bool:
+    """Say whether readings stand out by far more than any step around them between readings that are not `suspect`."""
+    around, stop = settings.wild_around, start + width
+    stretches = (slice(max(start - around, 0), start), slice(stop, stop + around))
+    earlier, later = (column[stretch][~suspect[stretch]] for stretch in stretches)
+    usual = np.abs(np.concatenate([np.diff(earlier), np.diff(later)]))
+    if len(usual) < settings.wild_fewest or min(len(earlier), len(later)) < settings.wild_neighbours:
         return False
-    neighbours = np.concatenate([before[: settings.wild_neighbours], after[: settings.wild_neighbours]])
-    inside = column[at : at + width]
+    neighbours = np.concatenate([earlier[-settings.wild_neighbours :], later[: settings.wild_neighbours]])
+    inside = column[start:stop]
     height = max(float(inside.min() - neighbours.max()), float(neighbours.min() - inside.max()))
     return height > settings.wild_steps * float(usual.max())
-
-
-def _sound(column: Array, alike: Mask, places: range) -> Array:
-    """Return the readings at places, in their order, without those that are `alike`."""
-    positions = np.array(places, np.int64)
-    return column[positions[~alike[positions]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,23 +74,23 @@ def constant_runs(time: Array, raw: Array, skip: Mask, settings: SignalSettings)
     A run counts where it is long against the runs that its axis shows elsewhere, so that coarse steps are no fault.
     Readings to `skip` (n,) are no axis' greatest or least value.
     """
-    return tuple(run for axis in range(raw.shape[1]) for run in _of_axis(axis, time, raw, skip, settings))
+    return tuple(run for axis in range(raw.shape[1]) for run in _axis_runs(axis, time, raw, skip, settings))
 
 
-def at_the_same_value(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
+def constant_readings(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
     """Mark the readings (n,) of frozen runs; or, `clipped`, all those at a value at which an axis was clipped."""
     marks = np.zeros(len(raw), np.bool_)
-    for one in runs:
-        if one.clipped != clipped:
+    for run in runs:
+        if run.clipped != clipped:
             continue
         if clipped:
-            marks |= raw[:, one.axis] == one.value
+            marks |= raw[:, run.axis] == run.value
         else:
-            marks[one.first + 1 : one.last + 1] = True
+            marks[run.first + 1 : run.last + 1] = True
     return marks
 
 
-def _of_axis(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalSettings) -> list[ConstantRun]:
+def _axis_runs(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalSettings) -> list[ConstantRun]:
     column = raw[:, axis]
     firsts = np.flatnonzero(np.concatenate([[True], np.diff(column) != 0.0]))
     lasts = np.concatenate([firsts[1:], [len(column)]]) - 1
@@ -106,22 +101,22 @@ def _of_axis(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalSet
     if not len(candidates) or len(firsts) == 1:
         return []
     sound = column[~skip]
-    ends = (float(sound.min()), float(sound.max())) if len(sound) else ()
-    constant: list[ConstantRun] = []
+    extremes = (float(sound.min()), float(sound.max())) if len(sound) else ()
+    results: list[ConstantRun] = []
     for value in np.unique(column[firsts[candidates]]).tolist():
         runs = candidates[column[firsts[candidates]] == value]
-        spans = [(int(firsts[at]), int(lasts[at])) for at in runs]
+        spans = [(int(firsts[run]), int(lasts[run])) for run in runs]
         live = np.array([_others_move(axis, time, raw, span, settings) for span in spans])
         if durations[runs[live]].sum() <= durations[runs].sum() / 2.0:  # what the axis reads where nothing presses
             continue
-        for at in runs[live].tolist():
-            clipped = value in ends
-            frozen = lengths[at] > settings.frozen_readings and durations[at] >= settings.frozen_shortest
-            elsewhere = lengths[~np.isin(column[firsts], ends)] if clipped else lengths[2 * lengths < lengths[at]]
-            long = lengths[at] > settings.long_run * (_usual(elsewhere) - 1.0)
-            if (clipped or frozen) and long and _jumps(column, int(firsts[at]), int(lasts[at]), settings):
-                constant.append(ConstantRun(axis, clipped, int(firsts[at]), int(lasts[at]), value))
-    return constant
+        for run in runs[live].tolist():
+            clipped = value in extremes
+            frozen = lengths[run] > settings.frozen_readings and durations[run] >= settings.frozen_shortest
+            elsewhere = lengths[~np.isin(column[firsts], extremes)] if clipped else lengths[2 * lengths < lengths[run]]
+            long = lengths[run] > settings.long_run * (_usual(elsewhere) - 1.0)
+            if (clipped or frozen) and long and _jumps(column, int(firsts[run]), int(lasts[run]), settings):
+                results.append(ConstantRun(axis, clipped, int(firsts[run]), int(lasts[run]), value))
+    return results
 
 
 def _usual(lengths: Indices) -> float:
@@ -136,46 +131,46 @@ def _jumps(column: Array, first: int, last: int, settings: SignalSettings) -> bo
     """Say whether a run begins or ends by more than a few of its axis' least steps: a slow turn does neither."""
     steps = np.abs(np.diff(column))
     least = float(steps[steps > 0.0].min())
-    ends = [float(steps[at]) for at in (first - 1, last) if 0 <= at < len(steps)]
-    return max(ends, default=0.0) > settings.flat_jump * least
+    edges = [float(steps[step]) for step in (first - 1, last) if 0 <= step < len(steps)]
+    return max(edges, default=0.0) > settings.flat_jump * least
 
 
 def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], settings: SignalSettings) -> bool:
     """Say whether other axes live during a run, and some of them moves by more than its noise around it."""
-    first, last = run
+    start, stop = run
     other_axes = np.delete(raw, axis, axis=1)
-    alive = (np.diff(other_axes[first : last + 1], axis=0) != 0.0).any(axis=1)
+    alive = (np.diff(other_axes[start : stop + 1], axis=0) != 0.0).any(axis=1)
     if alive.mean() < 0.5:
         return False
-    margin = max(0.0, settings.flat_around - (time[last] - time[first])) / 2.0
-    window = other_axes[(time >= time[first] - margin) & (time <= time[last] + margin)]
+    margin = max(0.0, settings.flat_around - (time[stop] - time[start])) / 2.0
+    window = other_axes[(time >= time[start] - margin) & (time <= time[stop] + margin)]
     steps = np.abs(np.diff(window, axis=0))
     noise = NORMAL_STEP * np.median(steps, axis=0)
-    least = np.array([float(each[each > 0.0].min(initial=np.inf)) for each in steps.T])
+    least = np.array([float(column[column > 0.0].min(initial=np.inf)) for column in steps.T])
     return bool((window.std(axis=0) > np.maximum(settings.flat_moves * noise, least)).any())
 
 
 def repeated_readings(block: ReadingBlock, settings: SignalSettings) -> Mask:
     """Mark every repeat of the same six numbers in a run that neither noise nor a rest in coarse steps explains."""
-    jumps = _jumps_of_coarse(block.raw, settings)
-    same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
-    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    jumps = _coarse_jumps(block.raw, settings)
+    repeats = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(repeats.astype(np.int8)))
     frozen = np.zeros(len(block), np.bool_)
     rests: list[int] = []
-    for start, last in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
-        if last - start >= settings.frozen_readings and (
-            block.time[last] - block.time[start] >= settings.frozen_shortest
+    for start, stop in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
+        if stop - start >= settings.frozen_readings and (
+            block.time[stop] - block.time[start] >= settings.frozen_shortest
         ):
-            jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
-            ends = last == len(block) - 1
-            off = np.abs(block.raw[rests] - block.raw[start]) > settings.frozen_off * np.ptp(block.raw, axis=0)
+            jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[stop : stop + 1].any())
+            at_end = stop == len(block) - 1
+            displaced = np.abs(block.raw[rests] - block.raw[start]) > settings.frozen_off * np.ptp(block.raw, axis=0)
             # Where some axis lies far from where it lay in each rest before it is pressed, or was.
-            frozen[start + 1 : last + 1] = jumped or (ends and bool(rests) and bool(off.any(axis=1).all()))
-            rests += [] if frozen[last] else [start]
+            frozen[start + 1 : stop + 1] = jumped or (at_end and bool(rests) and bool(displaced.any(axis=1).all()))
+            rests += [] if frozen[stop] else [start]
     return frozen
 
 
-def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
+def _coarse_jumps(raw: Array, settings: SignalSettings) -> Mask:
     """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
 
     Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
@@ -183,10 +178,10 @@ def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
     """
     steps = np.abs(np.diff(raw, axis=0))
     changes = [column[column > 0.0] for column in steps.T]
-    non_empty = [each for each in changes if len(each)]
-    if not non_empty or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in non_empty):
+    non_empty = [column for column in changes if len(column)]
+    if not non_empty or any(np.median(column) > settings.coarse_steps * column.min() for column in non_empty):
         return np.zeros(0, np.bool_)
-    usual = np.array([float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
+    usual = np.array([float(np.percentile(column, 95)) if len(column) else np.inf for column in changes])
     return np.asarray((steps > settings.coarse_jump * usual).any(axis=1), np.bool_)
 
 

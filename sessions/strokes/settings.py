@@ -299,8 +299,8 @@ class BootstrapSettings:
         )
         if not presses:
             return bootstrap
-        rest = (lean[0] - settings.tilt[0], lean[1] - settings.tilt[1])
-        return replace(bootstrap, tilt=rest, tilt_origin=f"by {presses} presses")
+        remaining = (lean[0] - settings.tilt[0], lean[1] - settings.tilt[1])
+        return replace(bootstrap, tilt=remaining, tilt_origin=f"by {presses} presses")
 
     @property
     def kind(self) -> str:
@@ -315,7 +315,7 @@ class BootstrapSettings:
     @property
     def lean_sentence(self) -> str:
         """The tilt of the face that is not levelled, and its standard uncertainty, for people."""
-        x, y = (f"{a:.2g} ± {error:.2g}°" for a, error in zip(self.tilt, self.tilt_error, strict=True))
+        x, y = (f"{angle:.2g} ± {error:.2g}°" for angle, error in zip(self.tilt, self.tilt_error, strict=True))
         return f"{x} to +x and {y} to +y, {self.tilt_origin}"
 
     @property

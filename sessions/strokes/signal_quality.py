@@ -47,23 +47,23 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     steps = np.diff(block.time)
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if len(forward) else np.nan
-    beyond = invalid.saturated_readings(block, info)
-    wild_axes = invalid.spikes(block.raw, settings.signal) & ~beyond[:, None]
+    out_of_range = invalid.saturated_readings(block, info)
+    wild_axes = invalid.spikes(block.raw, settings.signal) & ~out_of_range[:, None]
     wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
     repeats = invalid.repeated_readings(block, settings.signal)
-    stuck = invalid.constant_runs(block.time, block.raw, wild | beyond, settings.signal)
-    frozen = repeats | invalid.at_the_same_value(block.raw, stuck, clipped=False)
-    saturated = beyond | invalid.at_the_same_value(block.raw, stuck, clipped=True)
+    constant = invalid.constant_runs(block.time, block.raw, wild | out_of_range, settings.signal)
+    frozen = repeats | invalid.constant_readings(block.raw, constant, clipped=False)
+    saturated = out_of_range | invalid.constant_readings(block.raw, constant, clipped=True)
     stalls = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalls)
     long = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
     # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
-    another = bool(long.mean() > settings.signal.uneven)
-    widest = float(np.percentile(forward, 98)) if another else step
+    other_rate = bool(long.mean() > settings.signal.uneven)
+    widest = float(np.percentile(forward, 98)) if other_rate else step
     breaks = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
     neighbours = steps[~breaks]
     spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
-    even = bool(not another and spread <= settings.signal.uneven * step)
+    even = bool(not other_rate and spread <= settings.signal.uneven * step)
     stretches = segments(good, breaks)
     dead = tuple(
         name
@@ -73,16 +73,16 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     gaps = np.diff(block.sequence) - 1
     losses = int(gaps[gaps > 0].sum())
     flaws = (
-        *_flaws_of_readings(block, losses, repeats, frozen, beyond, info.status, settings.signal.frozen_refused),
-        *_flaws_of_axes(stuck, wild_axes, dead, block.time),
-        *_flaws_of_time(step, even, int(stalls.sum())),
+        *_reading_flaws(block, losses, repeats, frozen, out_of_range, info.status, settings.signal.frozen_refused),
+        *_axis_flaws(constant, wild_axes, dead, block.time),
+        *_time_flaws(step, even, int(stalls.sum())),
     )
     return SignalQuality(
         1.0 / step if step > 0 else np.nan,
         even,
         good,
         saturated,
-        tuple(_gap(a, b, block.time, frozen, saturated, wild) for a, b in pairwise(stretches)),
+        tuple(_gap(*pair, block.time, frozen, saturated, wild) for pair in pairwise(stretches)),
         stretches,
         dead,
         flaws,
@@ -90,21 +90,21 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
 
 
 def segments(good: Mask, breaks: Mask) -> tuple[slice, ...]:
-    """Return the stretches of good readings (n,) within which `broken` (n - 1,) marks no step."""
+    """Return the stretches of good readings (n,) within which `breaks` (n - 1,) marks no step."""
     joints = good[1:] & good[:-1] & ~breaks
     starts = np.flatnonzero(good & ~np.concatenate([[False], joints]))
     stops = np.flatnonzero(good & ~np.concatenate([joints, [False]])) + 1
     return tuple(slice(start, stop) for start, stop in zip(starts.tolist(), stops.tolist(), strict=True))
 
 
-def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:
-    hole = slice(before.stop, after.start)
+def _gap(previous: slice, following: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:
+    between = slice(previous.stop, following.start)
     marks = ((frozen, FlawName.FROZEN), (saturated, FlawName.SATURATED), (wild, FlawName.WILD))
-    cause = next((name for mask, name in marks if mask[hole].any()), FlawName.LOST_READINGS)
-    return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
+    cause = next((name for mask, name in marks if mask[between].any()), FlawName.LOST_READINGS)
+    return Gap(float(time[previous.stop - 1]), float(time[following.start]), cause)
 
 
-def _flaws_of_readings(
+def _reading_flaws(
     block: ReadingBlock, losses: int, repeats: Mask, frozen: Mask, saturated: Mask, table: StatusTable, refusal: float
 ) -> Iterator[Flaw]:
     """Yield what is wrong with readings (n,) as a whole; from a share of frozen ones on all are refused."""
@@ -120,8 +120,8 @@ def _flaws_of_readings(
             f"{100 * float(repeats.mean()):.0f} % of the readings repeat the six numbers before them, first at "
             f"{block.time[repeats][0]:.2f} s: the sensor was frozen"
         )
-        rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
-        yield Flaw(FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful")
+        consequence = ", and nothing is analysed." if refused else " there, and these readings are left out."
+        yield Flaw(FlawName.FROZEN, sentence + consequence, "refused" if refused else "doubtful")
     elif refused:
         share = 100 * float(frozen.mean())
         sentence = f"One axis or another was frozen in {share:.0f} % of the readings: nothing is analysed."
@@ -144,30 +144,30 @@ def _flaws_of_readings(
         yield Flaw(FlawName.SATURATED, sentence, "doubtful")
 
 
-def _flaws_of_axes(
-    stuck: tuple[invalid.ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array
+def _axis_flaws(
+    constant: tuple[invalid.ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array
 ) -> Iterator[Flaw]:
     """Yield which axes stuck, by the first run that shows it, had wild readings (n, 6), or never moved."""
-    for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
-        runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
-        duration = sum(float(time[one.last] - time[one.first]) for one in runs)
-        what = (
+    for axis, clipped in dict.fromkeys((run.axis, run.clipped) for run in constant):
+        runs = [run for run in constant if (run.axis, run.clipped) == (axis, clipped)]
+        duration = sum(float(time[run.last] - time[run.first]) for run in runs)
+        detail = (
             "never goes beyond it: clipped. These readings are left out, and peaks that they may hide are not given."
             if clipped
             else "moves before or after: frozen there. These readings are left out."
         )
         sentence = (
             f"{AXES[axis]} keeps one value bit for bit while other axes move, for {significant(duration, 2)} s "
-            f"in all, first at {time[runs[0].first]:.2f} s, and {what}"
+            f"in all, first at {time[runs[0].first]:.2f} s, and {detail}"
         )
         yield Flaw(FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful")
     if wild.any():
-        at = wild.any(axis=1)
+        spikes = wild.any(axis=1)
         axes = ", ".join(name for name, mask in zip(AXES, wild.T, strict=True) if mask.any())
-        stand = "reading stands" if at.sum() == 1 else "readings stand"
+        phrase = "reading stands" if spikes.sum() == 1 else "readings stand"
         sentence = (
-            f"{at.sum()} {stand} far beyond everything around on {axes}, first at {time[at][0]:.3f} s: spikes, which "
-            "are left out before filtering."
+            f"{spikes.sum()} {phrase} far beyond everything around on {axes}, first at {time[spikes][0]:.3f} s: "
+            "spikes, which are left out before filtering."
         )
         yield Flaw(FlawName.WILD, sentence, "doubtful")
     if dead:
@@ -176,7 +176,7 @@ def _flaws_of_axes(
         yield Flaw(FlawName.DEAD, f"{', '.join(dead)} never changed: {cost}.", "refused" if force else "doubtful")
 
 
-def _flaws_of_time(step: float, even: bool, stall_count: int) -> Iterator[Flaw]:
+def _time_flaws(step: float, even: bool, stall_count: int) -> Iterator[Flaw]:
     if not step > 0.0:
         yield Flaw(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")
         return
@@ -195,11 +195,11 @@ def doubtful_readings(recording: "Recording") -> Iterator[str]:
     count = StatusCount(recording.info.status)
     for block in recording.blocks():
         count.take(block.status)
-    words = flagged_words(count.flagged)
+    causes = flagged_words(count.flagged)
     if faulty := count.verdicts["doubtful"]:
-        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device reported a fault: {words}"
+        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device reported a fault: {causes}"
     if saturated := count.verdicts["saturated"]:
-        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device reported: {words}"
+        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device reported: {causes}"
     if unsure := sum(event.data.get("off_units", 0) for event in recording.events if event.kind == "losses"):
         yield (
             f"{FlawName.RECORDING}: the last {unsure} readings of a stream are doubtful, the device was found to "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivers.arrays import Array, Indices, Mask
-from sessions.strokes.settings import AnalysisSettings, SteadySettings
+from sessions.strokes.settings import AnalysisSettings, Pair, SteadySettings
 from sessions.strokes.span import Span, Track, mean_vector
 from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName, significant
 
@@ -24,13 +24,13 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
     """
     rule = settings.steady
     shortest = max(rule.steady_share * readings, rule.steady_shortest * rate, rule.steady_readings)
-    first, last, variance, steady = _stretches(ratio, shortest, rule)
-    if not len(first):
+    starts, stops, variance, steady = _stretches(ratio, shortest, rule)
+    if not len(starts):
         return None
-    length = last - first
+    length = stops - starts
     if rule.steady_rule in ("middle half", "whole slide"):
-        most = int(np.argmax(length))
-        sliding = first[most] + np.flatnonzero(np.isfinite(ratio[first[most] : last[most]]))
+        longest = int(np.argmax(length))
+        sliding = starts[longest] + np.flatnonzero(np.isfinite(ratio[starts[longest] : stops[longest]]))
         aside = len(sliding) // 4 if rule.steady_rule == "middle half" else 0
         return slice(int(sliding[aside]), int(sliding[-1 - aside]) + 1)
     if not steady.any():
@@ -38,10 +38,10 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
     seed = max(rule.steady_seed * np.isfinite(ratio).sum(), shortest)
     best = _least(length, variance, steady, seed, len(ratio) / (rule.steady_edges - 1))
     if rule.steady_rule == "least variance":
-        return slice(int(first[best]), int(last[best]))
-    around = np.flatnonzero(steady & (first <= first[best]) & (last >= last[best]))
+        return slice(int(starts[best]), int(stops[best]))
+    around = np.flatnonzero(steady & (starts <= starts[best]) & (stops >= stops[best]))
     best = around[np.lexsort((variance[around], -length[around]))[0]]
-    return _trim(ratio, slice(int(first[best]), int(last[best])), settings)
+    return _trim(ratio, slice(int(starts[best]), int(stops[best])), settings)
 
 
 def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Indices, Indices, Array, Mask]:
@@ -49,24 +49,24 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Ind
     edges = np.unique(np.linspace(0, len(ratio), rule.steady_edges).round().astype(int))
     finite = np.isfinite(ratio)
     value = np.where(finite, ratio, 0.0)
-    count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (finite, value, value**2))
-    first, last = (edges[index] for index in np.triu_indices(len(edges), 1))
-    long_enough = last - first >= shortest
-    first, last = first[long_enough], last[long_enough]
-    n = count[last] - count[first]
-    full = n >= rule.steady_held * (last - first)
-    first, last, n = first[full], last[full], n[full]
-    mean = (total[last] - total[first]) / n
-    variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
-    scatter = np.where(n < _QUARTERS * rule.steady_readings, np.sqrt(_QUARTERS * variance / n), 0.0)
+    count, total, squares = (np.concatenate([[0.0], np.cumsum(terms)]) for terms in (finite, value, value**2))
+    starts, stops = (edges[index] for index in np.triu_indices(len(edges), 1))
+    long_enough = stops - starts >= shortest
+    starts, stops = starts[long_enough], stops[long_enough]
+    valid = count[stops] - count[starts]
+    full = valid >= rule.steady_held * (stops - starts)
+    starts, stops, valid = starts[full], stops[full], valid[full]
+    mean = (total[stops] - total[starts]) / valid
+    variance = np.maximum((squares[stops] - squares[starts]) / valid - mean**2, 0.0)
+    scatter = np.where(valid < _QUARTERS * rule.steady_readings, np.sqrt(_QUARTERS * variance / valid), 0.0)
     tolerance = rule.steady_trend * mean + 2.0 * scatter
     steady = np.sqrt(variance) < rule.steady_spread * mean
     for quarter in range(_QUARTERS):
-        a = first + (last - first) * quarter // _QUARTERS
-        b = first + (last - first) * (quarter + 1) // _QUARTERS
-        here = (total[b] - total[a]) / np.maximum(count[b] - count[a], 1.0)
-        steady &= np.abs(here - mean) <= tolerance
-    return first, last, variance, steady
+        quarter_start = starts + (stops - starts) * quarter // _QUARTERS
+        quarter_stop = starts + (stops - starts) * (quarter + 1) // _QUARTERS
+        readings = np.maximum(count[quarter_stop] - count[quarter_start], 1.0)
+        steady &= np.abs((total[quarter_stop] - total[quarter_start]) / readings - mean) <= tolerance
+    return starts, stops, variance, steady
 
 
 def _least(length: Indices, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
@@ -74,18 +74,18 @@ def _least(length: Indices, variance: Array, steady: Mask, shortest: float, grid
 
     Lengths within a step of the `grid` are alike.
     """
-    enough = length[steady & (length >= shortest)]
-    least = int(enough.min()) if len(enough) else int(length[steady].max())
-    alike = np.flatnonzero(steady & (length >= least) & (length <= least + grid))
-    return int(alike[np.argmin(variance[alike])])
+    long_enough = length[steady & (length >= shortest)]
+    least = int(long_enough.min()) if len(long_enough) else int(length[steady].max())
+    candidates = np.flatnonzero(steady & (length >= least) & (length <= least + grid))
+    return int(candidates[np.argmin(variance[candidates])])
 
 
 def _trim(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
     """Return the window without those ends that lie off its median; a mean over a quarter hides the end of a ramp."""
-    part = ratio[window]
-    level = float(np.nanmedian(part))
-    scatter = 1.4826 * float(np.nanmedian(np.abs(part - level)))
-    inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
+    ratios = ratio[window]
+    level = float(np.nanmedian(ratios))
+    scatter = 1.4826 * float(np.nanmedian(np.abs(ratios - level)))
+    inside = np.flatnonzero(np.abs(ratios - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
 
 
@@ -105,16 +105,16 @@ def movement(time: Array, position: Array, rate: float, settings: AnalysisSettin
     if len(blocks) < settings.filter.fewest_blocks:
         return None
     t = blocks[:, 0] - blocks[:, 0].mean()
-    position_off = blocks[:, 1:] - blocks[:, 1:].mean(axis=0)
+    deviations = blocks[:, 1:] - blocks[:, 1:].mean(axis=0)
     spread = float(t @ t)
-    slope = t @ position_off / spread
-    rest = position_off - t[:, None] * slope
+    slope = t @ deviations / spread
+    residuals = deviations - t[:, None] * slope
     speed = float(np.hypot(*slope))
     # Scatter along the path is what makes the speed uncertain.
     direction = slope / speed if speed > 0.0 else np.array([1.0, 0.0])
-    error = float(np.sqrt(((rest @ direction) ** 2).sum() / (len(blocks) - 2) / spread))
-    variance = float((position_off**2).sum())
-    explained = 1.0 - float((rest**2).sum()) / variance if variance > 0.0 else 0.0
+    error = float(np.sqrt(((residuals @ direction) ** 2).sum() / (len(blocks) - 2) / spread))
+    variance = float((deviations**2).sum())
+    explained = 1.0 - float((residuals**2).sum()) / variance if variance > 0.0 else 0.0
     return Movement((float(slope[0]), float(slope[1])), speed, error, explained)
 
 
@@ -136,33 +136,33 @@ def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array
 
 
 def slide(
-    findings: Findings, span: Span, track: Track, ends: tuple[float, float] | None = None, uncut: Track | None = None
+    findings: Findings, span: Span, track: Track, interval: Pair | None = None, uncut: Track | None = None
 ) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 
-    The window between `ends` [s, device clock] that a person decided is taken, with its flaws. Turns cut the stroke out
-    of `uncut`.
+    The window of an `interval` [s, device clock] that a person decided is taken, with its flaws. `uncut` is the contact
+    that turns cut the stroke out of.
     """
     window, settings = None, track.settings
-    if ends is not None:
-        window = _decided_window(track, ends)
+    if interval is not None:
+        window = _decided_window(track, interval)
     elif np.isfinite(track.speed).any():
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
     motion, trouble = _speed(span, track, window)
-    if trouble is not None and ends is None:  # the centre of pressure does not tell when the finger slides
+    if trouble is not None and interval is None:  # the centre of pressure does not tell when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         motion, trouble = _speed(span, track, window)
-    at_rest = _rest(span, track, track if uncut is None else uncut, window)
-    if window is not None and at_rest is not None and ends is not None:
-        sentence = f"{at_rest[1]} The window was decided by a person: its numbers are given."
-        findings.flaw(at_rest[0], sentence, "doubtful")
-        at_rest = None
-    if window is None or at_rest is not None:
-        name, sentence = at_rest or (
+    refusal = _refusal(span, track, track if uncut is None else uncut, window)
+    if window is not None and refusal is not None and interval is not None:
+        sentence = f"{refusal[1]} The window was decided by a person: its numbers are given."
+        findings.flaw(refusal[0], sentence, "doubtful")
+        refusal = None
+    if window is None or refusal is not None:
+        name, sentence = refusal or (
             (FlawName.NO_STEADY_SLIDING, "T/N holds steady over no long enough part of the stroke.")
-            if ends is None
+            if interval is None
             else (FlawName.DECISION, "The window that was decided holds too few readings with a T/N.")
         )
         forbidden = (*COEFFICIENTS, *SPEED, *DIRECTION, "normal_force", "tangential_force")
@@ -180,32 +180,32 @@ def slide(
     return window
 
 
-def _decided_window(track: Track, ends: tuple[float, float]) -> slice | None:
+def _decided_window(track: Track, instants: tuple[float, float]) -> slice | None:
     """Return the readings between two instants; None where too few of them have a ratio."""
-    start = int(np.searchsorted(track.time, ends[0] - _ROUNDING))
-    stop = int(np.searchsorted(track.time, ends[1] + _ROUNDING, "right"))
+    start = int(np.searchsorted(track.time, instants[0] - _ROUNDING))
+    stop = int(np.searchsorted(track.time, instants[1] + _ROUNDING, "right"))
     enough = np.isfinite(track.ratio[start:stop]).sum() >= track.settings.steady.steady_readings
     return slice(start, stop) if enough else None
 
 
-def _rest(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple[FlawName, str] | None:
+def _refusal(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple[FlawName, str] | None:
     """Say why nothing shows that the contact slides over a window, or None where it does."""
     if window is None:
         return None
     position, limits = track.position[window], track.settings.slide
-    way = displacement(position)
+    distance = displacement(position)
     step = span.torque_step / float(np.nanmean(track.normal[window]))
-    if np.isfinite(way):
-        where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
-        if where > limits.farthest:
+    if np.isfinite(distance):
+        radius = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
+        if radius > limits.farthest:
             return FlawName.UNITS_IMPLAUSIBLE, (
-                f"The centre of pressure lies {significant(where, 3)} mm from the axis, where no finger is: check the "
+                f"The centre of pressure lies {significant(radius, 3)} mm from the axis, where no finger is: check the "
                 "units of the torques and the face's height; nothing shows that the contact slides, so no "
                 "friction is given."
             )
-        if way > max(limits.shear, limits.shear_steps * step):
+        if distance > max(limits.shear, limits.shear_steps * step):
             return _roll_flaw(track, uncut, float(np.nanmean(track.ratio[window])))
-    moves = f"moves by {significant(way, 2)} mm" if np.isfinite(way) else "is not known"
+    moves = f"moves by {significant(distance, 2)} mm" if np.isfinite(distance) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
         "slides, and a ratio at rest is no coefficient of friction; torques in a wrong unit would look so too."
@@ -218,14 +218,14 @@ def _roll_flaw(track: Track, uncut: Track, level: float) -> tuple[FlawName, str]
     It counts over the `uncut` contact where T/N lies about its `level` while steady: nothing slips below that.
     """
     settings = track.settings
-    at_level = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
-    places = block_means(np.where(at_level[:, None], uncut.position, np.nan), track.rate, settings)
-    way = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
-    if way > settings.slide.roll:
+    slipping = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
+    positions = block_means(np.where(slipping[:, None], uncut.position, np.nan), track.rate, settings)
+    distance = float(np.hypot(*np.ptp(positions, axis=0))) if len(positions) else 0.0
+    if distance > settings.slide.roll:
         return None
     return FlawName.ROLLED, (
-        f"The centre of pressure moves by {way:.2g} mm while T/N holds, and a finger that rolls without slip moves it "
-        f"by up to {settings.slide.roll:g} mm: nothing shows a slide, so no friction is given; stroke further."
+        f"The centre of pressure moves by {distance:.2g} mm while T/N holds, and a finger that rolls without slip "
+        f"moves it by up to {settings.slide.roll:g} mm: nothing shows a slide, so no friction is given; stroke further."
     )
 
 
@@ -239,15 +239,15 @@ def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | N
     if motion is None:
         return None, (name, "The centre of pressure is known at too few instants of the steady window for a speed.")
     step = span.torque_step / float(np.nanmean(track.normal[window]))
-    why = ""
+    reason = ""
     if step > limits.speed_step * (motion.speed * float(time[-1] - time[0])):
-        why = f"The torques come in steps that move the centre of pressure by {step:.2g} mm"
+        reason = f"The torques come in steps that move the centre of pressure by {step:.2g} mm"
     elif motion.error > limits.speed_error * motion.speed:
-        why = f"The centre of pressure moves at {significant(motion.speed, 2)} ± {significant(motion.error, 2)} mm/s"
+        reason = f"The centre of pressure moves at {significant(motion.speed, 2)} ± {significant(motion.error, 2)} mm/s"
     elif motion.explained < limits.speed_line:
-        why = f"A straight line explains {100 * motion.explained:.0f} % of the centre of pressure's movement"
-    if why:
-        return motion, (name, f"{why}: no speed is given.")
+        reason = f"A straight line explains {100 * motion.explained:.0f} % of the centre of pressure's movement"
+    if reason:
+        return motion, (name, f"{reason}: no speed is given.")
     if span.frame.height_origin == "default":
         arm = -track.wrench[window, :2] / track.normal[window, None]
         lever = movement(time, arm, track.rate, settings)
@@ -265,9 +265,9 @@ def _slide_onset(findings: Findings, track: Track, motion: Movement) -> None:
     """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
     start = int(np.searchsorted(track.time, float(findings.numbers["steady"][0])))
     slow = ~(track.speed[: start + 1] >= track.settings.slide.slide_share * motion.speed)
-    first = int(np.flatnonzero(slow)[-1]) + 1 if slow.any() else 0
-    if first <= start:
-        findings.numbers["slide_onset"] = float(track.time[first])
+    onset = int(np.flatnonzero(slow)[-1]) + 1 if slow.any() else 0
+    if onset <= start:
+        findings.numbers["slide_onset"] = float(track.time[onset])
 
 
 def _side_load(findings: Findings, track: Track, window: slice, motion: Movement) -> None:
@@ -287,20 +287,20 @@ def _side_load(findings: Findings, track: Track, window: slice, motion: Movement
 def _direction(findings: Findings, track: Track, window: slice, motion: Movement | None) -> None:
     """Give the direction along x: from the movement, else from the drag, which points the way the finger moves."""
     drag, share = mean_vector(track.wrench[window, :2]), track.settings.slide.along_share
-    by_drag = int(np.sign(drag[0])) if abs(drag[0]) >= share * np.hypot(*drag) else None
-    by_movement = None
+    drag_sign = int(np.sign(drag[0])) if abs(drag[0]) >= share * np.hypot(*drag) else None
+    movement_sign = None
     if motion is not None and abs(motion.along[0]) >= share * motion.speed:
-        by_movement = int(np.sign(motion.along[0]))
-    if by_movement is not None and by_drag is not None and by_movement != by_drag:
+        movement_sign = int(np.sign(motion.along[0]))
+    if movement_sign is not None and drag_sign is not None and movement_sign != drag_sign:
         sentence = (
             "The centre of pressure moved one way and the drag points the other: the frame, its normal or its height "
             "is wrong, so neither speed nor direction is given."
         )
         findings.flaw(FlawName.DIRECTION_DISAGREES, sentence, "doubtful", (*SPEED, *DIRECTION))
         return
-    way = drag if motion is None else np.array(motion.along)
-    findings.numbers["heading"] = float(np.degrees(np.arctan2(way[1], way[0])))
-    if by_movement is not None:
-        findings.numbers |= {"direction": by_movement, "direction_from": "centre of pressure"}
-    elif by_drag is not None:
-        findings.numbers |= {"direction": by_drag, "direction_from": "tangential force"}
+    heading = drag if motion is None else np.array(motion.along)
+    findings.numbers["heading"] = float(np.degrees(np.arctan2(heading[1], heading[0])))
+    if movement_sign is not None:
+        findings.numbers |= {"direction": movement_sign, "direction_from": "centre of pressure"}
+    elif drag_sign is not None:
+        findings.numbers |= {"direction": drag_sign, "direction_from": "tangential force"}

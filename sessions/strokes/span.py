@@ -26,7 +26,7 @@ class Zero:
     error: Array  # (6,) standard errors of `level` [N, N mm]
 
     @property
-    def when(self) -> str:
+    def period(self) -> str:
         """The stretch, for people."""
         return f"{self.start:.3f} to {self.stop:.3f} s"
 
@@ -39,21 +39,21 @@ class QuietWindows:
     wrench: Array  # (n, 6) of all readings, face frame, not zeroed [N, N mm]
     bounds: Indices  # (k, 2) first and past-last reading
 
-    def before(self, instant: float, longest: float) -> Zero | None:
+    def zero_before(self, instant: float, longest: float) -> Zero | None:
         """Return the zero of the last quiet windows that end by `instant` [s], over at most `longest` [s]."""
         earlier = self.bounds[self.time[self.bounds[:, 1] - 1] < instant]
-        return self._over(earlier[::-1], longest) if len(earlier) else None
+        return self._merge(earlier[::-1], longest) if len(earlier) else None
 
-    def after(self, instant: float, longest: float) -> Zero | None:
+    def zero_after(self, instant: float, longest: float) -> Zero | None:
         """Return the zero of the first quiet windows that start after `instant` [s], over at most `longest` [s]."""
         later = self.bounds[self.time[self.bounds[:, 0]] > instant]
-        return self._over(later, longest) if len(later) else None
+        return self._merge(later, longest) if len(later) else None
 
-    def _over(self, windows: Indices, longest: float) -> Zero:
+    def _merge(self, windows: Indices, longest: float) -> Zero:
         start, stop = windows[0]
-        for first, last in windows[1:]:
-            low, high = min(start, first), max(stop, last)
-            overlap = first <= stop and last >= start
+        for next_start, next_stop in windows[1:]:
+            low, high = min(start, next_start), max(stop, next_stop)
+            overlap = next_start <= stop and next_stop >= start
             if not overlap or self.time[high - 1] - self.time[low] > longest:
                 break
             start, stop = low, high
@@ -106,7 +106,7 @@ class Span:
     filtered: str  # what the filter did
     windows: QuietWindows
     quality: SignalQuality
-    saturated_at: Array  # times of readings left out because they were saturated [s]
+    saturation_times: Array  # times of readings left out because they were saturated [s]
     torque_step: float  # least step of a torque [N mm]; 0 where it is too fine to matter
     frame: Frame  # of the face, in which the wrench is
     settings: AnalysisSettings
@@ -119,8 +119,8 @@ def span_of(
     good = sound.good
     time = block.time[good]
     wrench = level(in_face_frame(calibration.wrench(block.raw[good], np.zeros(6)), frame), settings.tilt)
-    place = np.concatenate([[0], np.cumsum(good)])
-    segments = [slice(int(place[s.start]), int(place[s.stop])) for s in sound.segments]
+    positions = np.concatenate([[0], np.cumsum(good)])
+    segments = [slice(int(positions[segment.start]), int(positions[segment.stop])) for segment in sound.segments]
     smoother = Filter(settings.filter.cut_off, settings.filter.shortest_segment)
     if not sound.even:
         smooth, filtered = wrench, "not filtered: the time steps are uneven"
@@ -145,9 +145,10 @@ def span_of(
 
 def _least_step(torques: Array) -> float:
     """Return the least step between different readings of a torque, if steps are few enough to be seen."""
-    levels = [np.unique(column) for column in torques.T]
+    columns = (np.unique(column) for column in torques.T)
     # Where most values come more than once the steps are the sensor's own.
-    return max((float(np.median(np.diff(each))) for each in levels if 1 < len(each) < len(torques) / 2), default=0.0)
+    levels = (column for column in columns if 1 < len(column) < len(torques) / 2)
+    return max((float(np.median(np.diff(column))) for column in levels), default=0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,8 +169,8 @@ class StrokeZero:
 def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
     """Return a stroke's zero from unloaded stretches around it, if any; nothing presses where `idle` (n,) is set."""
     onset, lift, longest = contact.onset, contact.lift, span.settings.zero.zero_stretch
-    before = None if onset is None else span.windows.before(onset, longest)
-    after = None if lift is None else span.windows.after(lift, longest)
+    before = None if onset is None else span.windows.zero_before(onset, longest)
+    after = None if lift is None else span.windows.zero_after(lift, longest)
     zero = before or after
     if zero is None:
         return None
@@ -181,30 +182,30 @@ def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
         level = before.level + drift / 2.0
         noise = before.error**2 + after.error**2
         error = np.sqrt(noise / 4.0 + np.maximum(drift**2 - noise, 0.0) / 12.0)
-        origin = f"half-way from unloaded before contact, {before.when}, to after it, {after.when}"
+        origin = f"half-way from unloaded before contact, {before.period}, to after it, {after.period}"
     elif before is not None:
-        origin = f"unloaded before contact, {before.when}"
+        origin = f"unloaded before contact, {before.period}"
     else:
-        origin, flaw = f"unloaded after contact, {zero.when}", FlawName.ZERO_AFTER_CONTACT
+        origin, flaw = f"unloaded after contact, {zero.period}", FlawName.ZERO_AFTER_CONTACT
     unsure = _unsure(span, contact, idle, level, drift)
-    part = span.smooth[(span.time >= zero.start) & (span.time <= zero.stop), :3]
-    part = part[np.isfinite(part).all(axis=1)]
-    filtered = part.std(axis=0) if len(part) > 1 else zero.noise[:3]
+    unloaded = span.smooth[(span.time >= zero.start) & (span.time <= zero.stop), :3]
+    unloaded = unloaded[np.isfinite(unloaded).all(axis=1)]
+    filtered = unloaded.std(axis=0) if len(unloaded) > 1 else zero.noise[:3]
     return StrokeZero(level, zero.noise, filtered, zero.stop - zero.start, error, origin, drift, unsure, flaw)
 
 
 def _unsure(span: Span, contact: Contact, idle: Mask, level: Array, drift: Array | None) -> tuple[float, float]:
     """Return how far from a zero the forces lie near a contact where nothing presses, and in the valleys beside it."""
     first, last, around = span.time[contact.start], span.time[contact.stop - 1], span.settings.zero.near
-    near = idle & (span.time >= first - around) & (span.time <= last + around)
-    near[list(contact.valleys)] = True
-    away = span.smooth[near, :3] - level[:3]
-    away = away[np.isfinite(away).all(axis=1)]
-    offsets = [(float(np.hypot(*drift[:2])), abs(float(drift[2])))] if drift is not None else []
-    if len(away):
-        sideways = np.hypot(away[:, 0], away[:, 1])
-        offsets.append((float(np.percentile(sideways, 90)), float(np.percentile(np.abs(away[:, 2]), 90))))
-    return max((s for s, _ in offsets), default=0.0), max((n for _, n in offsets), default=0.0)
+    nearby = idle & (span.time >= first - around) & (span.time <= last + around)
+    nearby[list(contact.valleys)] = True
+    forces = span.smooth[nearby, :3] - level[:3]
+    forces = forces[np.isfinite(forces).all(axis=1)]
+    sideways, normal = (0.0, 0.0) if drift is None else (float(np.hypot(*drift[:2])), abs(float(drift[2])))
+    if len(forces):
+        sideways = max(sideways, float(np.percentile(np.hypot(forces[:, 0], forces[:, 1]), 90)))
+        normal = max(normal, float(np.percentile(np.abs(forces[:, 2]), 90)))
+    return sideways, normal
 
 
 def recorded_zero(span: Span, *, is_stated: bool) -> StrokeZero:
@@ -234,8 +235,8 @@ class Track:
 
 def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
     """Return the readings of a contact, zeroed, with what follows from them."""
-    part = slice(contact.start, contact.stop)
-    wrench = span.smooth[part] - zero.level
+    stretch = slice(contact.start, contact.stop)
+    wrench = span.smooth[stretch] - zero.level
     normal = -wrench[:, 2]
     peak = float(np.nanmax(normal, initial=0.0))
     limits = span.settings.ratio
@@ -245,8 +246,8 @@ def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
     position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, span.frame.height), np.nan)
     if any(name.startswith("T") for name in span.quality.dead):
         position = np.full_like(position, np.nan)
-    speed = _speed(span.time[part], position, span)
-    columns = (span.time[part], wrench, normal, tangential, ratio, position, speed)
+    speed = _speed(span.time[stretch], position, span)
+    columns = (span.time[stretch], wrench, normal, tangential, ratio, position, speed)
     return Track(*columns, floor, span.rate, span.settings)
 
 
@@ -262,20 +263,20 @@ def _speed(time: Array, position: Array, span: Span) -> Array:
     limits = span.settings
     smoother = Filter(limits.filter.speed_cut_off, limits.filter.shortest_segment)
     breaks = ~(np.diff(time) < limits.signal.missing_step / span.rate)
-    for part in segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), breaks):
-        path = position[part]
+    for stretch in segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), breaks):
+        path = position[stretch]
         if len(path) < 3:
             continue
         if span.quality.even and smoother.fits(span.rate):
             path = smoother.apply(path, span.rate, [slice(0, len(path))])
-        velocity = np.gradient(path, time[part], axis=0)
-        speed[part] = np.hypot(velocity[:, 0], velocity[:, 1])
+        velocity = np.gradient(path, time[stretch], axis=0)
+        speed[stretch] = np.hypot(velocity[:, 0], velocity[:, 1])
     return speed
 
 
-def unfiltered_forces(span: Span, part: slice, zero: StrokeZero) -> tuple[Array, Array]:
+def unfiltered_forces(span: Span, stretch: slice, zero: StrokeZero) -> tuple[Array, Array]:
     """Return the tangential and the normal force (n,) [N] of a part, zeroed and unfiltered."""
-    wrench = span.wrench[part] - zero.level
+    wrench = span.wrench[stretch] - zero.level
     return np.hypot(wrench[:, 0], wrench[:, 1]), -wrench[:, 2]
 
 
@@ -288,14 +289,14 @@ def noise_of_ratio(zero: StrokeZero, level: float, normal: float) -> float:
 def curve_of(span: Span, contact: Contact, zero: StrokeZero, crest_gap: float | None = None) -> StrokeCurve:
     """Return the stroke's course with some time around it.
 
-    `missed` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
+    `crest_gap` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
     """
     around = span.settings.contact
-    first = int(np.searchsorted(span.time, float(span.time[contact.start]) - around.curve_before))
-    last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + around.curve_after))
-    track = track_of(span, Contact(first, last, None, None), zero)
+    start = int(np.searchsorted(span.time, float(span.time[contact.start]) - around.curve_before))
+    stop = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + around.curve_after))
+    track = track_of(span, Contact(start, stop, None, None), zero)
     force = track.wrench[:, :2]
-    drag, unfiltered = unfiltered_forces(span, slice(first, last), zero)
+    drag, unfiltered = unfiltered_forces(span, slice(start, stop), zero)
     columns = (track.time, track.normal, unfiltered, track.tangential, force, track.ratio, track.position, track.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
     curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)

@@ -28,23 +28,23 @@ class Climb(NamedTuple):
     rise: float  # from rest to level [-]
     peak: float  # above the level [-]
 
-    def at(self, time: Array) -> Array:
+    def ratio(self, time: Array) -> Array:
         """Return T/N (n,) [-] as fitted at `time` (n,) [s]."""
-        return self.rest + _parts(self, time) @ np.array([self.rise, self.peak])
+        return self.rest + _progress_and_peak(self, time) @ np.array([self.rise, self.peak])
 
     def slopes(self, time: Array) -> Array:
         """Return how T/N changes with each of the seven numbers (n, 7) at `time` (n,) [s], 0 if it has none."""
-        lasts = self.meets - self.begins
-        rest = np.clip((self.meets - time) / lasts, 0.0, 1.0)
-        inside = (rest > 0.0) & (rest < 1.0)
-        by_left, by_bend = np.zeros_like(time), np.zeros_like(time)
-        by_left[inside] = -self.bend * rest[inside] ** (self.bend - 1.0) / lasts
-        by_bend[inside] = -(rest[inside] ** self.bend) * np.log(rest[inside])
-        progress, above = _parts(self, time).T
+        duration = self.meets - self.begins
+        remaining = np.clip((self.meets - time) / duration, 0.0, 1.0)
+        inside = (remaining > 0.0) & (remaining < 1.0)
+        remaining_slope, bend_slope = np.zeros_like(time), np.zeros_like(time)
+        remaining_slope[inside] = -self.bend * remaining[inside] ** (self.bend - 1.0) / duration
+        bend_slope[inside] = -(remaining[inside] ** self.bend) * np.log(remaining[inside])
+        progress, above = _progress_and_peak(self, time).T
         share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _peak_decay(self, time)
         columns = np.zeros((len(time), 7))
-        columns[:, 0], columns[:, 1] = share * by_left * rest, share * by_left * (1.0 - rest)
-        columns[:, 2] = share * by_bend
+        columns[:, 0], columns[:, 1] = share * remaining_slope * remaining, share * remaining_slope * (1.0 - remaining)
+        columns[:, 2] = share * bend_slope
         if self.fall > 0.0:
             late = np.maximum(time - self.meets, 0.0)
             columns[:, 1] += self.peak * above / self.fall * (late > 0.0)
@@ -60,8 +60,8 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     where a static peak was found. A climb explains most of what a level alone leaves, and rises by `stick_rise` of it.
     """
     finite = np.isfinite(ratio)
-    most = settings.climb.climb_most
-    readings = ClimbReadings(thin(time[finite], most), thin(ratio[finite], most), settings.climb)
+    limit = settings.climb.climb_most
+    readings = ClimbReadings(thin(time[finite], limit), thin(ratio[finite], limit), settings.climb)
     climb = readings.fit(settings.filter.block, peaked=peaked)
     if climb is None or climb.rise + climb.peak < settings.ratio.stick_rise * (climb.rest + climb.rise):
         return None
@@ -69,9 +69,9 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     return climb.meets if fits and climb.rest + climb.rise > 0.0 else None
 
 
-def thin(column: Array, most: int) -> Array:
-    """Return readings, or where there are more than `most` of them, means of as many neighbours each."""
-    edges = np.arange(0, len(column), -(-len(column) // most))
+def thin(column: Array, limit: int) -> Array:
+    """Return readings, or where there are more than `limit` of them, means of as many neighbours each."""
+    edges = np.arange(0, len(column), -(-len(column) // limit))
     return np.add.reduceat(column, edges) / np.diff(np.append(edges, len(column))) if len(column) else column
 
 
@@ -90,29 +90,30 @@ class ClimbReadings:
         """
         if len(self.time) < 2 * self.settings.climb_fewest + 1:
             return None
-        ends = self._straight()
+        interval = self._straight()
         falls = self.settings.climb_falls if peaked else (0.0,)
-        straight = min((self.refine(self._guess(ends, 1.0, fall)) for fall in falls), key=self.mean_square)
-        guesses = [self._guess(ends, bend, straight.fall) for bend in self.settings.climb_bends]
+        straight = min((self.refine(self._guess(interval, 1.0, fall)) for fall in falls), key=self.mean_square)
+        guesses = [self._guess(interval, bend, straight.fall) for bend in self.settings.climb_bends]
         bent = min((self.refine(guess, bends=True) for guess in guesses), key=self.mean_square)
-        free = max((float(self.time[-1]) - float(self.time[0])) / block - 5.0, 1.0)
+        dof = max((float(self.time[-1]) - float(self.time[0])) / block - 5.0, 1.0)
         least, gain = self.mean_square(bent), self.mean_square(straight) - self.mean_square(bent)
-        return bent if gain * free > self.settings.climb_bends_surely * least else straight
+        return bent if gain * dof > self.settings.climb_bends_surely * least else straight
 
     def refine(self, climb: Climb, *, bends: bool = False) -> Climb:
         """Return the climb near a first one that leaves least of the readings (Levenberg 1944, Marquardt 1963)."""
-        slopes, residual, damping = climb.slopes(self.time), self.ratio - climb.at(self.time), 1e-3
+        slopes, residual, damping = climb.slopes(self.time), self.ratio - climb.ratio(self.time), 1e-3
         for _ in range(self.settings.climb_steps):
             free = self.free_numbers(climb, slopes, residual, bends=bends)
             columns = slopes[:, free]
-            normal, right = columns.T @ columns, columns.T @ residual
+            normal, gradient = columns.T @ columns, columns.T @ residual
             numbers = np.array(climb)
-            numbers[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
-            new = self._feasible_climb(numbers)
-            new_residual = self.ratio - new.at(self.time)
-            gain = float(residual @ residual - new_residual @ new_residual)
+            numbers[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), gradient, rcond=None)[0]
+            candidate = self._feasible_climb(numbers)
+            candidate_residual = self.ratio - candidate.ratio(self.time)
+            gain = float(residual @ residual - candidate_residual @ candidate_residual)
             if gain > 0.0:
-                climb, slopes, residual, damping = new, new.slopes(self.time), new_residual, damping / 10.0
+                climb, residual, damping = candidate, candidate_residual, damping / 10.0
+                slopes = climb.slopes(self.time)
                 if gain < self.settings.climb_still * float(residual @ residual):
                     break
             elif (damping := damping * 10.0) > 1e9:
@@ -132,14 +133,14 @@ class ClimbReadings:
 
     def mean_square(self, climb: Climb) -> float:
         """Return the mean square of what a climb leaves of T/N [-]."""
-        return float(((self.ratio - climb.at(self.time)) ** 2).mean())
+        return float(((self.ratio - climb.ratio(self.time)) ** 2).mean())
 
     def _straight(self) -> tuple[float, float]:
         """Return the instants between which a straight climb fits best, among all pairs of a grid."""
-        few, count, t, y = self.settings.climb_fewest, self.settings.climb_candidates, self.time, self.ratio
-        grid = np.linspace(float(t[0]), float(t[-few - 1]), count)
+        fewest, count, t, y = self.settings.climb_fewest, self.settings.climb_candidates, self.time, self.ratio
+        grid = np.linspace(float(t[0]), float(t[-fewest - 1]), count)
         begins, meets = (grid[index] for index in np.triu_indices(count, 1))
-        late = meets >= t[few]
+        late = meets >= t[fewest]
         begins, meets = begins[late], meets[late]
         progress = 1.0 - np.clip((meets[:, None] - t) / (meets - begins)[:, None], 0.0, 1.0)
         progress -= progress.mean(axis=1)[:, None]
@@ -147,26 +148,28 @@ class ClimbReadings:
         best = int(np.argmax(explained))
         return float(begins[best]), float(meets[best])
 
-    def _guess(self, ends: tuple[float, float], bend: float, fall: float) -> Climb:
+    def _guess(self, interval: tuple[float, float], bend: float, fall: float) -> Climb:
         """Return a climb of a kind between two instants, its heights fitted."""
-        last = float(self.time[-self.settings.climb_fewest - 1])
-        kind = Climb(ends[0], min(ends[1] + (bend - 1.0) * (ends[1] - ends[0]), last), bend, fall, 0.0, 1.0, 0.0)
-        columns = kind.slopes(self.time)[:, [4, 5, 6] if fall > 0.0 else [4, 5]]
+        latest = float(self.time[-self.settings.climb_fewest - 1])
+        begins, meets = interval
+        meets = min(meets + (bend - 1.0) * (meets - begins), latest)
+        template = Climb(begins, meets, bend, fall, 0.0, 1.0, 0.0)
+        columns = template.slopes(self.time)[:, [4, 5, 6] if fall > 0.0 else [4, 5]]
         heights = np.linalg.lstsq(columns, self.ratio, rcond=None)[0].tolist()
-        return Climb(*kind[:4], *heights, *([] if fall > 0.0 else [0.0]))
+        return Climb(*template[:4], *heights, *([] if fall > 0.0 else [0.0]))
 
     def _feasible_climb(self, numbers: Array) -> Climb:
         """Return the climb of seven numbers, clipped to the limits of the fit."""
         begins, meets, bend, fall, rest, rise, peak = numbers.tolist()
-        few, t = self.settings.climb_fewest, self.time
-        meets = float(np.clip(meets, t[few], t[-few - 1]))
+        fewest, t = self.settings.climb_fewest, self.time
+        meets = float(np.clip(meets, t[fewest], t[-fewest - 1]))
         begins = float(np.clip(begins, t[0], meets - self.settings.climb_shortest))
         fall = float(np.clip(fall, *self.settings.climb_fall_limits)) if fall != 0.0 else 0.0
         bend = float(np.clip(bend, *self.settings.climb_bend_limits))
         return Climb(begins, meets, bend, fall, rest, max(rise, 0.0), max(peak, 0.0))
 
 
-def _parts(fit: Climb, t: Array) -> Array:
+def _progress_and_peak(fit: Climb, t: Array) -> Array:
     """Return how much of the climb is done, and of the peak there (n, 2) [-]."""
     progress = 1.0 - np.clip((fit.meets - t) / (fit.meets - fit.begins), 0.0, 1.0) ** fit.bend
     return np.column_stack([progress, progress * _peak_decay(fit, t)])

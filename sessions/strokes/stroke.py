@@ -41,7 +41,7 @@ class Meaning(NamedTuple):
     """What a number is, in the tables of an export."""
 
     unit: str  # "" for none
-    words: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,9 +236,10 @@ class AreaLaw:
         """The law, for people, with what was assumed."""
         if self.law == "fixed":
             return "fixed, whatever the normal force"
-        origin = ", assumed" if self.force == PLANNED_AT else ", set"
-        why = "Hertz, sphere on plane: Johnson 1985, section 4.2; assumed of a finger" if self.law == "hertz" else "set"
-        return f"grows as N^{self.exponent:.3g} ({why}), and is the planned one at {self.force:g} N{origin}"
+        origin = "assumed" if self.force == PLANNED_AT else "set"
+        hertz = "Hertz, sphere on plane: Johnson 1985, section 4.2; assumed of a finger"
+        reason = hertz if self.law == "hertz" else "set"
+        return f"grows as N^{self.exponent:.3g} ({reason}), and is the planned one at {self.force:g} N, {origin}"
 
 
 FIXED = AreaLaw()
@@ -276,12 +277,12 @@ def rule_for(trial: Trial | None) -> Rule:
     return "mean over steady window"
 
 
-def friction_parameters(stroke: Stroke, at: int, trial: Trial | None, contact_area: float) -> FrictionParameters:
+def friction_parameters(stroke: Stroke, position: int, trial: Trial | None, contact_area: float) -> FrictionParameters:
     """Return what the model gets of the stroke at a position of `Analysis.strokes`."""
     rule = rule_for(trial)
     return FrictionParameters(
         trial=stroke.trial,
-        stroke=at,
+        stroke=position,
         mu=stroke.mu_max if rule == "maximum" else stroke.mu_dynamic,
         mu_interval=None,
         tau_max=stroke.tau_max,

@@ -61,8 +61,8 @@ def measure_stroke(
         _judge_loads(findings, track, plan.contact_area)
         uncut = None
         if contact.uncut is not None:
-            first, last = contact.uncut
-            uncut = track_of(span, replace(contact, start=first, stop=last), zero)
+            start, stop = contact.uncut
+            uncut = track_of(span, replace(contact, start=start, stop=stop), zero)
         window = slide(findings, span, track, decisions.value("steady"), uncut)
         _decide_slide_onset(findings, track, decisions)
         if window is not None:
@@ -70,13 +70,13 @@ def measure_stroke(
             _friction(findings, track, window)
             _static_peak(findings, track, window, zero, turns=contact.start in contact.reversals)
             _break_away(findings, track, window)
-            _judge_way(findings, track, window)
+            _judge_direction(findings, track, window)
         _apply_decisions(findings, track, decisions)
         _judge_drift(findings, zero, track.settings.zero)
     numbers = {name: None if name in findings.reasons else findings.numbers.get(name) for name in EVERYTHING}
     if trial is not None and numbers["direction"] not in (None, trial.direction):
-        way = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
-        sentence = f"The finger moved the other way than the trial asks ({way})."
+        course = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
+        sentence = f"The finger moved the other way than the trial asks ({course})."
         findings.flaw(FlawName.WRONG_DIRECTION, sentence, "doubtful")
     stroke = Stroke(
         trial=None if trial is None else trial.number,
@@ -141,11 +141,11 @@ def _judge_zero(findings: Findings, zero: StrokeZero, track: Track) -> None:
 
 def _judge_gaps(findings: Findings, span: Span, contact: Contact) -> None:
     """Withhold peaks that missing readings may hide."""
-    first, last = span.time[contact.start], span.time[contact.stop - 1]
-    if ((span.saturated_at >= first) & (span.saturated_at <= last)).any():
+    start, stop = span.time[contact.start], span.time[contact.stop - 1]
+    if ((span.saturation_times >= start) & (span.saturation_times <= stop)).any():
         sentence = "Readings of this stroke are saturated or come with a fault of the device: its peaks are not known."
         findings.flaw(FlawName.SATURATED, sentence, "doubtful", PEAKS)
-    inside = [gap for gap in span.quality.gaps if first <= gap.start and gap.stop <= last]
+    inside = [gap for gap in span.quality.gaps if start <= gap.start and gap.stop <= stop]
     widest = max(inside, key=lambda gap: gap.stop - gap.start, default=None)
     if widest is not None and widest.stop - widest.start > span.settings.contact.longest_gap + 1.0 / span.rate:
         sentence = (
@@ -155,8 +155,8 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact) -> None:
         findings.flaw(widest.cause, sentence, "doubtful", PEAKS)
     wild = [gap for gap in inside if gap.cause is FlawName.WILD]
     if wild:
-        at = f"at {wild[0].start:.2f} s of this stroke"
-        sentence = f"A wild reading {at} was left out: compare its numbers with its curve."
+        instant = f"at {wild[0].start:.2f} s of this stroke"
+        sentence = f"A wild reading {instant} was left out: compare its numbers with its curve."
         findings.flaw(FlawName.WILD, sentence, "doubtful")
 
 
@@ -173,8 +173,8 @@ def _judge_loads(findings: Findings, track: Track, planned_area: float) -> None:
         )
         findings.flaw(FlawName.TOO_LITTLE_FORCE, sentence, "refused", (*COEFFICIENTS, *SPEED, *DIRECTION))
     if peak > settings.contact.greatest_force:
-        head = f"The normal force reaches {significant(peak, 3)} N"
-        sentence = f"{head}, more than a finger presses: check the units of the forces."
+        reached = f"The normal force reaches {significant(peak, 3)} N"
+        sentence = f"{reached}, more than a finger presses: check the units of the forces."
         findings.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
     half = settings.ratio.light_half * peak
     light = (track.ratio > 1.0) & (track.normal < half)
@@ -297,24 +297,24 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
     follow that. The filter overshoots a sudden change, of twice the level where the finger `turned`, by 3.5 %.
     """
     settings, began = track.settings, findings.numbers.get("slide_onset", track.time[window.start])
-    last = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))
-    before = track.ratio[:last]
+    latest = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))
+    ratios = track.ratio[:latest]
     findings.reasons.setdefault("mu_static", _NO_PEAK)
-    if not np.isfinite(before).any():
+    if not np.isfinite(ratios).any():
         return
-    top = int(np.nanargmax(before))
-    end = int(np.searchsorted(track.time, float(track.time[top] + settings.ratio.static_after)))
+    top = int(np.nanargmax(ratios))
+    settled = int(np.searchsorted(track.time, float(track.time[top] + settings.ratio.static_after)))
     length = max(1, round(settings.filter.block * track.rate))
-    power = power_of_normal_force(track.normal[end:], track.ratio[end:], length, settings)
+    power = power_of_normal_force(track.normal[settled:], track.ratio[settled:], length, settings)
     with np.errstate(invalid="ignore"):
-        alike = track.ratio * (track.normal[top] / track.normal) ** power  # as T/N would be under the peak's N
-    level = float(np.nanmedian(alike[top : end + 1]))
-    later = alike[max(end, window.start) : window.stop]
+        comparable = track.ratio * (track.normal[top] / track.normal) ** power  # as T/N would be under the peak's N
+    level = float(np.nanmedian(comparable[top : settled + 1]))
+    later = comparable[max(settled, window.start) : window.stop]
     crest = float(np.nanmax(later)) if np.isfinite(later).any() else level
     sd = noise_of_ratio(zero, level, float(track.normal[top]))
     share = settings.ratio.static_share * (2.0 if turns else 1.0)
-    if before[top] - max(level, crest) > max(settings.ratio.static_noise * sd, share * level):
-        findings.numbers["mu_static"] = float(before[top])
+    if ratios[top] - max(level, crest) > max(settings.ratio.static_noise * sd, share * level):
+        findings.numbers["mu_static"] = float(ratios[top])
         if findings.reasons["mu_static"] == _NO_PEAK:
             del findings.reasons["mu_static"]
 
@@ -348,16 +348,16 @@ def _apply_decisions(findings: Findings, track: Track, decisions: StrokeDecision
             findings.reasons.pop(name, None)
 
 
-def _judge_way(findings: Findings, track: Track, window: slice) -> None:
+def _judge_direction(findings: Findings, track: Track, window: slice) -> None:
     """Say where the tangential force turns: then there is no one direction, or this is not one stroke.
 
     A finger that rests has hardly a drag, and its noise points anywhere.
     """
     limits, greatest = track.settings.slide, np.nanmax(track.tangential, initial=0.0)
     in_drag = np.isfinite(track.ratio) & (track.tangential >= limits.drag_share * greatest)
-    way = track.wrench[:, :2] / np.where(in_drag, track.tangential, np.nan)[:, None]
-    inside = float(np.linalg.norm(mean_vector(way[window])))
-    overall = float(np.linalg.norm(mean_vector(way)))
+    directions = track.wrench[:, :2] / np.where(in_drag, track.tangential, np.nan)[:, None]
+    inside = float(np.linalg.norm(mean_vector(directions[window])))
+    overall = float(np.linalg.norm(mean_vector(directions)))
     if inside < limits.one_way:
         sentence = "The tangential force turns within the steady window: no one direction, no speed along it."
         findings.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful", (*SPEED, *DIRECTION))

@@ -112,17 +112,17 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
     pull = _pull(span, zero)
     if pull is not None:
         return TrialAnalysis(flaws=(*flaws, pull), filtered=span.filtered)
-    pieces, idle, more = _pieces(span, zero, context)
-    part = _measure(pieces, idle, span, zero, trial, context)
-    flaws += [*more, *part.flaws, *_stroke_count(part.strokes, trial, context)]
-    return part._replace(flaws=tuple(flaws))
+    pieces, idle, touch_flaws = _pieces(span, zero, context)
+    result = _measure(pieces, idle, span, zero, trial, context)
+    flaws += [*touch_flaws, *result.flaws, *_stroke_count(result.strokes, trial, context)]
+    return result._replace(flaws=tuple(flaws))
 
 
 def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
     """Return the zero by which contacts are found; None where nothing tells one."""
     if context.zero_is_stated:
         return recorded_zero(span, is_stated=True)
-    first = span.windows.after(-np.inf, context.settings.zero.zero_stretch)
+    first = span.windows.zero_after(-np.inf, context.settings.zero.zero_stretch)
     if first is not None:
         return StrokeZero(first.level, first.noise, first.noise[:3], 0.0, first.error)
     return recorded_zero(span, is_stated=False) if context.info.calibration.raw_unit == RAW_WRENCH else None
@@ -156,11 +156,11 @@ def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[C
         pieces += split_at_valleys(contact, span.time, smooth, settings)
     strokes: list[Contact] = []
     for piece in pieces:
-        own = zero if context.zero_is_stated else zero_for(span, piece, idle)
+        piece_zero = zero if context.zero_is_stated else zero_for(span, piece, idle)
         strokes += (
             (piece,)
-            if own is None
-            else split_at_reversals(piece, span.time, span.smooth - own.level, own.unsure[0], settings)
+            if piece_zero is None
+            else split_at_reversals(piece, span.time, span.smooth - piece_zero.level, piece_zero.unsure[0], settings)
         )
     contacts, flaws = _worth_measuring(strokes, span, smooth)
     return contacts, idle, flaws
@@ -170,7 +170,7 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
     """Return the contacts without taps and light touches, and a flaw for each of these."""
     peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
     greatest, limits = max(peaks, default=0.0), span.settings.contact
-    near = limits.gap_beside / span.rate
+    margin = limits.gap_beside / span.rate
     contacts: list[Contact] = []
     flaws: list[Flaw] = []
     for piece, peak in zip(pieces, peaks, strict=True):
@@ -179,7 +179,7 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
         if not tapped and peak >= limits.light_share * greatest:
             contacts.append(piece)
             continue
-        gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
+        gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < margin or abs(gap.start - stop) < margin]
         if gaps:
             sentence = (
                 f"The contact from {start:.2f} to {stop:.2f} s goes on into readings that are not sound "
@@ -187,8 +187,8 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
             )
             flaws.append(Flaw(gaps[0].cause, sentence, "doubtful"))
         else:
-            what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
-            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {significant(peak, 2)} N, is not a stroke."
+            label, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
+            sentence = f"A {label} from {start:.2f} to {stop:.2f} s, up to {significant(peak, 2)} N, is not a stroke."
             flaws.append(Flaw(name, sentence, "note"))
     return contacts, flaws
 
@@ -198,24 +198,24 @@ def _measure(
 ) -> TrialAnalysis:
     """Measure contacts as they were found or decided, each from its own zero unless one was stated."""
     number = None if trial is None else trial.number
-    by_stroke = [context.decisions.of_stroke(number, at) for at in range(1, len(pieces) + 1)]
+    by_stroke = [context.decisions.of_stroke(number, index) for index in range(1, len(pieces) + 1)]
     flaws: list[Flaw] = []
     idle = idle.copy()
-    for at, decisions in enumerate(by_stroke):
-        pieces[at], empty = _with_decided_ends(pieces[at], decisions, span)
-        flaws += [] if empty is None else [replace(empty, stroke=at)]
-        idle[pieces[at].start : pieces[at].stop] = False
+    for index, decisions in enumerate(by_stroke):
+        pieces[index], empty = _with_decided_ends(pieces[index], decisions, span)
+        flaws += [] if empty is None else [replace(empty, stroke=index)]
+        idle[pieces[index].start : pieces[index].stop] = False
     strokes: list[Stroke] = []
     presses: list[Press] = []
-    for at, (piece, decisions) in enumerate(zip(pieces, by_stroke, strict=True)):
-        own = zero
+    for index, (piece, decisions) in enumerate(zip(pieces, by_stroke, strict=True)):
+        stroke_zero = zero
         if not context.zero_is_stated:
-            own = zero_for(span, piece, idle) or recorded_zero(span, is_stated=False)
-        stroke, more = measure_stroke(span, piece, own, context.plan, trial, at + 1, decisions)
-        flaws += [replace(flaw, stroke=at) for flaw in more]
+            stroke_zero = zero_for(span, piece, idle) or recorded_zero(span, is_stated=False)
+        stroke, stroke_flaws = measure_stroke(span, piece, stroke_zero, context.plan, trial, index + 1, decisions)
+        flaws += [replace(flaw, stroke=index) for flaw in stroke_flaws]
         strokes.append(stroke)
-        if stroke.mu_dynamic is None and own.flaw is not FlawName.NO_UNLOADED_STRETCH:
-            press = press_of(span, piece, own, number)
+        if stroke.mu_dynamic is None and stroke_zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
+            press = press_of(span, piece, stroke_zero, number)
             presses += [] if press is None else [press]
     return TrialAnalysis(tuple(strokes), tuple(flaws), tuple(presses), span.filtered)
 
@@ -231,8 +231,8 @@ def _with_decided_ends(piece: Contact, decisions: StrokeDecisions, span: Span) -
             problem = f"The {name} that was decided lies outside of the readings around the stroke"
     if problem:
         return piece, Flaw(FlawName.DECISION, f"{problem}: onset and lift stay as they were found.", "doubtful")
-    ends = piece.onset if onset is None else onset, piece.lift if lift is None else lift
-    return replace(piece, start=start, stop=stop, onset=ends[0], lift=ends[1]), None
+    instants = piece.onset if onset is None else onset, piece.lift if lift is None else lift
+    return replace(piece, start=start, stop=stop, onset=instants[0], lift=instants[1]), None
 
 
 def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: TrialContext) -> Iterable[Flaw]:
@@ -256,7 +256,7 @@ def strokes_for_model(strokes: tuple[Stroke, ...], trial: Trial | None, decision
     if trial is None:
         return strokes
     choice = decisions.choice(trial.number)
-    return tuple(one for one in strokes if choice is not None and one.number == choice.new) or strokes[:1]
+    return tuple(stroke for stroke in strokes if choice is not None and stroke.number == choice.new) or strokes[:1]
 
 
 def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) -> Press | None:

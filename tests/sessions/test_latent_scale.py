@@ -10,7 +10,7 @@ from sessions.report.tables.scales import latent_table
 from sessions.statistics.findings import ConstantStimuli
 from sessions.statistics.pooled import latent_scales
 from sessions.statistics.psychometric import QUARTILE
-from sessions.statistics.scales import JUDGEMENTS, Choice, of_comparisons, of_judgements, paired_scale
+from sessions.statistics.scales import JUDGEMENTS, Choice, latent_comparisons, latent_judgements, paired_scale
 from sessions.statistics.scores import average
 
 VALUES = {0: -1.2, 20: -0.5, 50: 0.1, 80: 0.4, 100: 1.2}  # mean 0
@@ -61,7 +61,7 @@ def test_intervals_of_scores_hold_the_true_values(people):
     rng = np.random.default_rng(11)
     coverage = []
     for _ in range(100):
-        scale = of_judgements(judgements(rng, people, 2))
+        scale = latent_judgements(judgements(rng, people, 2))
         coverage += [estimate.low <= VALUES[index] <= estimate.high for index, estimate in scale.items()]
     assert 0.92 <= np.mean(coverage) <= 0.99  # three standard errors of 500
 
@@ -69,19 +69,19 @@ def test_intervals_of_scores_hold_the_true_values(people):
 def test_a_choice_of_unit_or_of_level_changes_no_latent_value():
     points = judgements(np.random.default_rng(2), 8)
     rescaled = [(subject, index, 7.0 * x + (40.0 if subject == "P1" else -3.0)) for subject, index, x in points]
-    for index, estimate in of_judgements(points).items():
-        other = of_judgements(rescaled)[index]
+    for index, estimate in latent_judgements(points).items():
+        other = latent_judgements(rescaled)[index]
         assert (other.value, other.low, other.high) == pytest.approx((estimate.value, estimate.low, estimate.high))
 
 
 def test_one_just_noticeable_difference_is_0_674():
-    scale = of_comparisons({0: 0.4, 100: 0.5}, (math.log(math.log(1.25)),) * 3)
+    scale = latent_comparisons({0: 0.4, 100: 0.5}, (math.log(math.log(1.25)),) * 3)
     assert scale[100].value - scale[0].value == pytest.approx(0.6745, abs=1e-4)
 
 
 def test_too_few_people_and_answers_that_do_not_scatter_have_no_latent_scale():
-    assert of_judgements(judgements(np.random.default_rng(1), 2)) == {}
-    assert of_judgements([(f"P{n}", index, value) for n in range(5) for index, value in VALUES.items()]) == {}
+    assert latent_judgements(judgements(np.random.default_rng(1), 2)) == {}
+    assert latent_judgements([(f"P{n}", index, value) for n in range(5) for index, value in VALUES.items()]) == {}
 
 
 def test_the_table_lays_all_kinds_beside_the_scores_and_is_left_out_of_scores_alone():

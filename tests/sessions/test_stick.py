@@ -47,7 +47,7 @@ def test_the_slopes_of_a_climb_are_those_of_differences(fall):
     slopes = Climb(*parameters).slopes(times)
     for number in [0, 1, 2, 3, 4, 5, 6] if fall else [0, 1, 2, 4, 5]:
         step = 1e-6 * np.eye(7)[number]
-        change = (Climb(*(parameters + step)).at(times) - Climb(*(parameters - step)).at(times)) / 2e-6
+        change = (Climb(*(parameters + step)).ratio(times) - Climb(*(parameters - step)).ratio(times)) / 2e-6
         np.testing.assert_allclose(slopes[:, number], change, atol=1e-6)
 
 

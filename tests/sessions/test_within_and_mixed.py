@@ -122,7 +122,7 @@ def test_a_balanced_mixed_model_has_the_slope_and_error_of_the_closed_form():
     subjects = [f"S{k}" for k in range(12) for _ in range(5)]
     levels = np.repeat(rng.normal(0, 20, 12), 5)
     score = 10.0 + 3.0 * x + levels + rng.normal(0, 4, 60)
-    fit = reml_fit(score, np.column_stack([np.ones(60), x]), subjects, own=1)
+    fit = reml_fit(score, np.column_stack([np.ones(60), x]), subjects, random_terms=1)
     # Balanced, with the same x for all: the slope is that of least squares within subjects.
     centred = score - np.repeat(score.reshape(12, 5).mean(axis=1), 5)
     expected = float((x - 2.0) @ centred) / float((x - 2.0) @ (x - 2.0))

@@ -114,7 +114,7 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     if options.shift and log.clock == "sequence":
         raise WrongValue("--shift is of times, and the log counts readings: leave it out")
     shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
-    curves = press_curves(recording, replace(log, at=log.at + shift), settings)
+    curves = press_curves(recording, replace(log, instants=log.instants + shift), settings)
     if not curves.presses:
         why = curves.left_out[0] if curves.left_out else "It holds no press."
         raise FitError(
