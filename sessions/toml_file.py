@@ -186,9 +186,9 @@ def _join_key(key: str, name: str) -> str:
 def _type_text(form: inspect.Type | None) -> str:
     """Say what a type allows.
 
-    >>> _in_words(inspect.type_info(tuple[float, float])), _in_words(inspect.type_info(float | None))
+    >>> _type_text(inspect.type_info(tuple[float, float])), _type_text(inspect.type_info(float | None))
     ('a list of 2, each a number', 'a number')
-    >>> _in_words(inspect.FloatType(gt=0.0, le=1e6)), _in_words(inspect.FloatType(ge=0.0))
+    >>> _type_text(inspect.FloatType(gt=0.0, le=1e6)), _type_text(inspect.FloatType(ge=0.0))
     ('a number above 0 and at most 1e+06', 'a number at least 0')
     """
     match form:

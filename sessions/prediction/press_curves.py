@@ -9,7 +9,7 @@ from drivers.arrays import Array
 from sessions.prediction.finger_fit import LoadingCurve
 from sessions.prediction.relaxation_fit import HoldCurve
 from sessions.recording import Recording
-from sessions.strokes import AnalysisSettings, Stroke
+from sessions.strokes import AnalysisSettings, StrokeCurve
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.trial_analysis import TrialContext
 
@@ -63,32 +63,30 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
             begin, stop = stroke.onset, np.inf if stroke.lift is None else stroke.lift
             if begin is None or not any(begin <= press.start <= stop for press in analysis.presses):
                 continue
-            name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
+            assert stroke.curve is not None
+            name = f"the press at {begin:.2f} s" + (f" of trial {trial.number}" if trial else "")
             times = np.interp(log.instants, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
-            loading = _loading(stroke, times, log)
+            rows = np.isfinite(times)
+            times, displacement = times[rows], log.displacement[rows]
+            loading = _loading(stroke.curve, begin, times, displacement, log.width[rows])
             if isinstance(loading, str):
                 left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loading}.")
             else:
-                presses.append((loading, name, _hold(stroke, times, log.displacement)))
+                presses.append((loading, name, _hold(stroke.curve, begin, times, displacement)))
     curves, names, holds = zip(*presses, strict=True) if presses else ((), (), ())
     return PressCurves(curves, names, holds, tuple(left_out))
 
 
-def _loading(stroke: Stroke, times: Array, log: DisplacementLog) -> LoadingCurve | str:
-    """Return the loading of a press whose log has its rows at instants `times` (n,) [s]; or why there is none."""
-    curve = stroke.curve
-    assert curve is not None
-    assert stroke.onset is not None
+def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array, width: Array) -> LoadingCurve | str:
+    """Return the loading of a press whose log has its rows at `times` (n,) [s]; or why there is none."""
     peak_time = float(curve.time[int(np.nanargmax(curve.normal))])
-    finite = np.isfinite(times)
-    times, displacement, width = times[finite], log.displacement[finite], log.width[finite]
-    inside = np.flatnonzero((times >= stroke.onset) & (times <= peak_time))
-    if not len(times) or times[0] > stroke.onset or times[-1] < peak_time:
+    inside = np.flatnonzero((times >= onset) & (times <= peak_time))
+    if not len(times) or times[0] > onset or times[-1] < peak_time:
         return "the log does not follow it from its onset to its greatest force"
     around = times[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else times[:0]
     if not len(inside) or float(np.diff(around).max(initial=0.0)) > LONGEST_GAP:
         return f"the log has a gap of more than {LONGEST_GAP:g} s in it"
-    loading = (curve.time >= stroke.onset) & (curve.time <= peak_time) & np.isfinite(curve.normal)
+    loading = (curve.time >= onset) & (curve.time <= peak_time) & np.isfinite(curve.normal)
     travel = np.interp(curve.time[loading], times, displacement)
     force = curve.normal[loading]
     # A stage that stands while the finger relaxes adds nothing but time: it ends where it has arrived.
@@ -103,15 +101,11 @@ def _loading(stroke: Stroke, times: Array, log: DisplacementLog) -> LoadingCurve
     return LoadingCurve.of(travel, force, lengths)
 
 
-def _hold(stroke: Stroke, times: Array, displacement: Array) -> HoldCurve | None:
+def _hold(curve: StrokeCurve, onset: float, times: Array, displacement: Array) -> HoldCurve | None:
     """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
-    curve = stroke.curve
-    assert curve is not None
-    assert stroke.onset is not None
-    finite = np.isfinite(times)
-    inside = (curve.time >= stroke.onset) & (curve.time <= times[finite][-1]) & np.isfinite(curve.normal)
+    inside = (curve.time >= onset) & (curve.time <= times[-1]) & np.isfinite(curve.normal)
     time, force = curve.time[inside], curve.normal[inside]
-    travel = np.interp(time, times[finite], displacement[finite])
+    travel = np.interp(time, times, displacement)
     plateau = np.flatnonzero(travel >= travel.max() - STANDS * np.ptp(travel))
     if time[plateau[-1]] - time[plateau[0]] < SHORTEST_HOLD:
         return None

@@ -128,7 +128,7 @@ def relaxation(model: PressModel, finger_fit: FingerFit, holds: Sequence[HoldCur
         log_posterior, at_once = _posterior(holds, elastic, part_grid, time_grid, model.error)
         weight = np.exp(log_posterior - log_posterior.max())
         marginal: tuple[Array, Array] = (weight.sum(axis=1), weight.sum(axis=0))
-        if rounds == _ROUNDS or min(float(hold.sum() ** 2 / (hold**2).sum()) for hold in marginal) >= _FINE:
+        if rounds == _ROUNDS or min(float(sums.sum() ** 2 / (sums**2).sum()) for sums in marginal) >= _FINE:
             break
         bounds = _about(part_grid, marginal[0]), _about(time_grid, marginal[1])
     best = np.unravel_index(int(log_posterior.argmax()), log_posterior.shape)

@@ -69,8 +69,10 @@ def sealed_sentence(recording: Recording, current: Sequence[Mapping[str, Any]]) 
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."
     time_text = f"sealed on {seal.get('sealed_utc')} (SHA-256 {sha256[:16]}…)"
-    current_numbers = [{name: row[name] for name in SEAL_NUMBERS} for row in current]
-    agree = _agree(numbers, current_numbers)
+    rows = zip(numbers, current, strict=False)
+    agree = len(numbers) == len(current) and all(
+        _agree(sealed.get(name), row[name]) for sealed, row in rows for name in SEAL_NUMBERS
+    )
     comparison = "the predictions shown are those" if agree else "the predictions shown here are others, made since"
     return f"Predictions were {time_text} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {comparison}."
 
@@ -88,13 +90,7 @@ def _how_blind(recording: Recording, *, blinded: bool) -> str:
     return f"while the key of the stimuli was sealed; it was opened on {unblinding.get('unblinded_utc')}"
 
 
-def _agree(original: Sequence[Any], current: Sequence[Mapping[str, Any]]) -> bool:
-    pairs = zip(original, current, strict=False)
-    alike = all(_alike(sealed.get(name), row[name]) for sealed, row in pairs for name in SEAL_NUMBERS)
-    return alike and len(original) == len(current)
-
-
-def _alike(sealed: object, current: object) -> bool:
+def _agree(sealed: object, current: object) -> bool:
     if isinstance(sealed, float | int) and isinstance(current, float | int):
         return math.isclose(sealed, current, rel_tol=_SAME)
     return sealed == current

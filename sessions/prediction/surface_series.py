@@ -81,11 +81,8 @@ def other_signs(finger: Scene) -> list[str]:
 
 def _scene(finger: Scene, surface: Surface, press: Press) -> Scene:
     reference = published(surface)
-    loading = reference.loading
-    if press.force is not None:
-        loading = replace(loading, indentation=None, normal_force=press.force)
-    else:
-        loading = replace(loading, indentation=press.depth * loading.depth)
+    depth = press.depth * reference.loading.depth if press.force is None else None
+    loading = replace(reference.loading, indentation=depth, normal_force=press.force)
     steady = replace(finger.solve, course="steady")
     return replace(finger, friction=reference.friction, loading=loading, solve=steady)
 

@@ -76,15 +76,15 @@ def with_intervals(
 
 def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[DrawsOrReason]:
     """Return the draws of each trial's friction, one in each repeat, or why there are none."""
-    return [_draws(analysis, row) for row in prediction.trials]
-
-
-def _draws(analysis: Analysis, row: TrialPrediction) -> DrawsOrReason:
-    if row.stroke is None or row.mu is None or row.tau_max is None:
-        return _reason(row, "sed")
-    rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
-    draws = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, analysis.bootstrap)
-    return "the stroke is too short for an interval of its friction" if draws is None else draws
+    draws: list[DrawsOrReason] = []
+    for row in prediction.trials:
+        if row.stroke is None or row.mu is None or row.tau_max is None:
+            draws.append(_reason(row, "sed"))
+            continue
+        rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
+        friction = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, analysis.bootstrap)
+        draws.append(friction or "the stroke is too short for an interval of its friction")
+    return draws
 
 
 def _reason(row: TrialPrediction, name: str) -> str:
@@ -202,15 +202,11 @@ def with_alternatives(
     """
     all_variants, options = tuple(variants(prediction.options.variants)), prediction.options
     draws = draws_of(analysis, prediction) if all_variants and analysis is not None and options.intervals else None
-
-    def draws_for(variant: Variant) -> Sequence[DrawsOrReason] | None:
-        return draws if variant.kinematics == "small" or options.variant_intervals else None
-
     count = len(all_variants)
-    columns = [
-        _along(prediction, variant, draws_for(variant), part_of(progress, n / count, (n + 1) / count))
-        for n, variant in enumerate(all_variants)
-    ]
+    columns: list[tuple[Alternative, ...]] = []
+    for n, variant in enumerate(all_variants):
+        variant_draws = draws if variant.kinematics == "small" or options.variant_intervals else None
+        columns.append(_along(prediction, variant, variant_draws, part_of(progress, n / count, (n + 1) / count)))
     trials = tuple(
         _with_depth(replace(row, alternatives=tuple(answers[number] for answers in columns)), options)
         for number, row in enumerate(prediction.trials)

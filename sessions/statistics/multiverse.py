@@ -31,10 +31,9 @@ from sessions.statistics.correlations import pearson
 from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
-from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
+from sessions.strokes.settings import AnalysisSettings, FilterSettings, Pair, SteadySettings, WindowRule
 from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, AreaLaw, Rule
 
-Pair = tuple[float, float]
 Kinematics = Literal["small", "finite"]
 Values = tuple[float | None, ...]  # of one quantity along each of `PATHS`, or only those at small strain
 

@@ -171,10 +171,8 @@ def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, 
 
 def average(values: Sequence[float]) -> Average | None:
     """Return the mean of subjects' values with its 95 % t interval; None of none."""
-    return _average(values) if values else None
-
-
-def _average(values: Sequence[float]) -> Average:
+    if not values:
+        return None
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return Average(n, mean, None, None, None)
@@ -196,7 +194,8 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
 
 
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
-    mean = _average(values)
+    mean = average(values)
+    assert mean is not None
     low, high = (None if bound is None else float(np.clip(bound, *SCORE_SCALE)) for bound in (mean.low, mean.high))
     return MeanScore(descriptor, index, mean.n, mean.mean, mean.sd, low, high, no_interval(mean))
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from drivers.arrays import Array
@@ -93,7 +92,8 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     dof = len(codes) - (int(codes.max()) + 1 if len(codes) else 0) - 1
     if dof < 2:
         return None
-    left_x, left_y = (_without_means(np.array(values, np.float64), codes) for values in (x, y))
+    columns = (np.array(values, np.float64) for values in (x, y))
+    left_x, left_y = (column - (np.bincount(codes, column) / np.bincount(codes))[codes] for column in columns)
     size = math.sqrt(float(left_x @ left_x) * float(left_y @ left_y))
     if size <= 1e-12 * float(np.abs(x).max()) * float(np.abs(y).max()):
         return None
@@ -202,7 +202,3 @@ def equal_moduli(logs: Table) -> dict[str, dict[int, float]]:
         subject: {index: value - means[subject] + grand for index, value in row.items()}
         for subject, row in logs.items()
     }
-
-
-def _without_means(values: Array, codes: NDArray[np.intp]) -> Array:
-    return values - (np.bincount(codes, values) / np.bincount(codes))[codes]

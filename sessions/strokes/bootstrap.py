@@ -16,33 +16,30 @@ from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, sl
 from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.stroke import Interval, Rule, Stroke, StrokeCurve
 
-Pair = tuple[float, float]
-
 _OF_SESSION = 2**32 - 1  # in the seed, where a stroke has its number
 
 
 class SystematicDraws:
     """Errors of one session, (repeats,) of each; the same for each of its strokes."""
 
-    def __init__(self, repeats: int, seed: int, accuracy: Pair, lean: Pair, lean_error: Pair, *, presses: int) -> None:
-        """Draw gains and cross-talk, whose standard uncertainties are `accuracy` [-], and the face's lean [degrees].
+    def __init__(self, settings: BootstrapSettings) -> None:
+        """Draw gains, cross-talk and the lean of the face's normal towards +x and +y.
 
-        `lean` is that of the normal towards +x and +y which nobody levelled, `lean_error` its standard uncertainty.
-        A press shows a sideways force by lean and by cross-talk, and tells their sum: a lean from `presses` is that.
-        The mean of so few follows Student's law (JCGM 101:2008, 6.4.9).
+        A press shows a sideways force by lean and by cross-talk: a lean from presses is their sum. The mean of so few
+        follows Student's law (JCGM 101:2008, 6.4.9).
         """
-        draw = np.random.default_rng([seed, _OF_SESSION])
-        gain, cross_talk = accuracy
-        self.gain_t, self.gain_n, self.gain_torque = 1.0 + gain * draw.standard_normal((3, repeats))
-        into_drag, into_normal = (cross_talk * draw.standard_normal((repeats, 2)) for _ in range(2))
+        draw, repeats = np.random.default_rng([settings.seed, _OF_SESSION]), settings.repeats
+        self.gain_t, self.gain_n, self.gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, repeats))
+        into_drag, into_normal = settings.cross_talk * draw.standard_normal((2, repeats, 2))
         deviates = draw.standard_normal((repeats, 2))
-        if presses:
-            deviates /= np.sqrt(draw.chisquare(presses - 1, (repeats, 2)) / (presses - 1))
-        lean_draws: Array = np.radians(np.array(lean) + np.array(lean_error) * deviates)
-        if presses:
-            lean_draws -= into_drag
-        self._normal_shares: Array = into_drag + lean_draws
-        self._drag_shares: Array = into_normal - lean_draws
+        if settings.tilt_presses:
+            dof = settings.tilt_presses - 1
+            deviates /= np.sqrt(draw.chisquare(dof, (repeats, 2)) / dof)
+        lean: Array = np.radians(np.array(settings.tilt) + np.array(settings.tilt_error) * deviates)
+        if settings.tilt_presses:
+            lean -= into_drag
+        self._normal_shares: Array = into_drag + lean
+        self._drag_shares: Array = into_normal - lean
 
     def shares(self, along: Array) -> tuple[Array, Array]:
         """Return a and b (repeats,) [-] for a drag that points along a unit vector (2,)."""
@@ -174,9 +171,7 @@ class _Repeats:
         self._stroke, self._curve, self._settings, self._draw = stroke, curve, settings, draw
         n = settings.repeats
         self._step = float(np.median(np.diff(curve.time)))
-        accuracy = (settings.gain_error, settings.cross_talk)
-        lean = settings.tilt, settings.tilt_error
-        self._systematic = SystematicDraws(n, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
+        self._systematic = SystematicDraws(settings)
         self._gain_t, self._gain_n = self._systematic.gain_t, self._systematic.gain_n
         self._noise_t, self._noise_n = curve.noise
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.

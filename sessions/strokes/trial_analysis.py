@@ -24,7 +24,7 @@ from sessions.strokes.contacts import (
     split_at_valleys,
 )
 from sessions.strokes.decisions import Decisions, StrokeDecisions
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.settings import AnalysisSettings, Pair
 from sessions.strokes.signal_quality import signal_quality
 from sessions.strokes.sliding import block_means, displacement
 from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, track_of, zero_for
@@ -34,8 +34,6 @@ from sessions.strokes.stroke_measures import measure_stroke
 ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recording's own zero is true
 ZERO_STATED = "as recorded, stated to be true"
 RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
-
-Pair = tuple[float, float]
 
 
 class TrialContext(NamedTuple):

@@ -11,6 +11,7 @@ from sessions.recording import Recording
 from sessions.strokes.analysis import analyse as analyse_recording
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws
+from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.trial_analysis import TrialContext, tilt_of
 
 T = times(12.0)
@@ -119,13 +120,15 @@ def test_a_recording_without_presses_names_the_lean_it_assumes_and_is_not_flawed
 
 def test_cross_talk_that_presses_show_is_not_drawn_a_second_time():
     """A press shows lean and cross-talk from N together: with an exact lean, nothing of the two is left in the drag."""
-    draws = SystematicDraws(4000, 3, (0.01, 0.01), (1.0, 1.0), (0.0, 0.0), presses=3)
+    draws = SystematicDraws(
+        BootstrapSettings(4000, 3, cross_talk=0.01, tilt=(1.0, 1.0), tilt_error=(0.0, 0.0), tilt_presses=3)
+    )
     normal, drag = draws.shares(np.array([1.0, 0.0]))
     assert normal == pytest.approx(np.radians(1.0), abs=1e-12)
     assert drag.std() == pytest.approx(0.01 * np.sqrt(2.0), rel=0.05)  # its own cross-talk, and the lean's
 
 
 def test_a_lean_from_three_presses_is_drawn_from_students_law():
-    draws = SystematicDraws(200_000, 3, (0.0, 0.0), (0.0, 0.0), (1.0, 1.0), presses=3)
+    draws = SystematicDraws(BootstrapSettings(200_000, 3, cross_talk=0.0, tilt_error=(1.0, 1.0), tilt_presses=3))
     ends = np.quantile(draws.shares(np.array([1.0, 0.0]))[0], (0.025, 0.975))
     assert np.degrees(ends) == pytest.approx([-4.303, 4.303], rel=0.03)  # of two degrees of freedom (Student 1908)
