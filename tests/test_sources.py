@@ -1,9 +1,11 @@
 """What holds for every source file: the names it uses, the names it keeps to itself, and what it never calls."""
 
 import ast
+import gc
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -32,8 +34,19 @@ PARTICIPLES_OF_RECORDS = {
 RUNS = frozenset({"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"})
 CALLS = frozenset({"eval", "exec", "compile", "__import__", "read_pickle"})
 LISTENS = frozenset({"bind", "listen", "create_server", "serve_forever", "start_server"})
+FUNCTIONS = ast.FunctionDef, ast.AsyncFunctionDef
 SIMULATORS = "simulators"  # the boxes of `sim:` and of `daq-app simulate`, on loopback
 TABLET = Path("daq_app", "tablet", "server.py")  # asked for by `--subject-screen web` alone, on a private network
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_collection():
+    """Keep the garbage collector from a million nodes, which it would look through again and again."""
+    gc.disable()
+    yield
+    parsed.cache_clear()
+    nodes.cache_clear()
+    gc.enable()
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +55,24 @@ def trees() -> dict[Path, ast.Module]:
     return parsed(PACKAGES)
 
 
+@cache
 def parsed(folders: tuple[str, ...]) -> dict[Path, ast.Module]:
     files = [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
     return {path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8")) for path in files}
+
+
+@cache
+def nodes(tree: ast.Module) -> dict[type[ast.AST], list[ast.AST]]:
+    """Return the nodes of a module by their kind, gathered once."""
+    kinds = defaultdict(list)
+    for node in ast.walk(tree):
+        kinds[type(node)].append(node)
+    return kinds
+
+
+def of_kind(tree: ast.Module, *kinds: type[ast.AST]) -> Iterator[ast.AST]:
+    for kind in kinds:
+        yield from nodes(tree)[kind]
 
 
 # ---- terms of the field
@@ -53,23 +81,23 @@ def parsed(folders: tuple[str, ...]) -> dict[Path, ast.Module]:
 def identifiers(file: Path, tree: ast.Module) -> Iterator[str]:
     """Yield the names that a file defines: its own, and those of classes, functions, parameters and variables."""
     yield file.parent.name if file.stem == "__init__" else file.stem
-    for node in ast.walk(tree):
-        match node:
-            case ast.FunctionDef(name) | ast.AsyncFunctionDef(name) | ast.ClassDef(name) | ast.arg(name):
-                yield name
-            case ast.Name(name, ast.Store()) | ast.Attribute(_, name, ast.Store()):
-                yield name
-            case _:
-                pass
+    yield from (node.name for node in of_kind(tree, *FUNCTIONS, ast.ClassDef))
+    yield from (node.arg for node in of_kind(tree, ast.arg))
+    yield from (node.id for node in of_kind(tree, ast.Name) if isinstance(node.ctx, ast.Store))
+    yield from (node.attr for node in of_kind(tree, ast.Attribute) if isinstance(node.ctx, ast.Store))
 
 
 def values(tree: ast.Module) -> set[str]:
     """Return the variables, parameters and functions of a file, without constants and without fields of records."""
-    records = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-    fields = {id(line.target) for record in records for line in record.body if isinstance(line, ast.AnnAssign)}
-    stored = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
-    functions = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)}
-    parameters = {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    fields = {
+        id(line.target)
+        for record in of_kind(tree, ast.ClassDef)
+        for line in record.body
+        if isinstance(line, ast.AnnAssign)
+    }
+    stored = [node for node in of_kind(tree, ast.Name) if isinstance(node.ctx, ast.Store)]
+    functions = {node.name for node in of_kind(tree, *FUNCTIONS)}
+    parameters = {node.arg for node in of_kind(tree, ast.arg)}
     return {*functions, *parameters, *(node.id for node in stored if id(node) not in fields)}
 
 
@@ -137,8 +165,8 @@ def is_private(name: str) -> bool:
 
 def imported_private_names(tree: ast.Module) -> Iterator[str]:
     """Yield each underscore name that a file imports from a module of the project."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in PRIVATE_IN:
+    for node in of_kind(tree, ast.ImportFrom):
+        if (node.module or "").partition(".")[0] in PRIVATE_IN:
             yield from (f"imports {alias.name}" for alias in node.names if is_private(alias.name))
 
 
@@ -171,9 +199,7 @@ def test_no_file_imports_a_private_name_of_another(trees):
 
 
 def test_no_class_overrides_or_uses_a_private_name_of_its_base(trees):
-    classes = {
-        node.name: node for _, tree in private(trees) for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
-    }
+    classes = {node.name: node for _, tree in private(trees) for node in of_kind(tree, ast.ClassDef)}
     assert not list(inherited_private_names(classes))
 
 
@@ -199,19 +225,14 @@ def test_a_private_name_taken_from_elsewhere_is_found():
 
 def called(tree):
     """Names of what is called."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call):
-            function = node.func
-            name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
-            yield name, node
+    for node in of_kind(tree, ast.Call):
+        function = node.func
+        yield function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", ""), node
 
 
 def imported(tree):
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield (node.module or "").split(".")[0]
+    yield from (alias.name.split(".")[0] for node in of_kind(tree, ast.Import) for alias in node.names)
+    yield from ((node.module or "").split(".")[0] for node in of_kind(tree, ast.ImportFrom))
 
 
 def test_no_module_reads_a_format_that_can_run(trees):
