@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -39,8 +40,9 @@ def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index
     return Visit(f"S{number:02d}", f"S{number:02d}", "p", simulated, sed is not None, True, tuple(rows), (), {})
 
 
+@cache
 def study():
-    """Return its findings."""
+    """Return its findings, made once."""
     simulated = "SIMULATED: made up"
     visits = [_full(visit(number, simulated=simulated)) for number in range(1, 11)]
     visits[8] = replace(visits[8], session="S09_" + "as_long_as_a_folder_may_be_called_" * 7)

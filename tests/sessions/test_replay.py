@@ -47,7 +47,7 @@ def record_session(
     hands=Hands,
     protocol=PAPER,
     phases=None,
-    most=3,
+    most=1,
     **transducer,
 ):
     """Record a session in simulated time, `most` trials a block; `stop` is asked with the number of readings sent."""
@@ -211,7 +211,7 @@ def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_pa
 
 
 def test_a_session_that_lost_its_transducer_ends_so_again(tmp_path):
-    recording = record_session(tmp_path / "session", link_lost_after=1234)
+    recording = record_session(tmp_path / "session", most=3, link_lost_after=1234)
     assert recording.events[-1].data["cause"] == "device"
     replay_identical(recording, tmp_path)
 
@@ -238,7 +238,7 @@ def test_a_session_that_our_own_error_ended_ends_so_again(tmp_path):
 
 @pytest.mark.parametrize("last", [1, 4, 6, 7, 8, 9, 11, 13, 40])
 def test_a_session_cut_short_anywhere_is_replayed_to_where_it_was_cut(last, tmp_path):
-    record_session(tmp_path / "session")
+    record_session(tmp_path / "session", most=3)
     cut_short(tmp_path / "session", last)
     recording = Recording.open(tmp_path / "session")
     assert "cut short" in recording.losses[-1]
@@ -310,7 +310,7 @@ def cut_short(folder, last):
 @pytest.mark.parametrize("lasts", [(9,), (20, 31), (24, 26, 60)])
 def test_a_session_that_was_cut_short_and_resumed_comes_out_identical(lasts, tmp_path):
     folder = tmp_path / "session"
-    record_session(folder)
+    record_session(folder, most=3)
     for last in lasts:
         cut_short(folder, last)
         resume(folder, seed=last)
@@ -323,7 +323,7 @@ def test_a_session_that_was_cut_short_and_resumed_comes_out_identical(lasts, tmp
 
 def test_a_session_whose_transducer_was_lost_and_that_was_resumed_comes_out_identical(tmp_path):
     folder = tmp_path / "session"
-    record_session(folder, link_lost_after=1100)
+    record_session(folder, most=3, link_lost_after=1100)
     resume(folder, link_lost_after=700)
     resume(folder)
     recording = Recording.open(folder)
