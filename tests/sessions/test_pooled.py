@@ -24,6 +24,12 @@ from sessions.toml_file import SettingsError
 VISITS = [visit(number) for number in range(1, 11)]
 
 
+@pytest.fixture
+def words_alone(monkeypatch):
+    """Draw nothing for a page of which the words are read."""
+    monkeypatch.setattr("sessions.report.pages.study_plates", lambda _: ())
+
+
 def test_the_order_in_which_visits_come_changes_no_bit():
     assert pool_visits(VISITS) == pool_visits(VISITS[::-1])
 
@@ -60,6 +66,7 @@ def test_the_true_relation_of_people_at_large_stands_beside_the_intervals_for_th
     assert (effects[SED_TERM].true_value, effects[SED_TERM].low) == (60.0, finding.on_response.term(SED_TERM).low)
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
     out = (Exclusion("S03", "asked to", "the experimenter"),)
     findings, without = pool_visits(VISITS, exclusions=out), pool_visits([v for v in VISITS if v.subject != "S03"])
@@ -68,6 +75,7 @@ def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
     assert "asked to" in study_page(findings, "x")
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_the_same_recording_in_two_folders_counts_once_and_is_named():
     first, again = replace(VISITS[0], sha256="a" * 64), replace(VISITS[0], session="S01-backup", sha256="a" * 64)
     findings = pool_visits([*VISITS[1:], again, first])
@@ -121,6 +129,7 @@ def test_the_table_has_one_line_of_heads_and_numbers_to_the_last_bit():
     assert trials_csv(pool_visits([visit(1, simulated="SIMULATED: s")])).startswith("SIMULATED,")
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_a_simulated_study_says_so_at_the_head_of_its_page():
     page = study_page(pool_visits([*VISITS[:2], visit(3, simulated="SIMULATED: s")]), "x")
     assert page.splitlines()[1].startswith("<!-- SIMULATED: 1 of the 3 sessions")
@@ -147,6 +156,7 @@ def test_a_decision_that_fits_no_trial_is_told_as_such():
     ]
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_scores_that_are_all_the_same_leave_a_reason_and_no_model():
     flat = [replace(v, rows=tuple(replace(row, score=50.0) for row in v.rows)) for v in VISITS]
     findings = pool_visits(flat)

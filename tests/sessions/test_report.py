@@ -156,7 +156,7 @@ def test_a_visit_for_scores_only_gives_a_report_of_its_scores(tmp_path):
     assert report.course is None
     assert report.strokes == ()
     assert sum(len(e.scores) for e in report.experiments) == 10
-    assert "none: a visit for scores only" in page(report)
+    assert "none: a visit for scores only" in page(report, ())
 
 
 def test_a_value_that_nobody_set_is_marked(report):
@@ -248,7 +248,7 @@ def test_a_trial_without_friction_keeps_its_row_with_a_dash_and_the_reason(tmp_p
     for row in report.predictions:
         assert "too_little_force" in row.reasons["sed"]
         assert row.reasons["error_estimate"] == row.reasons["sed"]
-    assert "The stroke gives no coefficient of friction" in page(report)
+    assert "The stroke gives no coefficient of friction" in page(report, ())
 
 
 def test_strokes_without_a_plan_are_predicted_at_the_depth_given_for_them(tmp_path):
@@ -258,7 +258,7 @@ def test_strokes_without_a_plan_are_predicted_at_the_depth_given_for_them(tmp_pa
         recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0, course="steady"))
     )
     assert [p.stroke for p in report.predictions] == [1, 2]
-    assert "Predicted responses" in page(report)
+    assert "Predicted responses" in page(report, ())
 
 
 def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing(tmp_path):
