@@ -64,11 +64,15 @@ def visits(request):
 
 
 @pytest.fixture(scope="module")
-def rows(visits):
+def analyses(visits):
+    return [visit.analyse() for visit in visits]
+
+
+@pytest.fixture(scope="module")
+def rows(visits, analyses):
     """Return (stroke, friction, ground truth) of every trial of every seed."""
     rows = []
-    for visit in visits:
-        analysis = visit.analyse()
+    for visit, analysis in zip(visits, analyses, strict=True):
         assert len(analysis.strokes) == len(analysis.friction) == 10
         rows += zip(analysis.strokes, analysis.friction, visit.strokes, strict=True)
     return rows
@@ -134,10 +138,10 @@ def test_intervals_of_mu_cover_the_truth_at_least_as_often_as_they_say(rows):
     assert np.mean(hits) >= 0.95
 
 
-def test_live_and_offline_tell_the_same_onset_and_lift(visits):
+def test_live_and_offline_tell_the_same_onset_and_lift(visits, analyses):
     """The runner feeds the detector what arrives in 20 ms; offline the same class gets a whole trial."""
-    for visit in visits[:5]:
-        for (_, block), stroke in zip(visit.parts, visit.analyse().strokes, strict=True):
+    for visit, analysis in zip(visits[:5], analyses[:5], strict=True):
+        for (_, block), stroke in zip(visit.parts, analysis.strokes, strict=True):
             detector, events = ContactDetector(), []
             force = normal_force(CALIBRATION.wrench(block.raw, np.zeros(6)), FRAME)
             for start in range(0, len(block), 4):
