@@ -132,6 +132,8 @@ class Dialogue:
         words = {word.name.lower(): say(word) for word in _WORDS}
         page = Page(view, key, "rtl" if mirrored else "ltr", session is None, words)
         if page != self._page:
+            if self._page is not None and self._page.key != key:
+                self._open_keys.discard(key)  # asked once more: the recorder refused its answer, as in a pause
             self._page = page
             self._send(page)
 
@@ -139,9 +141,12 @@ class Dialogue:
         """Return the recorder's command for an answer; None where it knows already, or no session runs.
 
         `clock` makes of the tablet's clock [ms] the session's [s]. An answer no longer asked for is kept as a note.
+        In a pause none is taken, for the tablet sends it again when its question is asked once more.
         """
         session, page, key = self._session, self._page, answer.key
         if session is None or session.over or page is None or key in self._open_keys or self._acknowledge(key):
+            return None
+        if session.phase == "paused":
             return None
         event = event_of(answer.acts, clock, session.plan.answering_hand)
         if key == page.key and isinstance(event, _ANSWERS[page.view.kind]):

@@ -55,6 +55,19 @@ def test_an_answer_goes_to_the_recorder_once_and_is_acknowledged_when_it_is_safe
     assert tablet.messages.count(Stored(key)) == 2
 
 
+@pytest.mark.parametrize("crosses", [True, False])
+def test_an_answer_that_a_pause_crosses_or_meets_waits_on_the_tablet_until_its_question_is_asked_again(crosses):
+    tablet = Tablet()
+    key = tablet.show(*SCORE).key
+    if crosses:
+        assert tablet.give(key) is not None  # the recorder, paused by then, refuses it
+    tablet.show(*SCORE, log("pause", 1))
+    assert tablet.give(key) is None
+    assert not [message for message in tablet.messages if isinstance(message, Stored)]
+    assert tablet.show(*SCORE, log("pause", 1), log("resume", 1)).key == key
+    assert isinstance(tablet.give(key), steps.Scored)
+
+
 def test_an_answer_that_comes_too_late_is_written_down_as_a_note():
     tablet = Tablet()
     key = tablet.show(*SCORE).key
