@@ -29,6 +29,24 @@ class _Tree(NamedTuple):
     leaf: Indices  # (e,) part that holds each position of `order` and is not bisected
 
 
+def _halve(order: Indices, centres: Array, low: Indices, high: Indices) -> Indices:
+    """Sort each part `low` to `high` of `order` along its longer side; return the first position of its upper half."""
+    size = high - low
+    begins = np.cumsum(size) - size
+    part = np.repeat(np.arange(len(size)), size)
+    at = np.arange(len(part)) + (low - begins)[part]
+    x = centres[order[at]]
+    along = np.argmax(np.maximum.reduceat(x, begins) - np.minimum.reduceat(x, begins), axis=1)
+    x = x[np.arange(len(x)), along[part]]
+    ascending = np.lexsort((x, part))
+    order[at], x = order[at][ascending], x[ascending]
+    between = np.append(False, x[1:] != x[:-1]) & (at != low[part])
+    ends = (low + high)[part]  # a part in which all have the same x is cut in its middle
+    distance = np.where(between, np.abs(2 * at - ends), 2 * len(order) + (at != ends // 2))
+    nearest = np.flatnonzero(distance == np.minimum.reduceat(distance, begins)[part])
+    return at[nearest[np.searchsorted(part[nearest], np.arange(len(size)))]]
+
+
 def _bisect(centres: Array, most: int) -> _Tree:
     """Return the parts of elements at `centres` (e, 2), at most `most` elements in a part that is not bisected.
 
@@ -42,20 +60,7 @@ def _bisect(centres: Array, most: int) -> _Tree:
     while (large := high - low > most).any():
         branches.append(sum(map(len, lows)) - len(low) + np.flatnonzero(large))
         low, high = low[large], high[large]
-        size = high - low
-        begins = np.cumsum(size) - size
-        part = np.repeat(np.arange(len(size)), size)
-        at = np.arange(len(part)) + (low - begins)[part]
-        x = centres[order[at]]
-        along = np.argmax(np.maximum.reduceat(x, begins) - np.minimum.reduceat(x, begins), axis=1)
-        x = x[np.arange(len(x)), along[part]]
-        ascending = np.lexsort((x, part))
-        order[at], x = order[at][ascending], x[ascending]
-        between = np.append(False, x[1:] != x[:-1]) & (at != low[part])
-        ends = (low + high)[part]  # a part in which all have the same x is cut in its middle
-        distance = np.where(between, np.abs(2 * at - ends), 2 * count + (at != ends // 2))
-        nearest = np.flatnonzero(distance == np.minimum.reduceat(distance, begins)[part])
-        middle = at[nearest[np.searchsorted(part[nearest], np.arange(len(size)))]]
+        middle = _halve(order, centres, low, high)
         low, high = np.stack([low, middle], axis=1).ravel(), np.stack([middle, high], axis=1).ravel()
         lows.append(low)
         highs.append(high)
