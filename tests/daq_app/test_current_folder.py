@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -26,12 +27,17 @@ LATE = ("argparse", "drivers", "json", "numpy", "random", "sqlite3", "solver")  
 DEADLINE = 300.0  # loops that were never compiled on this machine take a minute or two [s]
 
 
+@cache
+def every_name():
+    return {*sys.stdlib_module_names, *packages_distributions()} | OURS
+
+
 @pytest.fixture
 def malicious(tmp_path, monkeypatch):
     """A current folder with a module of every name there is; each leaves a file beside it when it is run."""
     folder = tmp_path / "downloads"
     folder.mkdir()
-    for name in ({*sys.stdlib_module_names, *packages_distributions()} | OURS) - {"__main__"}:
+    for name in every_name() - {"__main__"}:
         if name.isidentifier():
             text = f"open({str(tmp_path / 'run')!r}, 'a').write({name!r} + ' ')\nraise SystemExit(77)\n"
             (folder / f"{name}.py").write_text(text)

@@ -4,6 +4,7 @@ import json
 import shutil
 
 import pytest
+from examples import short_protocol
 
 from daq_app.cli.main import run
 
@@ -11,7 +12,9 @@ from daq_app.cli.main import run
 @pytest.fixture(scope="module")
 def session_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("replay") / "P07"
-    words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P07", "--headless"]
+    protocol = folder.with_name("three.toml")
+    protocol.write_text(short_protocol("three", "Three surfaces", [0, 100], [100]))
+    words = ["run", str(protocol), "--device", "sim:?seed=7&rate=200", "--subject", "P07", "--headless"]
     assert run([*words, "--simulate-subject", "7", "--pace", "50", "--seed", "3", "--out", str(folder), "--json"]) == 0
     assert run(["analyse", str(folder), "--json"]) == 0
     return folder

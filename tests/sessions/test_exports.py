@@ -127,7 +127,7 @@ def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, ex
     assert wrench == pytest.approx([r * s for r, s in zip(intact[0][5:], [1e-6] * 3 + [1e-3] * 3, strict=True)])
 
 
-@pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form == "nwb")) for form in FORMATS])
+@pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form != "csv")) for form in FORMATS])
 def test_one_long_answer_takes_room_and_memory_once_in_every_export(exports, tmp_path, form):
     assert exports[form, "whole"].exists()  # so that its libraries are loaded
     recording = Recording.open(with_a_long_answer(tmp_path / "s", 12_000, 100))
@@ -248,7 +248,9 @@ def test_the_readme_tells_every_column_of_every_csv(exports):
 # ---- BIDS
 
 
-@pytest.mark.parametrize("name", MAKERS)
+@pytest.mark.parametrize(
+    "name", ["whole", "torn", *(pytest.param(name, marks=pytest.mark.slow) for name in ("scores_only", "foreign"))]
+)
 def test_the_official_validator_finds_no_error_in_a_bids_export(exports, name):
     validator = Path(sys.executable).with_name("bids-validator-deno")
     if not validator.exists():
@@ -356,7 +358,7 @@ def test_a_session_in_told_time_that_moves_when_waited_on_opens_as_nwb(sources, 
         assert elapsed.total_seconds() == pytest.approx(begun_s, abs=1e-5)
 
 
-@pytest.mark.parametrize("name", ["whole", "scores_only"])
+@pytest.mark.parametrize("name", ["whole", pytest.param("scores_only", marks=pytest.mark.slow)])
 def test_the_nwb_inspector_finds_no_violation(exports, name):
     inspector = pytest.importorskip("nwbinspector")
     messages = list(inspector.inspect_nwbfile(nwbfile_path=exports["nwb", name] / "session.nwb"))

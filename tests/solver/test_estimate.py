@@ -145,7 +145,7 @@ def test_where_the_nested_mesh_has_no_state_nothing_is_known():
     assert (estimate.sed, estimate.normal, estimate.tangential) == (1.0, 1.0, 1.0)
 
 
-@pytest.mark.parametrize("kinematics", ["small", "finite"])
+@pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
 def test_the_nested_value_is_nearer_the_truth_than_the_meshs_own(kinematics):
     sticky = replace(scene(STICKINESS[0]), solve=Solve(kinematics))
     truth = STICKS_LEAST if kinematics == "finite" else float(numbers_on_mesh([sticky], 26.0, shift=False)[0, 0])
@@ -175,7 +175,7 @@ def test_a_bound_far_from_the_edges_of_contact_keeps_no_tolerance_from_being_met
     assert prediction.sed_ending == pytest.approx(STICKS_LEAST, rel=0.003)
 
 
-@pytest.mark.parametrize("kinematics", ["small", "finite"])
+@pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
 def test_estimates_lie_above_the_errors_of_scenes_that_nothing_was_chosen_on_and_mostly_below_ten_times_them(
     kinematics,
 ):

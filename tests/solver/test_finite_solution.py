@@ -191,6 +191,7 @@ def test_setting_up_a_mesh_counts_once_where_the_first_mesh_is_that_of_the_answe
     assert prediction.setup_s + prediction.wall_s + prediction.estimate_s < perf_counter() - begin
 
 
+@pytest.mark.slow
 def test_where_two_fine_meshes_disagree_because_a_free_cut_folds_the_answer_warns_and_a_driven_cut_has_no_such_fold():
     free = random_scene("fingers", 14021, "finite")
     driven = replace(free, finger=replace(free.finger, cut="driven"))
