@@ -35,7 +35,7 @@ def test_a_scene_without_a_tolerance_is_solved_to_the_usual_one_beside_any_other
     assert alone[0].error_estimate <= 0.003 < alone[1].error_estimate
 
 
-@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("reverse", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_history_is_marched_on_the_mesh_that_its_settled_state_needs_whatever_the_others_need(reverse):
     strict, wedged = (sliding(mu, way, course="history", tolerance=1.8e-4) for mu, way in ((0.3, "+x"), (2.5, "-x")))
     alone = solve(strict)

@@ -43,7 +43,7 @@ def test_a_course_without_a_part_has_no_rate_there():
     assert np.isnan(sticking.slide)
 
 
-@pytest.mark.parametrize("kinematics", ["small", "finite"])
+@pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
 def test_the_press_before_a_drag_ends_after_its_second_although_the_bone_moves_along_the_surface(kinematics):
     drag = Loading(slide="+x", normal_force=0.05, tangential_force=0.01)
     scene = Scene(friction=Friction(0.5), loading=drag, solve=Solve(kinematics, "history", 0.1, "quick"))
@@ -55,7 +55,7 @@ def test_the_press_before_a_drag_ends_after_its_second_although_the_bone_moves_a
     assert sed_rates.break_away == pytest.approx(course.sed_ending[-1] - course.sed_ending[press_end])
 
 
-@pytest.mark.parametrize("kinematics", ["small", "finite"])
+@pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
 def test_twice_as_fast_a_slide_breaks_away_twice_as_fast_and_its_end_is_the_prediction(kinematics):
     scene = Scene(friction=Friction(0.3), loading=Loading(1.0, "-x", 10.0), solve=Solve(kinematics, "history"))
     predictions = [solve(replace(scene, loading=replace(scene.loading, speed=speed))) for speed in (10.0, 20.0)]

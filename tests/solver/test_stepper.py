@@ -156,7 +156,7 @@ def test_a_reading_may_be_a_number_of_any_kind():
     np.testing.assert_equal(live.step(1, 0), float_stepper.step(1.0, 0.0))
 
 
-@pytest.mark.parametrize("readings_of_lift", [4, 8])  # 20 and 40 ms at 200 Hz
+@pytest.mark.parametrize("readings_of_lift", [4, pytest.param(8, marks=pytest.mark.slow)])  # 20 and 40 ms at 200 Hz
 def test_a_finger_that_lifts_quickly_is_told_of_as_it_is(readings_of_lift):
     finger, mu = finger_on_mesh("finite", 5), 0.4
     live = stepper_on_mesh("finite", mu)
