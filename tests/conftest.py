@@ -18,7 +18,7 @@ settings.load_profile("same examples")
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Keep what is collected here from the garbage collector: it stays, and to look through it takes a tenth of the time."""
+    """Keep all that is collected here, and stays, from the garbage collector: to look through it takes long."""
     gc.disable()
     try:
         return (yield)
