@@ -76,7 +76,7 @@ class RawFile:
             for block in self._recording.blocks():
                 self._before[int(block.sequence[0]), int(block.received_ns[0])] = count
                 count += len(block)
-        for block in self._recording.blocks(between=(received_ns, received_ns + 1)):
+        for block in self._recording.blocks(span=(received_ns, received_ns + 1)):
             matches = np.flatnonzero((block.sequence == sequence) & (block.received_ns == received_ns))
             if len(matches):
                 return self._before[int(block.sequence[0]), int(block.received_ns[0])] + int(matches[0])

@@ -17,6 +17,7 @@ from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import (
     differences,
+    explain_differences,
     first_sentences,
     force_visit,
     gain_error_set,
@@ -26,7 +27,6 @@ from sessions.recording.derived import (
     sessions_of,
     set_gain_error,
     store_derived,
-    why,
 )
 from sessions.recording.head import software_versions
 from sessions.strokes import Analysis, AnalysisSettings, analyse
@@ -198,7 +198,7 @@ def repeat(
 def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
     sentences = first_sentences(list(differences(document, json.loads(json.dumps(fresh)), name)))
-    return [*sentences, why(name, document, software_versions())] if sentences else []
+    return [*sentences, explain_differences(name, document, software_versions())] if sentences else []
 
 
 def _predict(

@@ -285,7 +285,7 @@ def _index_of(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
         key = study_key(folder.parent)
     except StudyError as error:
         raise NotNow(f"simulated people must know which stimulus is which: {error}") from error
-    return (lambda trial: trial) if key is None else key.of
+    return (lambda trial: trial) if key is None else key.reveal
 
 
 def _check_people(people: m.People, plan: SessionPlan, bench: Bench, folder: Path) -> None:

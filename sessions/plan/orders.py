@@ -74,9 +74,9 @@ def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item
     circle = shuffle(items, seed, f"{name}/first")
     count = len(circle)
     orders = {
-        f"{a},{b}": (a, b)
+        f"{first},{second}": (first, second)
         for i, j in combinations(range(count), 2)
-        for a, b in [(circle[i], circle[j]) if 2 * (j - i) <= count else (circle[j], circle[i])]
+        for first, second in [(circle[i], circle[j]) if 2 * (j - i) <= count else (circle[j], circle[i])]
     }
     return tuple(orders[key] for key in shuffle(tuple(orders), seed, name))
 
@@ -111,8 +111,8 @@ def opaque_codes(count: int, seed: int) -> tuple[str, ...]:
     attempt = 0
     while len(codes) < count:
         number = int.from_bytes(_digest(f"{seed}/label/{attempt}"), "big")
-        rest, letter = divmod(number, len(LETTERS))
-        codes[f"{LETTERS[letter]}{rest % 100:02d}"] = None
+        quotient, letter = divmod(number, len(LETTERS))
+        codes[f"{LETTERS[letter]}{quotient % 100:02d}"] = None
         attempt += 1
     return tuple(codes)
 
@@ -123,18 +123,18 @@ def _digest(text: str) -> bytes:
 
 _PSES, _SPREADS = 41, 15  # of the grid: steps of a fortieth of the indices' range, and of a third of a spread
 _LAPSES = (0.0, 0.05)
-_SAME = 1e-9  # of entropy: below it two comparisons are alike on any processor, and the first is taken
+_ENTROPY_RESOLUTION = 1e-9  # of entropy: below it two comparisons are alike on any processor, and the first is taken
 
 
 def next_comparison(candidates: Sequence[Stimulus], answers: Sequence[tuple[Stimulus, bool]]) -> Stimulus:
     """Return which of the candidates is compared next, from answers: what was compared, and whether it was chosen."""
-    chance = _chances(tuple(one.known_index for one in candidates))
+    chance = _chances(tuple(candidate.known_index for candidate in candidates))
     belief = np.zeros(chance.shape[0])
     for comparison, choice in answers:
-        p = chance[:, candidates.index(comparison)]
-        belief += np.log(p if choice else 1.0 - p)
+        choice_chance = chance[:, candidates.index(comparison)]
+        belief += np.log(choice_chance if choice else 1.0 - choice_chance)
     weight = np.exp(belief - belief.max())
-    return candidates[int(np.argmin(np.round(_expected_entropy(weight / weight.sum(), chance) / _SAME)))]
+    return candidates[int(np.argmin(np.round(_expected_entropy(weight / weight.sum(), chance) / _ENTROPY_RESOLUTION)))]
 
 
 def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stimulus, bool]]) -> SessionPlan:
@@ -142,7 +142,7 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
 
     The same plan where the trial begins no pair of an adaptive block.
     """
-    block = next(one for one in plan.blocks if any(trial.number == number for trial in one.trials))
+    block = next(block for block in plan.blocks if any(trial.number == number for trial in block.trials))
     if not block.candidates or number not in {trial.compared_with for trial in block.trials}:
         return plan
     stimulus = next_comparison(block.candidates, answers)
@@ -156,7 +156,7 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
 
 def with_mounted_stimuli(plan: SessionPlan, codes: Mapping[int | None, str]) -> SessionPlan:
     """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` go by trial number."""
-    stimuli = {(block.name, one.code): one for block in plan.blocks for one in block.candidates}
+    stimuli = {(block.name, stimulus.code): stimulus for block in plan.blocks for stimulus in block.candidates}
 
     def mount(trial: Trial) -> Trial:
         return replace(trial, stimulus=stimuli.get((trial.block, codes.get(trial.number, "")), trial.stimulus))
@@ -182,8 +182,8 @@ def _chances(indices: tuple[int, ...]) -> Array:
 def _expected_entropy(weight: Array, chance: Array) -> Array:
     """Return the entropy of what is possible that is left after an answer to each comparison, on average [nat]."""
     entropy_left = np.zeros(chance.shape[1])
-    for p in (chance, 1.0 - chance):
-        joint = weight[:, None] * p
+    for answer_chance in (chance, 1.0 - chance):
+        joint = weight[:, None] * answer_chance
         likely = joint.sum(axis=0)
         entropy_left -= (joint * np.log(np.maximum(joint / likely, 1e-300))).sum(axis=0)
     return entropy_left

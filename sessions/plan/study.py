@@ -45,7 +45,8 @@ class Key:
     @property
     def sha256(self) -> str:
         """Return the SHA-256 of the UTF-8 text "salt", then a line "code descriptor index" each, codes sorted."""
-        lines = [self.salt, *(f"{code} {of} {index}" for code, (of, index) in sorted(self.stimuli.items()))]
+        stimuli = sorted(self.stimuli.items())
+        lines = [self.salt, *(f"{code} {descriptor} {index}" for code, (descriptor, index) in stimuli)]
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def seal(self) -> str:
@@ -64,19 +65,19 @@ class Key:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        stimuli = {code: {"descriptor": of, "index": index} for code, (of, index) in sorted(self.stimuli.items())}
+        stimuli = {code: {"descriptor": name, "index": index} for code, (name, index) in sorted(self.stimuli.items())}
         return {"salt": self.salt, "stimuli": stimuli}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> "Key":
         """Return the key that `to_dict` gave `data` for. Raises ValueError where it is none."""
         try:
-            stimuli = {code: (str(of["descriptor"]), int(of["index"])) for code, of in data["stimuli"].items()}
+            stimuli = {code: (str(entry["descriptor"]), int(entry["index"])) for code, entry in data["stimuli"].items()}
             return Key(str(data["salt"]), stimuli)
         except (KeyError, TypeError, AttributeError) as error:
             raise ValueError(f"this is no key of a study ({error})") from error
 
-    def of(self, trial: Trial) -> Trial:
+    def reveal(self, trial: Trial) -> Trial:
         """Return a trial with the index of its stimulus. Raises ValueError where the key lacks its code."""
         stimulus = self.stimuli.get(trial.stimulus.code)
         if stimulus is None:
@@ -85,7 +86,7 @@ class Key:
 
     def plan(self, plan: SessionPlan) -> SessionPlan:
         """Return a blinded plan with the index of every stimulus."""
-        return plan.with_trials(self.of)
+        return plan.with_trials(self.reveal)
 
 
 class StudyError(Exception):
@@ -182,16 +183,16 @@ def free_slot(members: Sequence[Member]) -> int:
     return next(slot for slot in count() if slot not in slots)
 
 
-def check_code(what: str, code: str) -> None:
+def check_code(label: str, code: str) -> None:
     """Raise SettingsError unless `code` is one: no name, nothing a file's name could not hold."""
     if not is_code(code):
-        raise SettingsError(f'{what} "{code}" is not allowed: a code of letters, digits, - and _, never a name')
+        raise SettingsError(f'{label} "{code}" is not allowed: a code of letters, digits, - and _, never a name')
 
 
 STUDY_FILE = "study.sqlite"
 KEY_FILE = "sealed-key.json"
 _VERSION = 1
-_HEAD = ("version", "protocol", "seed", "key_sha256")  # what the check sum of the head is of, in this order
+_HEAD_NAMES = ("version", "protocol", "seed", "key_sha256")  # what the check sum of the head is of, in this order
 _PATIENCE = 10.0  # waiting for another program that is enrolling [s]
 
 _TABLES = (
@@ -212,12 +213,12 @@ def is_study(folder: Path) -> bool:
     return (folder / STUDY_FILE).is_file()
 
 
-def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, where: str = "the protocol") -> Study:
+def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, source: str = "the protocol") -> Study:
     """Make the folder of a new study, whose protocol is fixed from now on. Raises StudyError, SettingsError.
 
-    `where` names the file of the protocol in a sentence on what is wrong with it.
+    `source` names the file of the protocol in a sentence on what is wrong with it.
     """
-    protocol = from_toml(protocol_text, Protocol, where)
+    protocol = from_toml(protocol_text, Protocol, source)
     check_code("the name of the study's folder", folder.name)
     adaptive = next((block.name for block in protocol.blocks if block.adaptive is not None), None)
     if blinded and adaptive is not None:
@@ -227,10 +228,10 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool, 
     try:
         (folder / STUDY_FILE).touch(exist_ok=False)  # which one of two programs alone can do
     except FileExistsError:
-        again = f"{folder} is a study already, and its protocol is fixed: enrol without --protocol"
-        raise StudyError(again) from None
+        refusal = f"{folder} is a study already, and its protocol is fixed: enrol without --protocol"
+        raise StudyError(refusal) from None
     values = (str(_VERSION), protocol_text, str(seed), "" if key is None else key.sha256)
-    head: dict[str, str] = dict(zip(_HEAD, values, strict=True))
+    head: dict[str, str] = dict(zip(_HEAD_NAMES, values, strict=True))
     try:
         with _transaction(folder) as connection:
             for table in _TABLES:
@@ -323,11 +324,11 @@ def _add_event(folder: Path, subject: str, choose: Callable[[Study], tuple[str, 
 
 
 def _tell(connection: sqlite3.Connection, kind: str, subject: str, data: Mapping[str, Any]) -> None:
-    (last,) = connection.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()
+    (last_number,) = connection.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()
     utc = datetime.now(UTC).isoformat(timespec="seconds")
-    data = {**data, "crc32": _check_sum(last + 1, utc, kind, subject, json.dumps(data))}
+    data = {**data, "crc32": _check_sum(last_number + 1, utc, kind, subject, json.dumps(data))}
     text = json.dumps(data, ensure_ascii=False, allow_nan=False)
-    connection.execute("INSERT INTO events VALUES (?, ?, ?, ?, ?)", (last + 1, utc, kind, subject, text))
+    connection.execute("INSERT INTO events VALUES (?, ?, ?, ?, ?)", (last_number + 1, utc, kind, subject, text))
 
 
 def _check_sum(*values: object) -> int:
@@ -351,7 +352,7 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
     events = connection.execute("SELECT number, utc, kind, subject, data FROM events ORDER BY number").fetchall()
     check_sum = head.pop("crc32", None)  # none in older files
     try:
-        if check_sum not in (None, str(_check_sum(*(head[name] for name in _HEAD)))):
+        if check_sum not in (None, str(_check_sum(*(head[name] for name in _HEAD_NAMES)))):
             raise ValueError("its head is not what it was")
         study = Study(
             name=folder.resolve().name,

@@ -34,12 +34,12 @@ def seal(folder: Path) -> None:
     fold_log(folder, Recording.open(folder).events)
     release_reserve(folder)
     recording = Recording.open(folder)
-    new = folder / f".{SEALED_FILE}.part"
+    unfinished = folder / f".{SEALED_FILE}.part"
     try:
         _clear_unfinished_copies(folder)
-        new.unlink(missing_ok=True)
-        write_copy(recording, new)
-        put_in_place(new, folder / SEALED_FILE)
+        unfinished.unlink(missing_ok=True)
+        write_copy(recording, unfinished)
+        put_in_place(unfinished, folder / SEALED_FILE)
         unequal = next(differences(recording), None)
         if unequal is not None:
             raise RecordingError(
@@ -51,7 +51,7 @@ def seal(folder: Path) -> None:
             (folder / name).chmod(0o444)
         list_in_manifest(folder, SEALED, head_of_manifest(recording))
     except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
-        new.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         advice = remedy(error)
         raise DiskRefused(
             f"{folder} could not be sealed ({error}); the live file is untouched: {advice}, and seal it again "
@@ -84,9 +84,9 @@ def _contradictions(recording: Recording) -> Iterator[str]:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
     current = json.loads(json.dumps(description(recording)))
-    for place, then, _ in unlike(stored, current, ""):
-        if then is not ABSENT:  # else an older version did not tell it
-            yield f"{place.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"
+    for name, stored_value, _ in unlike(stored, current, ""):
+        if stored_value is not ABSENT:  # else an older version did not tell it
+            yield f"{name.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"
 
 
 def _clear_unfinished_copies(folder: Path) -> None:

@@ -61,13 +61,13 @@ def _store(folder: Path, name: str, content: bytes) -> Path:
     return path
 
 
-def check_replaceable(path: Path, head: str) -> None:
+def check_replaceable(path: Path, heading: str) -> None:
     """Raise RecordingError where a file that somebody named for a text holds something else than one of these.
 
-    Such a text has the line `head` at its start, or after a line that says SIMULATED.
+    Such a text has the line `heading` at its start, or after a line that says SIMULATED.
     """
     content = bytes_of(path)
-    if content and head.encode() not in content.split(b"\n", 2)[:2]:
+    if content and heading.encode() not in content.split(b"\n", 2)[:2]:
         raise RecordingError(f"{path} holds something else, so it is left alone: choose another file")
 
 
@@ -106,43 +106,43 @@ def parse_gain_error(stored: object) -> float | None:
 
 MADE_BY = "made_by"  # versions of what made a stored document
 TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"})  # no numbers of a session
-_MOST = 20  # differences named one by one
+_MOST_NAMED = 20  # differences named one by one
 
 
 ABSENT = object()  # in place of a value under a name that a document lacks
 
 
-def unlike(stored: Any, fresh: Any, where: str, but: frozenset[str] = frozenset()) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401  JSON values
+def unlike(stored: Any, fresh: Any, path: str, but: frozenset[str] = frozenset()) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401  JSON values
     """Yield the place of each value that is stored otherwise, what is stored and what is now; names in `but` aside."""
     if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
-        then, now = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
-        for key in sorted({*then, *now} - but, key=_rank):
-            yield from unlike(then.get(key, ABSENT), now.get(key, ABSENT), f"{where}.{key}", but)
+        stored_map, fresh_map = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
+        for key in sorted({*stored_map, *fresh_map} - but, key=_rank):
+            yield from unlike(stored_map.get(key, ABSENT), fresh_map.get(key, ABSENT), f"{path}.{key}", but)
         return
     if isinstance(stored, list | tuple) and isinstance(fresh, list | tuple):
-        before, after = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
-        if len(before) == len(after):
-            for i, (a, b) in enumerate(zip(before, after, strict=True)):
-                yield from unlike(a, b, f"{where}[{i}]", but)
+        stored_list, fresh_list = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
+        if len(stored_list) == len(fresh_list):
+            for i, (old, new) in enumerate(zip(stored_list, fresh_list, strict=True)):
+                yield from unlike(old, new, f"{path}[{i}]", but)
             return
     if stored != fresh or isinstance(stored, bool) != isinstance(fresh, bool):
-        yield where, stored, fresh
+        yield path, stored, fresh
 
 
-def differences(stored: object, fresh: object, where: str) -> Iterator[str]:
+def differences(stored: object, fresh: object, path: str) -> Iterator[str]:
     """Yield a sentence for each value that was stored otherwise than it comes out now; timings are left out.
 
     >>> list(differences({"a": [1.0, 2.0], "wall_s": 3}, {"a": [1.0, 2.5], "wall_s": 4}, "x"))
     ['x.a[1] was stored as 2.0 and comes out as 2.5 (+25 %)']
     """
-    for place, then, now in unlike(stored, fresh, where, TIMINGS):
-        if then is ABSENT or now is ABSENT:
-            yield f"{place} is {'new' if then is ABSENT else 'no longer made'}"
-        elif isinstance(then, list | tuple) and isinstance(now, list | tuple):
-            entries = len(cast("Sequence[Any]", then)), len(cast("Sequence[Any]", now))
-            yield f"{place} was stored with {entries[0]} entries and comes out with {entries[1]}"
+    for name, old, new in unlike(stored, fresh, path, TIMINGS):
+        if old is ABSENT or new is ABSENT:
+            yield f"{name} is {'new' if old is ABSENT else 'no longer made'}"
+        elif isinstance(old, list | tuple) and isinstance(new, list | tuple):
+            entries = len(cast("Sequence[Any]", old)), len(cast("Sequence[Any]", new))
+            yield f"{name} was stored with {entries[0]} entries and comes out with {entries[1]}"
         else:
-            yield f"{place} was stored as {then!r} and comes out as {now!r}{_by(cast('object', then), now)}"
+            yield f"{name} was stored as {old!r} and comes out as {new!r}{_relative_change(cast('object', old), new)}"
 
 
 def _rank(key: str) -> tuple[int, str]:
@@ -150,27 +150,27 @@ def _rank(key: str) -> tuple[int, str]:
     return (0 if key in ("settings", "options", "decisions") else 2 if key == "bootstrap" else 1), key
 
 
-def _by(stored: object, fresh: object) -> str:
+def _relative_change(stored: object, fresh: object) -> str:
     """Say how much a number changed, where that can be said."""
     if not isinstance(stored, float) or not isinstance(fresh, float) or stored == 0.0:
         return ""
     return f" ({100.0 * (fresh / stored - 1.0):+.3g} %)"
 
 
-def why(name: str, stored: Mapping[str, Any], now: Mapping[str, str]) -> str:
+def explain_differences(name: str, stored: Mapping[str, Any], present: Mapping[str, str]) -> str:
     """Say of a document whose numbers come out otherwise what changed since it was made.
 
-    >>> why("a.json", {"made_by": {"numpy": "1", "scipy": "2"}}, {"numpy": "1", "scipy": "3"})
+    >>> explain_differences("a.json", {"made_by": {"numpy": "1", "scipy": "2"}}, {"numpy": "1", "scipy": "3"})
     'a.json was made by other versions: scipy 2 then and 3 now'
     """
     software: Any = stored.get(MADE_BY)
-    then: Mapping[str, Any] = cast("Mapping[str, Any]", software) if isinstance(software, Mapping) else {}
-    if not then:
+    versions: Mapping[str, Any] = cast("Mapping[str, Any]", software) if isinstance(software, Mapping) else {}
+    if not versions:
         return f"{name} does not say what made it"
     changes = [
-        f"{library} {then.get(library, 'absent')} then and {now.get(library, 'absent')} now"
-        for library in {**then, **now}
-        if then.get(library) != now.get(library)
+        f"{library} {versions.get(library, 'absent')} then and {present.get(library, 'absent')} now"
+        for library in {**versions, **present}
+        if versions.get(library) != present.get(library)
     ]
     if not changes:
         return (
@@ -181,8 +181,8 @@ def why(name: str, stored: Mapping[str, Any], now: Mapping[str, str]) -> str:
 
 def first_sentences(sentences: Sequence[str]) -> tuple[str, ...]:
     """Return the first of many sentences, and how many more there are."""
-    more = len(sentences) - _MOST
-    return tuple(sentences) if more <= 0 else (*sentences[:_MOST], f"and {more} more numbers differ")
+    omitted = len(sentences) - _MOST_NAMED
+    return tuple(sentences) if omitted <= 0 else (*sentences[:_MOST_NAMED], f"and {omitted} more numbers differ")
 
 
 UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened

@@ -23,7 +23,7 @@ from drivers.clock import Clock
 from drivers.transducer import StatusBit, StatusTable, TransducerInfo, bit
 from sessions.file_access import as_type, json_object, read_within_limit, write_whole
 from sessions.plan.plan import Origin
-from sessions.recording.log import SixNumbers, Whole
+from sessions.recording.log import Int64, SixNumbers
 
 _LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
 OPTIONAL = ("nidaqmx", "distributed")  # named where they are installed
@@ -128,10 +128,10 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
 
     `same_program` is added: whether this program and its libraries are those that were tested.
     """
-    places = folder.absolute().parents
-    disk = next((place.stat().st_dev for place in places if place.exists()), None)
-    for place in places:
-        path = place / CERTIFICATE_FILE
+    folders = folder.absolute().parents
+    disk = next((parent.stat().st_dev for parent in folders if parent.exists()), None)
+    for parent in folders:
+        path = parent / CERTIFICATE_FILE
         try:
             certificate = json_object(read_within_limit(path))
             if certificate["format"] != SELFTEST_FORMAT or path.stat().st_dev != disk:
@@ -166,14 +166,14 @@ class _Info(msgspec.Struct):
     counter_rate: float | None
     calibration: _Calibration
     settings: dict[str, str]
-    harmless: Whole = 0
-    summary: Whole = 0
+    harmless: Int64 = 0
+    summary: Int64 = 0
     status_bits: list[StatusBit] | None = None
 
 
 class _Clock(msgspec.Struct):
     factor: Annotated[float, msgspec.Meta(ge=0.0)]  # 0: the clock moves when it is waited on
-    now_ns: Whole
+    now_ns: Int64
 
 
 class _Setting(msgspec.Struct):
@@ -194,10 +194,10 @@ class Provenance(msgspec.Struct):
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:
     """Return the line that heads every file of a recording in which something was simulated, else None."""
     simulated = {"transducer": info is not None and info.simulated, "subject": subject_simulated}
-    parts = [name for name, yes in simulated.items() if yes]
-    if not parts:
+    names = [name for name, flag in simulated.items() if flag]
+    if not names:
         return None
-    return f"SIMULATED: the {' and the '.join(parts)} of this recording {'are' if len(parts) > 1 else 'is'} simulated"
+    return f"SIMULATED: the {' and the '.join(names)} of this recording {'are' if len(names) > 1 else 'is'} simulated"
 
 
 def compact_json(value: object) -> str:

@@ -53,7 +53,7 @@ class TrialRecord:
     @property
     def answer(self) -> float | Choice | None:
         """Return what the subject answered: a score, a number or which of two; None where it gave none."""
-        return next((one for one in (self.score, self.number, self.choice) if one is not None), None)
+        return next((value for value in (self.score, self.number, self.choice) if value is not None), None)
 
     @property
     def start_ns(self) -> int | None:
@@ -132,7 +132,7 @@ def _outcome(trial: Trial, answer: Any) -> Outcome:  # noqa: ANN401  a score, a 
     return "presented" if trial.answer == "none" else "not answered"
 
 
-Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # what SQLite, HDF5 and NumPy hold alike
+Int64: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # what SQLite, HDF5 and NumPy hold alike
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 SixNumbers: TypeAlias = tuple[float, float, float, float, float, float]
 
@@ -153,7 +153,7 @@ _FIELDS: Mapping[str, list[Any]] = {  # name and type of what events hold at the
         *(("reason", str, ""), ("cause", str, ""), ("complete", bool, False), ("readings", Count, 0)),
         ("health", dict[str, Any] | None, None),
     ],
-    "resumed": [("last_ns", Whole), ("gap", float | None, None)],
+    "resumed": [("last_ns", Int64), ("gap", float | None, None)],
 }
 SHAPES = {kind: msgspec.defstruct("Event", fields) for kind, fields in _FIELDS.items()}
 
@@ -169,8 +169,8 @@ def health_of(log: Iterable[LoggedEvent]) -> Health:
     """Return the totals of what "losses" events tell."""
     events = list(log)
     counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTS}
-    words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
+    rate_texts = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
     by_flag: Counter[str] = Counter()
     for event in events:
         by_flag.update(event.data.get("flagged", {}))
-    return Health(**counts, rate_words=words[-1] if words else "", flagged=dict(by_flag))
+    return Health(**counts, rate_words=rate_texts[-1] if rate_texts else "", flagged=dict(by_flag))

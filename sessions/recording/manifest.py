@@ -36,8 +36,8 @@ def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> 
     count = 0
     for block in blocks:
         count += len(block)
-        for name, kind in COLUMNS.items():
-            sums[name].update(getattr(block, name).astype(kind, copy=False).tobytes())
+        for name, dtype in COLUMNS.items():
+            sums[name].update(getattr(block, name).astype(dtype, copy=False).tobytes())
     log = sha256()
     for event in events:
         log.update(compact_json([event.time_ns, event.kind, event.trial, dict(event.data)]).encode() + b"\n")

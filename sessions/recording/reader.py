@@ -63,12 +63,12 @@ class Recording:
         """
         path = folder / schema.LIVE_FILE
         with name_failure(RecordingError, f"{path} cannot be read"):  # in a folder that nobody may look into
-            there = path.is_file()
-        if not there:
-            what = f"give a session folder{_copy_of(folder)}"
+            exists = path.is_file()
+        if not exists:
+            advice = f"give a session folder{_copy_of(folder)}"
             if folder.is_file() and (folder.parent / schema.LIVE_FILE).is_file():
-                what = f"give the folder that it lies in, {folder.parent}"
-            raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; {what}")
+                advice = f"give the folder that it lies in, {folder.parent}"
+            raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; {advice}")
         damage: list[str] = []
         with name_failure(RecordingError, f"{path} cannot be read", _copy_of(folder), DATABASE_FAILURES):
             tail_losses = tuple(torn_log(path))
@@ -86,11 +86,11 @@ class Recording:
             as_type(head["provenance"], Provenance)
             simulated = None if head["simulated"] == "no" else head["simulated"]
         except (ValueError, KeyError, TypeError) as error:
-            what = f"its head is damaged ({error}); restore it from a copy{_copy_of(folder)}"
-            raise RecordingError(f"{path}: {what}") from error
+            advice = f"restore it from a copy{_copy_of(folder)}"
+            raise RecordingError(f"{path}: its head is damaged ({error}); {advice}") from error
         trials = trial_records(plan, events)
-        provenance, whole = head["provenance"], not damage
-        return Recording(folder, plan, info, simulated, provenance, events, trials, head, whole, tuple(losses))
+        provenance, log_is_whole = head["provenance"], not damage
+        return Recording(folder, plan, info, simulated, provenance, events, trials, head, log_is_whole, tuple(losses))
 
     @property
     def simulated(self) -> bool:
@@ -126,18 +126,17 @@ class Recording:
         losses = [event for event in self.events if event.kind == "losses"]
         health = health_of(losses)
         counts = ((sentence, getattr(health, name)) for name, sentence in LOSS_SENTENCES.items())
-        trouble = [sentence.format(count) for sentence, count in counts if count]
-        trouble += [f"what their status said: {flagged_words(health.flagged)}"] if health.flagged else []
+        sentences = [sentence.format(count) for sentence, count in counts if count]
+        sentences += [f"what their status said: {flagged_words(health.flagged)}"] if health.flagged else []
         rates = [event.data["rate_words"] for event in losses if "rate_words" in event.data]
-        trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(rates)]
+        sentences += [f"the rate that was found: {text}" for text in dict.fromkeys(rates)]
         for record in self.trials:
             limit = self.plan.stroke_limit(record.trial)
             if record.take and record.take.strokes > limit:
-                allowed_words = "one was" if limit == 1 else f"{limit} were"
-                trouble.append(
-                    f"trial {record.trial.number} holds {record.take.strokes} strokes where {allowed_words} asked for"
-                )
-        return tuple(trouble)
+                number = "one was" if limit == 1 else f"{limit} were"
+                strokes = f"{record.take.strokes} strokes"
+                sentences.append(f"trial {record.trial.number} holds {strokes} where {number} asked for")
+        return tuple(sentences)
 
     def trial(self, number: int) -> TrialRecord:
         """Return the record of the trial with this number. Raises KeyError when the plan has none."""
@@ -158,17 +157,18 @@ class Recording:
     def _all_readings(self) -> ReadingBlock:
         """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
         path = self.folder / schema.LIVE_FILE
-        bytes_held = sum(side.stat().st_size for side in (path, _side_file(path, "-wal")) if side.is_file())
-        most = min(bytes_held // schema.BYTES_A_READING, self._row_capacity())
-        room = {name: np.empty((most, 6) if name == "raw" else most, kind) for name, kind in schema.COLUMNS.items()}
+        bytes_held = sum(file.stat().st_size for file in (path, _side_file(path, "-wal")) if file.is_file())
+        capacity = min(bytes_held // schema.BYTES_A_READING, self._row_capacity())
+        shapes = {name: (capacity, 6) if name == "raw" else (capacity,) for name in schema.COLUMNS}
+        buffers = {name: np.empty(shapes[name], dtype) for name, dtype in schema.COLUMNS.items()}
         count = 0
         for block in self.blocks():
-            if count + len(block) > most:  # committed since it was counted
+            if count + len(block) > capacity:  # committed since it was counted
                 break
-            for name, column in room.items():
+            for name, column in buffers.items():
                 column[count : count + len(block)] = getattr(block, name)
             count += len(block)
-        columns: Any = {name: column[:count] for name, column in room.items()}
+        columns: Any = {name: column[:count] for name, column in buffers.items()}
         return ReadingBlock(**columns)
 
     def _row_capacity(self) -> int:
@@ -182,38 +182,36 @@ class Recording:
 
     def readings_between(self, start_ns: int, stop_ns: int | None) -> ReadingBlock:
         """Return the readings received from `start_ns` up to, not including, `stop_ns` (None: to the end) [ns]."""
-        blocks_read: list[ReadingBlock] = []
-        for block in self.blocks(between=(start_ns, stop_ns)):
+        blocks: list[ReadingBlock] = []
+        for block in self.blocks(span=(start_ns, stop_ns)):
             inside = block.received_ns >= start_ns
             if stop_ns is not None:
                 inside &= block.received_ns < stop_ns
-            blocks_read.append(
-                ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)})
-            )
-        return ReadingBlock.concatenate(blocks_read)
+            blocks.append(ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)}))
+        return ReadingBlock.concatenate(blocks)
 
     def last_block(self) -> ReadingBlock:
         """Return the last block of readings (an empty one where there is none). Raises RecordingError when damaged."""
         path = self.folder / schema.LIVE_FILE
         try:
             with _connect(path) as connection:
-                (last,) = connection.execute("SELECT max(rowid) FROM blocks").fetchone()
-                return ReadingBlock.empty() if last is None else _block(connection, last)
+                (last_row,) = connection.execute("SELECT max(rowid) FROM blocks").fetchone()
+                return ReadingBlock.empty() if last_row is None else _block(connection, last_row)
         except (ValueError, TypeError, OSError, sqlite3.DatabaseError) as error:
             raise RecordingError(f"{path}: the last block of readings is damaged ({error})") from error
 
     def blocks(
-        self, losses: list[str] | None = None, between: tuple[int, int | None] | None = None
+        self, losses: list[str] | None = None, span: tuple[int, int | None] | None = None
     ) -> Generator[ReadingBlock]:
         """Yield the readings block by block as they were committed; damaged blocks are left out and named in `losses`.
 
-        `between` limits it to blocks that hold readings received in that span of the session clock [ns].
+        `span` limits it to blocks that hold readings received in that span of the session clock [ns].
         """
         damage: list[str] = [] if losses is None else losses
         path = self.folder / schema.LIVE_FILE
         try:
             with _connect(path) as connection:
-                yield from _blocks(connection, damage, between)
+                yield from _blocks(connection, damage, span)
         except DATABASE_FAILURES as error:
             damage.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
 
@@ -226,20 +224,20 @@ def _copy_of(folder: Path) -> str:
 
 def _end(events: Sequence[LoggedEvent]) -> Mapping[str, Any] | None:
     """Return what the last `ended` tells, unless the session was resumed after it."""
-    last = next((event for event in reversed(events) if event.kind in ("ended", "resumed")), None)
-    return None if last is None or last.kind == "resumed" else last.data
+    last_end = next((event for event in reversed(events) if event.kind in ("ended", "resumed")), None)
+    return None if last_end is None or last_end.kind == "resumed" else last_end.data
 
 
 def _blocks(
-    connection: sqlite3.Connection, losses: list[str], between: tuple[int, int | None] | None
+    connection: sqlite3.Connection, losses: list[str], span: tuple[int, int | None] | None
 ) -> Iterator[ReadingBlock]:
     condition, limits = "", ()
-    if between is not None:
-        condition = " WHERE received_last_ns >= ?" + ("" if between[1] is None else " AND received_first_ns < ?")
-        limits = tuple(limit for limit in between if limit is not None)
+    if span is not None:
+        condition = " WHERE received_last_ns >= ?" + ("" if span[1] is None else " AND received_first_ns < ?")
+        limits = tuple(limit for limit in span if limit is not None)
     next_number = 1
     for (number,) in connection.execute("SELECT rowid FROM blocks" + condition + " ORDER BY rowid", limits).fetchall():
-        if between is None and number != next_number:
+        if span is None and number != next_number:
             losses.append(f"blocks {next_number} to {number - 1} of the readings are missing")
         next_number = number + 1
         try:

@@ -40,15 +40,15 @@ class LogTail:
 def log_tail(log: BinaryIO) -> LogTail:
     """Follow the frames of a write-ahead log as SQLite's recovery does, a frame in memory at a time."""
     size = log.seek(0, os.SEEK_END)
-    head = _read(log, 0, _HEADER.size)
-    if len(head) < _HEADER.size:
+    header = _read(log, 0, _HEADER.size)
+    if len(header) < _HEADER.size:
         return LogTail(0, size)
-    magic, _, page_size, _, salt_1, salt_2, sum_1, sum_2 = _HEADER.unpack(head)
+    magic, _, page_size, _, salt_1, salt_2, sum_1, sum_2 = _HEADER.unpack(header)
     order = ">" if magic == BIG_ENDIAN_SUMS else "<"
-    sums = _sums(head[:-8], order, (0, 0))
+    sums = _sums(header[:-8], order, (0, 0))
     if magic not in (BIG_ENDIAN_SUMS, LITTLE_ENDIAN_SUMS) or sums != (sum_1, sum_2) or page_size not in PAGE_SIZES:
         return LogTail(0, size)
-    commits, position, end = 0, _HEADER.size, _HEADER.size
+    commits, position, commit_end = 0, _HEADER.size, _HEADER.size
     suspect = None
     while position + _FRAME.size + page_size <= size:
         frame = _read(log, position, _FRAME.size + page_size)
@@ -62,8 +62,8 @@ def log_tail(log: BinaryIO) -> LogTail:
             break
         position += _FRAME.size + page_size
         if pages:
-            commits, end = commits + 1, position
-    return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2), suspect) - end)
+            commits, commit_end = commits + 1, position
+    return LogTail(commits, _of_this_run(log, commit_end, page_size, (salt_1, salt_2), suspect) - commit_end)
 
 
 def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, int], suspect: int | None) -> int:
@@ -73,7 +73,7 @@ def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, in
     """
     size = log.seek(0, os.SEEK_END)
     step = _FRAME.size + page_size
-    position = end = start
+    position = run_end = start
     while position + _FRAME.size <= size:
         frame = _FRAME.unpack(_read(log, position, _FRAME.size))
         if frame == _HOLE and position != suspect:
@@ -81,8 +81,8 @@ def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, in
             continue
         position += step
         if position - step == suspect or frame[2:4] == salts:
-            end = position
-    return min(end, size) if end < position else size
+            run_end = position
+    return min(run_end, size) if run_end < position else size
 
 
 def _read(log: BinaryIO, position: int, count: int) -> bytes:
@@ -101,11 +101,11 @@ def _next_data(log: BinaryIO, position: int) -> int:
 
 def _sums(data: bytes, order: str, sums: tuple[int, int]) -> tuple[int, int]:
     """Continue the log's running check sums over `data`, whose length is a multiple of 8."""
-    first, second = sums
-    for a, b in struct.iter_unpack(order + "2I", data):
-        first = (first + a + second) & 0xFFFFFFFF
-        second = (second + b + first) & 0xFFFFFFFF
-    return first, second
+    sum_1, sum_2 = sums
+    for even_word, odd_word in struct.iter_unpack(order + "2I", data):
+        sum_1 = (sum_1 + even_word + sum_2) & 0xFFFFFFFF
+        sum_2 = (sum_2 + odd_word + sum_1) & 0xFFFFFFFF
+    return sum_1, sum_2
 
 
 def torn_log(path: Path) -> Iterator[str]:
@@ -122,12 +122,12 @@ def torn_log(path: Path) -> Iterator[str]:
 
 
 Identity = tuple[int, int] | None  # device and inode, as `os.stat` tells; None where there is no such file
-SIDES = ("", "-wal")  # the live file, and its log, which holds the newest commits
+FILE_SUFFIXES = ("", "-wal")  # the live file, and its log, which holds the newest commits
 
 
 def identities(path: Path) -> tuple[Identity, ...]:
     """Return which files lie at the names of a live file and of its write-ahead log."""
-    return tuple(_identity(path.with_name(path.name + side)) for side in SIDES)
+    return tuple(_identity(path.with_name(path.name + side)) for side in FILE_SUFFIXES)
 
 
 def rescue(source: sqlite3.Connection, path: Path) -> Path:
@@ -137,41 +137,41 @@ def rescue(source: sqlite3.Connection, path: Path) -> Path:
     is made beside that of `path`, in the user's home or in the system's temporary folder, the first that takes it.
     Raises RecordingError where none does.
     """
-    why: list[str] = []
+    reasons: list[str] = []
     for folder in _new_folders(path.absolute().parent):
-        new = folder / path.name
+        copy = folder / path.name
         try:
             folder.mkdir(parents=True)
-            with closing(sqlite3.connect(new, isolation_level=None)) as target:
+            with closing(sqlite3.connect(copy, isolation_level=None)) as target:
                 source.backup(target)
-            for place in (folder, folder.parent):
-                sync_folder(place)
+            for parent in (folder, folder.parent):
+                sync_folder(parent)
         except (OSError, sqlite3.Error) as error:
-            why.append(f"{folder}: {error}")
+            reasons.append(f"{folder}: {error}")
             with suppress(OSError):
-                new.unlink(missing_ok=True)
+                copy.unlink(missing_ok=True)
                 folder.rmdir()
         else:
-            return new
+            return copy
     raise RecordingError(
-        f"{path} was removed, renamed or replaced, and what it held could be written nowhere else ({'; '.join(why)});"
-        " the session has ended: look for the folder under another name or in the trash"
+        f"{path} was removed, renamed or replaced, and what it held could be written nowhere else "
+        f"({'; '.join(reasons)}); the session has ended: look for the folder under another name or in the trash"
     )
 
 
 def _identity(path: Path) -> Identity:
     try:
-        there = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return there.st_dev, there.st_ino
+    return status.st_dev, status.st_ino
 
 
 def _new_folders(session: Path) -> Iterator[Path]:
     """Yield a folder that is not there yet in each place, the best place first."""
-    for place in (session.parent, Path.home(), Path(tempfile.gettempdir())):
+    for parent in (session.parent, Path.home(), Path(tempfile.gettempdir())):
         numbers = itertools.chain([""], (f"-{number}" for number in itertools.count(2)))
-        names = (place / f"{session.name}-rescued{number}" for number in numbers)
+        names = (parent / f"{session.name}-rescued{number}" for number in numbers)
         yield next(folder for folder in names if not folder.exists())
 
 
@@ -200,7 +200,7 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
     live = folder / LIVE_FILE
     if not live.with_name(f"{live.name}-wal").exists():
         return
-    time_ns, readings = (last.time_ns, last.readings) if (last := next(reversed(events), None)) else (0, 0)
+    time_ns, readings = (events[-1].time_ns, events[-1].readings) if events else (0, 0)
     try:
         with closing(sqlite3.connect(live, timeout=0.5, isolation_level=None)) as connection:
             connection.execute("PRAGMA locking_mode=EXCLUSIVE")  # nobody else has the file open from here on
@@ -212,8 +212,8 @@ def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
             connection.execute("COMMIT")
             connection.execute("PRAGMA journal_mode=DELETE")
     except sqlite3.Error as error:
-        kind = error.sqlite_errorcode & 0xFF  # the low byte
-        if kind not in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+        code = error.sqlite_errorcode & 0xFF  # the low byte
+        if code not in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
             raise RecordingError(f"{live} cannot take its log in ({error}); {remedy(error)}") from error
         raise RecordingError(
             f"{live} is in use ({error}); end the program that still writes it, or reads it"

@@ -20,12 +20,12 @@ class RecordingError(Exception):
 
 
 class DiskRefused(RecordingError):
-    """The disk takes no more of a session; `why` says it without what is safe, and ends with what mends it."""
+    """The disk takes no more of a session; `reason` says it without what is safe, and ends with what mends it."""
 
-    def __init__(self, sentence: str, why: str) -> None:
+    def __init__(self, sentence: str, reason: str) -> None:
         """Take the sentence of a session that goes on when resumed, and the reason alone."""
         super().__init__(sentence)
-        self.why = why
+        self.reason = reason
 
 
 class NotEmpty(RecordingError):
@@ -113,7 +113,7 @@ def event_row(event: LoggedEvent) -> tuple[int, int, str, int | None, int, str, 
 
 def blobs(block: ReadingBlock) -> tuple[bytes, ...]:
     """Return the six columns of a block as little-endian bytes, in the order of `COLUMNS`."""
-    return tuple(np.ascontiguousarray(getattr(block, name), kind).tobytes() for name, kind in COLUMNS.items())
+    return tuple(np.ascontiguousarray(getattr(block, name), dtype).tobytes() for name, dtype in COLUMNS.items())
 
 
 def blobs_crc(columns: tuple[bytes, ...]) -> int:
@@ -126,13 +126,13 @@ def blobs_crc(columns: tuple[bytes, ...]) -> int:
 
 def summary(block: ReadingBlock) -> tuple[int, ...]:
     """Return the columns `SUMMARY` of a block that holds a reading."""
-    ends = [int(column[i]) for column in (block.sequence, block.counter) for i in (0, -1)]
-    return len(block), *ends, int(block.received_ns.min()), int(block.received_ns.max())
+    limits = [int(column[i]) for column in (block.sequence, block.counter) for i in (0, -1)]
+    return len(block), *limits, int(block.received_ns.min()), int(block.received_ns.max())
 
 
 def block_from_blobs(columns: tuple[bytes, ...]) -> ReadingBlock:
     """Return the readings of `columns`, in the order of `COLUMNS`. Raises ValueError when they differ in length."""
     arrays: dict[str, Indices | Array] = {
-        name: np.frombuffer(column, kind) for (name, kind), column in zip(COLUMNS.items(), columns, strict=True)
+        name: np.frombuffer(column, dtype) for (name, dtype), column in zip(COLUMNS.items(), columns, strict=True)
     }
     return ReadingBlock(**{**arrays, "raw": arrays["raw"].reshape(-1, 6)})  # pyright: ignore[reportArgumentType]  columns differ in type

@@ -29,7 +29,7 @@ from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FI
 
 CHUNK_BYTES = 32_768  # as a chunk of the readings' columns has
 EVENT_DATA = "events/data"  # a data set of texts, of which an answer's may be thousands of times another's
-END = "_end"  # of the name of the data set that holds where each text ends
+ENDS_SUFFIX = "_end"  # of the name of the data set that holds where each text ends
 
 
 class _Disk(io.RawIOBase):
@@ -46,11 +46,11 @@ class _Disk(io.RawIOBase):
         return self._file.readinto(buffer)
 
     def write(self, data: Any, /) -> int:  # noqa: ANN401
-        rest = memoryview(data).cast("B")
-        count = len(rest)
+        remaining = memoryview(data).cast("B")
+        count = len(remaining)
         try:
-            while self.failure is None and rest:
-                rest = rest[self._file.write(rest) :]
+            while self.failure is None and remaining:
+                remaining = remaining[self._file.write(remaining) :]
         except OSError as error:
             self.failure = error
         return count  # as if all was written
@@ -68,11 +68,11 @@ class _Disk(io.RawIOBase):
 
 
 @contextmanager
-def new_hdf5(path: Path, **more: Any) -> Generator[h5py.File]:  # noqa: ANN401  what h5py.File takes
+def new_hdf5(path: Path, **options: Any) -> Generator[h5py.File]:  # noqa: ANN401  what h5py.File takes
     """Lend a new HDF5 file. Raises OSError once it is closed where the disk did not take all."""
     with _Disk(path) as disk:
         try:
-            with h5py.File(disk, "w", **more) as file:
+            with h5py.File(disk, "w", **options) as file:
                 yield file
         except Exception:  # of whatever kind, when what was not written is read again
             if disk.failure is None:
@@ -84,16 +84,16 @@ def new_hdf5(path: Path, **more: Any) -> Generator[h5py.File]:  # noqa: ANN401  
 def write_texts(file: h5py.File, name: str, column: Iterable[str]) -> tuple[h5py.Dataset, h5py.Dataset]:
     """Write a column of ASCII texts, and return its two data sets: uint8 bytes, int64 ends."""
     data_set = file.create_dataset(name, (0,), np.uint8, maxshape=(None,), chunks=(CHUNK_BYTES,), fletcher32=True)
-    buffer, ends, end = bytearray(), list[int](), 0
+    buffer, ends, position = bytearray(), list[int](), 0
     for text in column:
         buffer += text.encode("ascii")
-        end += len(text)
-        ends.append(end)
+        position += len(text)
+        ends.append(position)
         if len(buffer) >= CHUNK_BYTES:
             _append(data_set, buffer)
     _append(data_set, buffer)
     storage = {"chunks": (len(ends),), "fletcher32": True} if ends else {}
-    return data_set, file.create_dataset(name + END, data=np.array(ends, "<i8"), **storage)
+    return data_set, file.create_dataset(name + ENDS_SUFFIX, data=np.array(ends, "<i8"), **storage)
 
 
 def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
@@ -104,10 +104,10 @@ def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
         for start in range(0, len(column), rows):
             yield from column[start : start + rows].tolist()
         return
-    begin = 0
-    for end in file[name + END][...].tolist():
-        yield column[begin:end].tobytes()
-        begin = end
+    text_begin = 0
+    for text_end in file[name + ENDS_SUFFIX][...].tolist():
+        yield column[text_begin:text_end].tobytes()
+        text_begin = text_end
 
 
 def _append(data_set: h5py.Dataset, buffer: bytearray) -> None:
@@ -142,7 +142,7 @@ class DataSet:
 
 
 def write_copy(
-    recording: Recording, path: Path, more: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
+    recording: Recording, path: Path, further: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
 ) -> None:
     """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
     total = recording.expected_readings or 1
@@ -160,16 +160,16 @@ def write_copy(
                 column[-len(values) :] = values
             if progress is not None:
                 progress(min(len(readings["time"]) / total, 1.0))
-        for one in (*data_sets(recording), *more):
-            kind = one.values.dtype
-            if kind.kind == "S":
+        for entry in (*data_sets(recording), *further):
+            dtype = entry.values.dtype
+            if dtype.kind == "S":
                 # Some readers (GNU Octave) know no UTF-8; most texts need none.
-                plain = all(text.isascii() for text in one.values.tolist())
-                kind = h5py.string_dtype("ascii" if plain else "utf-8", kind.itemsize)
+                plain = all(text.isascii() for text in entry.values.tolist())
+                dtype = h5py.string_dtype("ascii" if plain else "utf-8", dtype.itemsize)
             # An empty data set has no chunks, and so nothing to protect.
-            storage = {"chunks": one.values.shape, "fletcher32": True} if one.values.size else {}
-            data_set = file.create_dataset(one.name, data=one.values.astype(kind), **storage)
-            _describe(data_set, one.unit, one.note)
+            storage = {"chunks": entry.values.shape, "fletcher32": True} if entry.values.size else {}
+            data_set = file.create_dataset(entry.name, data=entry.values.astype(dtype), **storage)
+            _describe(data_set, entry.unit, entry.note)
         data_set, ends = write_texts(file, EVENT_DATA, _event_texts(recording))
         _describe(data_set, "", "what else is known, as JSON")
         _describe(ends, "bytes", f"where each text of {EVENT_DATA} ends; it begins where the one before ends")
@@ -183,11 +183,11 @@ def differences(recording: Recording) -> Iterator[str]:
         with h5py.File(recording.folder / SEALED_FILE, "r") as file:
             yield from _different_readings(recording, file)
             older = int(file.attrs.get("format_version", 0)) < FORMAT_VERSION
-            for one in data_sets(recording):
-                if older and one.name not in file:
+            for entry in data_sets(recording):
+                if older and entry.name not in file:
                     continue  # a later version holds more
-                if not _same(np.asarray(file[one.name]), one.values):
-                    yield f"{one.name} of {SEALED_FILE} differs from the live file"
+                if not _equal_bytes(np.asarray(file[entry.name]), entry.values):
+                    yield f"{entry.name} of {SEALED_FILE} differs from the live file"
             pairs = zip_longest(read_texts(file, EVENT_DATA), _event_texts(recording))
             if any(stored is None or text is None or stored != text.encode() for stored, text in pairs):
                 yield f"{EVENT_DATA} of {SEALED_FILE} differs from the live file"
@@ -246,10 +246,10 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
     choices = _int64([{None: 0, "first": 1, "second": 2}[r.choice] for r in records])
     yield DataSet("trials/number", _int64([t.number for t in trials]), "", "from 1, in the planned order")
     yield DataSet("trials/block", texts([t.block for t in trials]), "", "name of the block")
-    yield DataSet("trials/descriptor", texts([s.descriptor for s in stimuli]), "", "what was judged")
-    indices = _int64([-1 if s.index is None else s.index for s in stimuli])
+    yield DataSet("trials/descriptor", texts([stimulus.descriptor for stimulus in stimuli]), "", "what was judged")
+    indices = _int64([-1 if stimulus.index is None else stimulus.index for stimulus in stimuli])
     yield DataSet("trials/index", indices, "", "the maker's number of the stimulus, 0 to 100; -1 where it was sealed")
-    yield DataSet("trials/code", texts([s.code for s in stimuli]), "", "label on the stimulus")
+    yield DataSet("trials/code", texts([stimulus.code for stimulus in stimuli]), "", "label on the stimulus")
     yield DataSet("trials/direction", _int64([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
     yield DataSet("trials/repetition", _int64([t.repetition for t in trials]), "", "from 1")
     yield DataSet("trials/phase", texts([t.phase for t in trials]), "", "main; or practice, pre-evaluation")
@@ -268,10 +268,10 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
 
 def _empty_readings(file: h5py.File) -> dict[str, h5py.Dataset]:
     data_sets: dict[str, h5py.Dataset] = {}
-    for name, kind in COLUMNS.items():
+    for name, dtype in COLUMNS.items():
         width = (6,) if name == "raw" else ()
         data_sets[name] = file.create_dataset(
-            f"readings/{name}", (0, *width), kind, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
+            f"readings/{name}", (0, *width), dtype, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
         )
         data_sets[name].attrs["unit"], data_sets[name].attrs["note"] = map(_attribute, READING_NOTES[name])
     return data_sets
@@ -296,7 +296,7 @@ def _describe(data_set: h5py.Dataset, unit: str, note: str) -> None:
     data_set.attrs["unit"], data_set.attrs["note"] = _attribute(unit), _attribute(note)
 
 
-def _same(stored: NDArray[Any], expected: NDArray[Any]) -> bool:
+def _equal_bytes(stored: NDArray[Any], expected: NDArray[Any]) -> bool:
     return stored.shape == expected.shape and stored.astype(expected.dtype).tobytes() == expected.tobytes()
 
 

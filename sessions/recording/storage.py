@@ -56,8 +56,8 @@ def need(plan: SessionPlan, rate: float | None) -> Need:
 
 def check_room(folder: Path, need: Need) -> None:
     """Raise RecordingError where the disk `folder` is to lie on has less room than wanted."""
-    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    free = shutil.disk_usage(there).free
+    existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    free = shutil.disk_usage(existing).free
     if free < need.size:
         raise RecordingError(
             f"{folder} has {free / 1e6:.0f} MB of room, and the session may need {need.sentence}; "
@@ -124,17 +124,17 @@ class Mount(NamedTuple):
     """A file system and where it is mounted."""
 
     kind: str
-    at: PurePath
+    path: PurePath
     source: str
 
 
 def unsafe(folder: Path) -> str | None:
     """Return a sentence why a session must not be recorded in `folder`, which need not be there yet; None: it may."""
-    place = folder.resolve()
-    if (network := _on_a_network(place)) is not None:
+    location = folder.resolve()
+    if (network := _on_a_network(location)) is not None:
         return network
-    program = sync_folder_above(place) or _program_by_mark(place) or _sync_service(place)
-    return None if program is None else f"{place} is kept in step with a cloud by {program}; {MOVE}"
+    program = sync_folder_above(location) or _program_by_mark(location) or _sync_service(location)
+    return None if program is None else f"{location} is kept in step with a cloud by {program}; {MOVE}"
 
 
 def file_system(folder: Path) -> str | None:
@@ -143,49 +143,50 @@ def file_system(folder: Path) -> str | None:
     return None if mount is None else mount.kind
 
 
-def innermost(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
-    """Return the mount that holds `place`."""
-    around = [mount for mount in mounts if place.is_relative_to(mount.at)]
-    # Of several at one place the last hides the others.
-    return max(enumerate(around), key=lambda item: (len(item[1].at.parts), item[0]))[1] if around else None
+def innermost(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
+    """Return the mount that holds `path`."""
+    containing = [mount for mount in mounts if path.is_relative_to(mount.path)]
+    # Of several at one path the last hides the others, and `max` takes the first of equals.
+    return max(reversed(containing), key=lambda mount: len(mount.path.parts), default=None)
 
 
-def network_mount(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
-    """Return the mount that holds `place` where that lies on another computer, else None."""
-    inner = innermost(place, mounts)
-    if inner is None:
+def network_mount(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
+    """Return the mount that holds `path` where that lies on another computer, else None."""
+    mount = innermost(path, mounts)
+    if mount is None:
         return None
-    windows_drive = inner.kind == "9p" and re.match(r"([A-Z]:|drvfs)", inner.source) is not None  # seen from WSL
-    far = any(kinds.fullmatch(inner.kind) for kinds in (NETWORK, SHARED_FOLDERS, CLOUD))
-    return inner if far or windows_drive else None
+    windows_drive = mount.kind == "9p" and re.match(r"([A-Z]:|drvfs)", mount.source) is not None  # seen from WSL
+    remote = any(pattern.fullmatch(mount.kind) for pattern in (NETWORK, SHARED_FOLDERS, CLOUD))
+    return mount if remote or windows_drive else None
 
 
-def sync_folder_above(place: PurePath) -> str | None:
-    """Return the program whose folder `place` lies in, by the names of the folders above and itself; None: none."""
-    folders = ((part, pattern, program) for part in place.parts for pattern, program in SYNC_FOLDERS)
-    return next((program for part, pattern, program in folders if re.fullmatch(pattern, part, re.IGNORECASE)), None)
+def sync_folder_above(path: PurePath) -> str | None:
+    """Return the program whose folder `path` lies in, by the names of the folders above and itself; None: none."""
+    folders = ((name, pattern, program) for name in path.parts for pattern, program in SYNC_FOLDERS)
+    return next((program for name, pattern, program in folders if re.fullmatch(pattern, name, re.IGNORECASE)), None)
 
 
 def linux_mounts(table: str) -> tuple[Mount, ...]:
     """Return what /proc/self/mounts tells; blanks in names are written as octal numbers there."""
     mounts: list[Mount] = []
     for line in table.splitlines():
-        source, at, kind = (re.sub(r"\\([0-7]{3})", lambda m: chr(int(m[1], 8)), word) for word in line.split()[:3])
-        mounts.append(Mount(kind, PurePath(at), source))
+        fields = (re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), text) for text in line.split()[:3])
+        source, path, kind = fields
+        mounts.append(Mount(kind, PurePath(path), source))
     return tuple(mounts)
 
 
 def mac_mounts(table: str) -> tuple[Mount, ...]:
     """Return what the command mount tells on macOS: `SOURCE on PLACE (KIND, ...)`."""
     lines = re.findall(r"^(.*) on (/.*) \(([^,)]+)", table, re.MULTILINE)
-    return tuple(Mount(kind, PurePath(at), source) for source, at, kind in lines)
+    return tuple(Mount(kind, PurePath(path), source) for source, path, kind in lines)
 
 
-def _on_a_network(place: Path) -> str | None:
+def _on_a_network(folder: Path) -> str | None:
     if sys.platform == "win32":
-        return f"{place} lies on a network drive; {MOVE}" if _windows_network(place) else None
-    mount = network_mount(place, _mounts())
-    return None if mount is None else f"{place} lies on another computer or is shared with one ({mount.kind}); {MOVE}"
+        return f"{folder} lies on a network drive; {MOVE}" if _windows_network(folder) else None
+    mount = network_mount(folder, _mounts())
+    return None if mount is None else f"{folder} lies on another computer or is shared with one ({mount.kind}); {MOVE}"
 
 
 def _mounts() -> Sequence[Mount]:
@@ -199,19 +200,19 @@ def _mounts() -> Sequence[Mount]:
     return mac_mounts(output)
 
 
-def _windows_network(place: Path) -> bool:
+def _windows_network(folder: Path) -> bool:
     """Say whether Windows calls the drive a remote one (GetDriveTypeW: 4), or the path names a computer."""
-    if place.drive.startswith("\\\\"):
+    if folder.drive.startswith("\\\\"):
         return True
     import ctypes
 
     windows = getattr(ctypes, "windll", None)
-    return windows is not None and windows.kernel32.GetDriveTypeW(f"{place.drive}\\") == 4
+    return windows is not None and windows.kernel32.GetDriveTypeW(f"{folder.drive}\\") == 4
 
 
-def _program_by_mark(place: Path) -> str | None:
-    """Return the synchronising program whose marker file lies in `place` or above it; None where there is none."""
-    for folder in (place, *place.parents):
+def _program_by_mark(location: Path) -> str | None:
+    """Return the synchronising program whose marker file lies in `location` or above it; None where there is none."""
+    for folder in (location, *location.parents):
         try:
             names = {entry.name for entry in folder.iterdir()} if folder != folder.parent else set[str]()
         except OSError:
@@ -224,6 +225,6 @@ def _program_by_mark(place: Path) -> str | None:
     return None
 
 
-def _sync_service(place: Path) -> str | None:
+def _sync_service(folder: Path) -> str | None:
     roots = [root for variable in SYNC_VARIABLES if (root := os.environ.get(variable))]
-    return "OneDrive" if any(place.is_relative_to(root) for root in roots) else None
+    return "OneDrive" if any(folder.is_relative_to(root) for root in roots) else None

@@ -85,10 +85,10 @@ class SessionWriter:
         }
         path = folder / schema.LIVE_FILE
         try:
-            new = [place for place in (folder, *folder.parents) if not place.exists()]
+            new_folders = [parent for parent in (folder, *folder.parents) if not parent.exists()]
             folder.mkdir(parents=True, exist_ok=True)
-            for place in new:
-                sync_folder(place.parent)
+            for parent in new_folders:
+                sync_folder(parent.parent)
             if any(folder.iterdir()):
                 raise schema.NotEmpty(folder)
             if reserve:
@@ -107,8 +107,8 @@ class SessionWriter:
             _prepare(connection, head, durable=cls.durable)
         except sqlite3.Error as error:
             connection.close()
-            for side in folder.glob(f"{schema.LIVE_FILE}*"):  # nothing is recorded in it
-                side.unlink()
+            for file in folder.glob(f"{schema.LIVE_FILE}*"):  # nothing is recorded in it
+                file.unlink()
             _leave(folder)
             raise RecordingError(
                 f"{path} cannot be begun ({error}); {remedy(error)}, or give a folder on a local disk"
@@ -259,8 +259,8 @@ class SessionWriter:
             self.give_back_reserve()
         try:
             return self._write_waiting()
-        except sqlite3.Error as again:
-            self._fail(again)
+        except sqlite3.Error as failure:
+            self._fail(failure)
 
     def _lost_sight(self) -> bool:
         """Say whether the names of the live file and its log are gone, or name other files than the open ones."""

@@ -72,9 +72,9 @@ def line_of(command: steps.Command) -> Line | None:
 def _plain(value: Any) -> Any:  # noqa: ANN401  whatever an event holds
     """Return plain data with every nan and infinity written as a text."""
     if isinstance(value, dict):
-        return {name: _plain(inside) for name, inside in cast("dict[str, Any]", value).items()}
+        return {name: _plain(content) for name, content in cast("dict[str, Any]", value).items()}
     if isinstance(value, list | tuple):
-        return [_plain(inside) for inside in cast("list[Any]", value)]
+        return [_plain(content) for content in cast("list[Any]", value)]
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -116,34 +116,34 @@ def parts(events: Sequence[LoggedEvent]) -> tuple[tuple[LoggedEvent, ...], ...]:
     for i, event in enumerate(events):
         if event.kind == "resumed":
             last_ns = int(event.data["last_ns"])
-            begins.append(next(j for j in range(i + 1) if events[j].time_ns > last_ns))
-    return tuple(tuple(events[a:b]) for a, b in zip(begins, [*begins[1:], len(events)], strict=True))
+            begins.append(next(n for n in range(i + 1) if events[n].time_ns > last_ns))
+    return tuple(tuple(events[begin:end]) for begin, end in zip(begins, [*begins[1:], len(events)], strict=True))
 
 
 def steps_of(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
     """Return the steps of a session from its log; the last is its end, or where it was cut short."""
     history: list[Step] = []
     for i, event in enumerate(events):
-        place = event.readings, event.time_ns
+        point = event.readings, event.time_ns
         refused = event.kind == "refused"
         kind = event.data.get("event") if refused else event.kind
         if event.kind == "ended":
-            history.append(Step(*place, end=event.data))
+            history.append(Step(*point, end=event.data))
         elif kind is not None and kind in _ACTS:
-            history.append(Step(*place, act=event_from_data(kind, event.data["given"] if refused else event.data)))
+            history.append(Step(*point, act=event_from_data(kind, event.data["given"] if refused else event.data)))
         elif kind in NOTICED:
-            history.append(Step(*place))
+            history.append(Step(*point))
         elif event.kind == "losses" and not _at_the_end(events, i):
-            history.append(Step(*place, losses=event))
+            history.append(Step(*point, losses=event))
         elif event.kind == "told" and event.trial is not None:  # the machine's own words belong to no trial
-            history.append(Step(*place, zero_missing=True))
+            history.append(Step(*point, zero_missing=True))
     if not history or history[-1].end is None:
-        last = events[-1] if events else LoggedEvent(0, 0, "", None, 0, {})
-        history.append(Step(last.readings, last.time_ns, end={}))
+        last_event = events[-1] if events else LoggedEvent(0, 0, "", None, 0, {})
+        history.append(Step(last_event.readings, last_event.time_ns, end={}))
     return tuple(history)
 
 
 def _at_the_end(events: Sequence[LoggedEvent], position: int) -> bool:
     """Say whether losses were reported while the session was being ended: then the end reports them once more."""
-    after = events[position + 1 : position + 2]
-    return bool(after) and after[0].kind == "ended" and events[position].trial is None
+    following = events[position + 1 : position + 2]
+    return bool(following) and following[0].kind == "ended" and events[position].trial is None

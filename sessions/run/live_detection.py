@@ -82,9 +82,9 @@ class TakeWatch:
             else:
                 notices.append(FingerLifted(event.time, event.noticed))
                 self._lifted = event.time
-        last = float(block.time[-1])
-        if self._lifted is not None and last - self._lifted >= self.after_lift:
-            notices.append(Settled(last))
+        last_time = float(block.time[-1])
+        if self._lifted is not None and last_time - self._lifted >= self.after_lift:
+            notices.append(Settled(last_time))
             self._lifted = None
         return tuple(notices)
 

@@ -11,8 +11,9 @@ from sessions.run.states import (
     Ended,
     Idle,
     Mounting,
+    OpenTake,
     Paused,
-    Place,
+    Position,
     Progress,
     Ready,
     Resting,
@@ -33,7 +34,7 @@ def start(plan: SessionPlan) -> Step:
     """Return the state before a session begins, and the first commands. Raises ValueError for a plan without trials."""
     if not plan.trials:
         raise ValueError(f"the plan of {plan.subject} has no trials, so there is nothing to run")
-    return Idle(Place(plan, 0, (Progress(),) * len(plan.trials))), (steps.AskBegin(),)
+    return Idle(Position(plan, 0, (Progress(),) * len(plan.trials))), (steps.AskBegin(),)
 
 
 def advance(state: State, event: steps.Event) -> Step:
@@ -42,18 +43,19 @@ def advance(state: State, event: steps.Event) -> Step:
         case Ended(), _:
             return state, (_refusal(state, event),)
         case _, steps.Abort(reason):
-            why = reason.strip() or "no reason given"
-            return Ended(why, complete=False), (*_discard_commands(state, why), steps.EndSession(why, complete=False))
+            cause = reason.strip() or "no reason given"
+            commands = (*_discard_commands(state, cause), steps.EndSession(cause, complete=False))
+            return Ended(cause, complete=False), commands
         case _, steps.Note(text):
             return state, () if text.strip() else (
                 steps.Refuse("an empty note says nothing: write what is to be kept"),
             )
         case _, steps.Pause() | steps.Resume() | steps.RestOver():
-            return _rest(state, event)
+            return _pause_or_resume(state, event)
         case _, steps.Redo(reason) | steps.Skip(reason) if not reason.strip():
             return state, (steps.Refuse(f"say why: {type(event).__name__.lower()} needs a reason"),)
         case _, steps.Redo() | steps.UndoRedo():
-            return _again(state, event)
+            return _redo_or_undo(state, event)
         case _, steps.Skip(reason):
             return _leave_out(state, reason)
         case _, steps.ContactOnset() | steps.FingerLifted() | steps.Settled():
@@ -61,7 +63,7 @@ def advance(state: State, event: steps.Event) -> Step:
         case Scoring(), steps.Scored() | steps.MagnitudeEstimate() | steps.PairedChoice():
             return _take_answer(state, event)
         case _:
-            return _went_on(state, event)
+            return _advance_course(state, event)
 
 
 def resume_interrupted(state: State, reason: str) -> Step:
@@ -78,28 +80,29 @@ def resume_interrupted(state: State, reason: str) -> Step:
         case Ended():
             return state, ()
         case _:
-            place, undone = _undo_pair(state.place, reason)
-            return Mounting(place), (*_discard_commands(state, reason), *undone, *_asking_for(place, new_block=True))
+            position, undone = _undo_pair(state.position, reason)
+            discards = _discard_commands(state, reason)
+            return Mounting(position), (*discards, *undone, *_asking_for(position, new_block=True))
 
 
 def trial_in_hand(state: State) -> int | None:
     """Return the number of the trial a state belongs to; None before the first, after the last."""
-    return None if isinstance(state, Idle | Closing | Ended) else state.place.trial.number
+    return None if isinstance(state, Idle | Closing | Ended) else state.position.trial.number
 
 
-def _went_on(state: State, event: steps.Event) -> Step:
+def _advance_course(state: State, event: steps.Event) -> Step:
     match state, event:
-        case Idle(place), steps.Begin():
-            return Mounting(place), _asking_for(place, new_block=True)
-        case Mounting(place), steps.StimulusMounted(code) if code == place.trial.stimulus.code:
-            return _begin_take(place)
-        case Mounting(place), steps.StimulusMounted(code):
-            due_code = place.trial.stimulus.code
-            return state, (steps.Refuse(f"trial {place.trial.number} needs the stimulus {due_code}, not {code}"),)
-        case Taring(place), steps.Zeroed():
-            return Ready(place), (_ask_stroke(place),)
-        case Ready(place), steps.StrokeDone() if not place.plan.forces:
-            return _stroke_over(place.at(place.index))
+        case Idle(position), steps.Begin():
+            return Mounting(position), _asking_for(position, new_block=True)
+        case Mounting(position), steps.StimulusMounted(code) if code == position.trial.stimulus.code:
+            return _begin_take(position)
+        case Mounting(position), steps.StimulusMounted(code):
+            due_code = position.trial.stimulus.code
+            return state, (steps.Refuse(f"trial {position.trial.number} needs the stimulus {due_code}, not {code}"),)
+        case Taring(position), steps.Zeroed():
+            return Ready(position), (_ask_stroke(position),)
+        case Ready(position), steps.StrokeDone() if not position.plan.forces:
+            return _stroke_over(position.at(position.index))
         case Closing(), steps.Finish():
             reason = "every trial is done"
             return Ended(reason, complete=True), (steps.EndSession(reason, complete=True),)
@@ -109,86 +112,86 @@ def _went_on(state: State, event: steps.Event) -> Step:
 
 def _follow_contact(state: State, event: steps.ContactOnset | steps.FingerLifted | steps.Settled) -> Step:
     match state, event:
-        case Ready(place), steps.ContactOnset() if place.plan.forces:
-            return Stroking(place.at(place.index)), ()
-        case Stroking(place), steps.FingerLifted():
-            return _stroke_over(place)
-        case Scoring(place, touching=False, strokes=strokes), steps.ContactOnset() if place.plan.forces:
-            return Scoring(place, touching=True, strokes=strokes + 1), _further_stroke(place, strokes + 1)
-        case Scoring(place, touching=True, strokes=strokes), steps.FingerLifted():
-            return Scoring(place, strokes=strokes), ()
-        case Scoring(place, touching=False, strokes=strokes, settled=False), steps.Settled() if place.plan.forces:
-            return Scoring(place, strokes=strokes, settled=True), ()
-        case Settling(place, touching=False), steps.ContactOnset():
-            return Settling(place, touching=True), (
+        case Ready(position), steps.ContactOnset() if position.plan.forces:
+            return Stroking(position.at(position.index)), ()
+        case Stroking(position), steps.FingerLifted():
+            return _stroke_over(position)
+        case Scoring(position, touching=False, strokes=strokes), steps.ContactOnset() if position.plan.forces:
+            return Scoring(position, touching=True, strokes=strokes + 1), _further_stroke(position, strokes + 1)
+        case Scoring(position, touching=True, strokes=strokes), steps.FingerLifted():
+            return Scoring(position, strokes=strokes), ()
+        case Scoring(position, touching=False, strokes=strokes, settled=False), steps.Settled() if position.plan.forces:
+            return Scoring(position, strokes=strokes, settled=True), ()
+        case Settling(position, touching=False), steps.ContactOnset():
+            return Settling(position, touching=True), (
                 steps.Tell("the finger touches again: the take runs on until it is off"),
             )
-        case Settling(place, touching=True), steps.FingerLifted():
-            return Settling(place), ()
-        case Settling(place, touching=False), steps.Settled():
-            return _keep_take(place)
+        case Settling(position, touching=True), steps.FingerLifted():
+            return Settling(position), ()
+        case Settling(position, touching=False), steps.Settled():
+            return _keep_take(position)
         case _:
             return state, (_refusal(state, event),)
 
 
 def _take_answer(state: Scoring, answer: AnswerEvent) -> Step:
     """Take an answer; the take ends once the finger has been off for a moment, so that what follows it is recorded."""
-    place = state.place
-    wrong = answer_problem(answer, place.trial.answer)
-    if wrong is not None:
-        return state, (steps.Refuse(wrong),)
+    position = state.position
+    problem = answer_problem(answer, position.trial.answer)
+    if problem is not None:
+        return state, (steps.Refuse(problem),)
     if isinstance(answer, steps.PairedChoice):
-        place = place.with_progress(replace(place.progress[place.index], choice=answer.choice))
-    if state.settled or not place.plan.forces:
-        return _keep_take(place)
-    return Settling(place, touching=state.touching), ()
+        position = position.with_progress(replace(position.progress[position.index], choice=answer.choice))
+    if state.settled or not position.plan.forces:
+        return _keep_take(position)
+    return Settling(position, touching=state.touching), ()
 
 
-def _rest(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -> Step:
+def _pause_or_resume(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -> Step:
     """Stop asking, and go on where it is safe: the stimulus is confirmed and the zero measured anew."""
     match state, event:
-        case Scoring(place, strokes=strokes), steps.Pause():
-            return Paused(place, scoring=True, strokes=strokes), ()
-        case ((Mounting(place) | Taring(place) | Ready(place) | Stroking(place)), steps.Pause()):
-            why = "a pause came before the stroke was done"
-            return Paused(place, scoring=False), _discard_commands(state, why)
-        case Paused(place, scoring=True, strokes=strokes), steps.Resume():
-            return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
-        case Paused(place), steps.Resume():
-            before, undone = _undo_pair(place, "a pause parted the two stimuli")
-            return Mounting(before), (*undone, steps.AskMount(before.trial))
-        case Resting(place), steps.Resume() | steps.RestOver():
-            return Mounting(place), _asking_for(place, new_block=place.trial == place.block.trials[0])
+        case Scoring(position, strokes=strokes), steps.Pause():
+            return Paused(position, scoring=True, strokes=strokes), ()
+        case ((Mounting(position) | Taring(position) | Ready(position) | Stroking(position)), steps.Pause()):
+            reason = "a pause came before the stroke was done"
+            return Paused(position, scoring=False), _discard_commands(state, reason)
+        case Paused(position, scoring=True, strokes=strokes), steps.Resume():
+            return Scoring(position, strokes=strokes, settled=True), (_ask_answer(position),)
+        case Paused(position), steps.Resume():
+            first, undone = _undo_pair(position, "a pause parted the two stimuli")
+            return Mounting(first), (*undone, steps.AskMount(first.trial))
+        case Resting(position), steps.Resume() | steps.RestOver():
+            return Mounting(position), _asking_for(position, new_block=position.trial == position.block.trials[0])
         case _:
             return state, (_refusal(state, event),)
 
 
-def _again(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
+def _redo_or_undo(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
     """Repeat a trial, or undo that; a redo that discards no whole stroke cannot be undone."""
     if isinstance(event, steps.UndoRedo):
         return _redo_undone(state)
-    after, commands = _repeat(state, event.reason)
+    next_state, commands = _repeat(state, event.reason)
     between_takes = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
-    if between_takes and after != state and isinstance(after, Mounting | Taring | Ready):
-        after = structs.replace(after, place=replace(after.place, before_redo=state))
-    return after, commands
+    if between_takes and next_state != state and isinstance(next_state, Mounting | Taring | Ready):
+        next_state = structs.replace(next_state, position=replace(next_state.position, before_redo=state))
+    return next_state, commands
 
 
 def _repeat(state: State, reason: str) -> Step:
     """Repeat the trial in hand, or the one before where none is in hand yet; the order after it stays as it was."""
     match state:
-        case Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
-            if place.trial.compared_with is not None:
-                before, undone = _undo_pair(place, reason)
-                return Mounting(before), (*_discard_commands(state, reason), *undone, steps.AskMount(before.trial))
-            after, commands = _begin_take(place)
-            return after, (*_discard_commands(state, reason), *commands)
-        case Mounting(place) if place.take > 0:
-            return state, (steps.Refuse(f"trial {place.trial.number} is about to be repeated already"),)
-        case Mounting(place) | Resting(place) if place.index > 0:
-            return _return_to(place.at(place.index - 1), reason)
-        case Closing(place):
-            return _return_to(place, reason)
+        case Taring(position) | Ready(position) | Stroking(position) | Scoring(position) | Settling(position):
+            if position.trial.compared_with is not None:
+                first, undone = _undo_pair(position, reason)
+                return Mounting(first), (*_discard_commands(state, reason), *undone, steps.AskMount(first.trial))
+            taring, commands = _begin_take(position)
+            return taring, (*_discard_commands(state, reason), *commands)
+        case Mounting(position) if position.take > 0:
+            return state, (steps.Refuse(f"trial {position.trial.number} is about to be repeated already"),)
+        case Mounting(position) | Resting(position) if position.index > 0:
+            return _return_to(position.at(position.index - 1), reason)
+        case Closing(position):
+            return _return_to(position, reason)
         case _:
             return state, (_refusal(state, steps.Redo(reason)),)
 
@@ -196,149 +199,139 @@ def _repeat(state: State, reason: str) -> Step:
 def _redo_undone(state: State) -> Step:
     """Return to where the last redo came from: what it discarded is restored, what was left out is left out again."""
     match state:
-        case Mounting(place) | Taring(place) | Ready(place) if place.before_redo is not None:
-            before = place.before_redo
+        case Mounting(position) | Taring(position) | Ready(position) if position.before_redo is not None:
+            previous = position.before_redo
         case _:
             return state, (steps.Refuse("there is no redo to undo: it can be undone until the next stroke"),)
-    assert not isinstance(before, Ended)
-    then, trials, restores = before.place, place.plan.trials, list[steps.Command]()
-    in_hand = then.index if isinstance(before, Scoring | Settling) else None
-    for index in range(place.index, then.index + isinstance(before, Scoring | Settling | Closing)):
-        was, takes, number = then.progress[index], place.progress[index].takes, trials[index].number
-        if was.kept or index == in_hand:
-            restores += (steps.RestoreTake(number, was.take), *([steps.KeepTake(number, was.take)] if was.kept else ()))
+    assert not isinstance(previous, Ended)
+    restored, trials, restores = previous.position, position.plan.trials, list[steps.Command]()
+    in_hand = restored.index if isinstance(previous, Scoring | Settling) else None
+    for index in range(position.index, restored.index + isinstance(previous, Scoring | Settling | Closing)):
+        progress, take_count, number = restored.progress[index], position.progress[index].takes, trials[index].number
+        if progress.kept or index == in_hand:
+            restores.append(steps.RestoreTake(number, progress.take))
+            restores += [steps.KeepTake(number, progress.take)] if progress.kept else []
         else:
             restores.append(steps.LeaveOut(number, UNDONE))
-        then = replace(then.at(index).with_progress(replace(was, takes=takes)), index=then.index)
-    after, commands = _go_back(structs.replace(before, place=then))
-    return after, (*_discard_commands(state, UNDONE), *restores, *commands)
+        restored = replace(restored.at(index).with_progress(replace(progress, takes=take_count)), index=restored.index)
+    next_state, commands = _return_before_redo(structs.replace(previous, position=restored))
+    return next_state, (*_discard_commands(state, UNDONE), *restores, *commands)
 
 
-def _go_back(before: State) -> Step:
+def _return_before_redo(previous: State) -> Step:
     """Return to the state from which the trial was redone; the finger has been off since."""
-    match before:
-        case Scoring(place, strokes=strokes):
-            return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
-        case Settling(place):
-            return _keep_take(place)
-        case Resting(place):
-            return before, (steps.AskRest(place.plan.rests.duration),)
-        case Mounting(place):
-            return before, (steps.AskMount(place.trial),)
+    match previous:
+        case Scoring(position, strokes=strokes):
+            return Scoring(position, strokes=strokes, settled=True), (_ask_answer(position),)
+        case Settling(position):
+            return _keep_take(position)
+        case Resting(position):
+            return previous, (steps.AskRest(position.plan.rests.duration),)
+        case Mounting(position):
+            return previous, (steps.AskMount(position.trial),)
         case _:
-            return before, (steps.AskFinish(),)
+            return previous, (steps.AskFinish(),)
 
 
 def _leave_out(state: State, reason: str) -> Step:
     """Leave the trial in hand out and go on to the next."""
-    match state:
-        case Mounting(place) | Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
-            why = f"skipped: {reason}"
-            more: tuple[steps.Command, ...] = ()
-            discards = _discard_commands(state, why)
-            if place.first_of_two:
-                place = place.at(place.index + 1)
-                more = (steps.LeaveOut(place.trial.number, why),)
-            after, commands = _next(place)
-            return after, (*discards, *more, *commands)
-        case _:
-            return state, (_refusal(state, steps.Skip(reason)),)
+    if not isinstance(state, Mounting | OpenTake):
+        return state, (_refusal(state, steps.Skip(reason)),)
+    position, discard_reason = state.position, f"skipped: {reason}"
+    commands = _discard_commands(state, discard_reason)
+    if position.first_of_two:
+        position = position.at(position.index + 1)
+        commands = (*commands, steps.LeaveOut(position.trial.number, discard_reason))
+    next_state, next_commands = _next(position)
+    return next_state, (*commands, *next_commands)
 
 
-def _begin_take(place: Place) -> Step:
+def _begin_take(position: Position) -> Step:
     """Open the next take of the trial in hand, its stimulus being on."""
-    place = place.with_take(place.progress[place.index].takes + 1)
-    start_take = steps.StartTake(place.trial.number, place.take)
-    if place.plan.forces:
-        return Taring(place), (start_take, steps.MeasureZero())
-    return Ready(place), (start_take, _ask_stroke(place))
+    position = position.with_take(position.progress[position.index].takes + 1)
+    start_take = steps.StartTake(position.trial.number, position.take)
+    if position.plan.forces:
+        return Taring(position), (start_take, steps.MeasureZero())
+    return Ready(position), (start_take, _ask_stroke(position))
 
 
-def _stroke_over(place: Place) -> Step:
+def _stroke_over(position: Position) -> Step:
     """Ask for the answer; where none is due the take ends, once the finger has been off for a moment."""
-    if place.trial.answer != "none":
-        return Scoring(place), (_ask_answer(place),)
-    return (Settling(place), ()) if place.plan.forces else _keep_take(place)
+    if position.trial.answer != "none":
+        return Scoring(position), (_ask_answer(position),)
+    return (Settling(position), ()) if position.plan.forces else _keep_take(position)
 
 
-def _further_stroke(place: Place, strokes: int) -> tuple[steps.Command, ...]:
-    limit = place.block.strokes_allowed
+def _further_stroke(position: Position, strokes: int) -> tuple[steps.Command, ...]:
+    limit = position.block.strokes_allowed
     if strokes <= limit:
         return ()
     return (steps.Tell(f"stroke {strokes} where {limit} may be made: it is recorded and will be flagged"),)
 
 
-def _keep_take(place: Place) -> Step:
-    keep = steps.KeepTake(place.trial.number, place.take)
-    after, commands = _next(place.with_progress(replace(place.progress[place.index], kept=True)))
-    return after, (keep, *commands)
+def _keep_take(position: Position) -> Step:
+    keep = steps.KeepTake(position.trial.number, position.take)
+    next_state, commands = _next(position.with_progress(replace(position.progress[position.index], kept=True)))
+    return next_state, (keep, *commands)
 
 
-def _return_to(place: Place, reason: str) -> Step:
+def _return_to(position: Position, reason: str) -> Step:
     """Return to an earlier trial, whose kept take is discarded."""
-    before, undone = _undo_pair(place, reason)
-    return Mounting(before), (*_undo_commands(place, reason), *undone, steps.AskMount(before.trial))
+    first, undone = _undo_pair(position, reason)
+    return Mounting(first), (*_undo_commands(position, reason), *undone, steps.AskMount(first.trial))
 
 
-def _undo_pair(place: Place, reason: str) -> tuple[Place, tuple[steps.Command, ...]]:
-    """Return to the first of two that are compared, its take discarded; any other place stays as it is, not kept."""
-    if place.trial.compared_with is None:
-        return _without_kept_take(place), ()
-    first = _without_kept_take(place).at(place.index - 1)
+def _undo_pair(position: Position, reason: str) -> tuple[Position, tuple[steps.Command, ...]]:
+    """Return to the first of two that are compared, its take discarded; any other position stays as it is, not kept."""
+    if position.trial.compared_with is None:
+        return _without_kept_take(position), ()
+    first = _without_kept_take(position).at(position.index - 1)
     return _without_kept_take(first), _undo_commands(first, reason)
 
 
-def _undo_commands(place: Place, reason: str) -> tuple[steps.Command, ...]:
+def _undo_commands(position: Position, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that was kept of the trial in hand, where one was."""
-    return (steps.DiscardTake(place.trial.number, place.take, reason),) if place.progress[place.index].kept else ()
+    has_kept_take = position.progress[position.index].kept
+    return (steps.DiscardTake(position.trial.number, position.take, reason),) if has_kept_take else ()
 
 
-def _without_kept_take(place: Place) -> Place:
-    return place.with_take(place.take)
+def _without_kept_take(position: Position) -> Position:
+    return position.with_take(position.take)
 
 
-def _next(place: Place) -> Step:
+def _next(position: Position) -> Step:
     """Go on to the next trial, if there is one, or to the rest before it."""
-    if place.last:
-        return Closing(place.at(place.index)), (steps.AskFinish(),)
-    after = place.successor()
-    if after.rest_due:
-        return Resting(after), (steps.AskRest(after.plan.rests.duration),)
-    return Mounting(after), _asking_for(after, new_block=after.block.name != place.block.name)
+    if position.is_last:
+        return Closing(position.at(position.index)), (steps.AskFinish(),)
+    successor = position.successor()
+    if successor.rest_due:
+        return Resting(successor), (steps.AskRest(successor.plan.rests.duration),)
+    return Mounting(successor), _asking_for(successor, new_block=successor.block.name != position.block.name)
 
 
-def _asking_for(place: Place, *, new_block: bool) -> tuple[steps.Command, ...]:
-    instruction = (steps.ShowInstruction(place.block),) if new_block else ()
-    return (*instruction, steps.AskMount(place.trial))
+def _asking_for(position: Position, *, new_block: bool) -> tuple[steps.Command, ...]:
+    instruction = (steps.ShowInstruction(position.block),) if new_block else ()
+    return (*instruction, steps.AskMount(position.trial))
 
 
-def _ask_stroke(place: Place) -> steps.AskStroke:
-    return steps.AskStroke(place.trial, place.block.strokes_allowed)
+def _ask_stroke(position: Position) -> steps.AskStroke:
+    return steps.AskStroke(position.trial, position.block.strokes_allowed)
 
 
-def _ask_answer(place: Place) -> steps.Command:
-    trial, block = place.trial, place.block
+def _ask_answer(position: Position) -> steps.Command:
+    trial, block = position.trial, position.block
     if trial.answer == "number":
         return steps.AskNumber(trial, block.question)
     if trial.answer == "choice":
-        return steps.AskChoice(place.at(place.index - 1).trial, trial, block.question)
+        return steps.AskChoice(position.at(position.index - 1).trial, trial, block.question)
     return steps.AskScore(trial, block.scale_ends, block.ticks, block.question)
 
 
 def _discard_commands(state: State, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that is open, where one is."""
-    match state:
-        case (
-            Taring(place)
-            | Ready(place)
-            | Stroking(place)
-            | Scoring(place)
-            | Settling(place)
-            | Paused(place, scoring=True)
-        ):
-            return (steps.DiscardTake(place.trial.number, place.take, reason),)
-        case _:
-            return ()
+    if isinstance(state, OpenTake) or (isinstance(state, Paused) and state.scoring):
+        return (steps.DiscardTake(state.position.trial.number, state.position.take, reason),)
+    return ()
 
 
 def _refusal(state: State, event: steps.Event) -> steps.Refuse:
@@ -355,4 +348,4 @@ def _refusal(state: State, event: steps.Event) -> steps.Refuse:
         Closing: "every trial is done",
         Ended: "the session has ended",
     }
-    return steps.Refuse(f"{steps.WORDS[type(event)]} means nothing now: {situations[type(state)]}")
+    return steps.Refuse(f"{steps.EVENT_NAMES[type(event)]} means nothing now: {situations[type(state)]}")

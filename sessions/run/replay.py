@@ -60,15 +60,15 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
 
 def different_events(first: Recording, second: Recording) -> Iterator[str]:
     """Yield a sentence for each event that came out otherwise, is new, or came no more."""
-    then, now = ([event for event in events.events if event.kind not in TELL_LOSSES] for events in (first, second))
-    matcher = SequenceMatcher(None, [_key(event) for event in then], [_key(event) for event in now], autojunk=False)
-    for what, i, i_end, j, j_end in matcher.get_opcodes():
-        if what == "equal":
-            for before, after in zip(then[i:i_end], now[j:j_end], strict=True):
-                yield from differences(_plain(before), _plain(after), _name(before))
+    log, replay_log = ([e for e in recording.events if e.kind not in TELL_LOSSES] for recording in (first, second))
+    kinds, replay_kinds = ([(event.kind, event.trial) for event in events] for events in (log, replay_log))
+    for operation, i, i_end, k, k_end in SequenceMatcher(None, kinds, replay_kinds, autojunk=False).get_opcodes():
+        if operation == "equal":
+            for old, new in zip(log[i:i_end], replay_log[k:k_end], strict=True):
+                yield from differences(_plain(old), _plain(new), _name(old))
         else:
-            yield from (f"{_name(event)} came no more" for event in then[i:i_end])
-            yield from (f"{_name(event)} of the replay is new" for event in now[j:j_end])
+            yield from (f"{_name(event)} came no more" for event in log[i:i_end])
+            yield from (f"{_name(event)} of the replay is new" for event in replay_log[k:k_end])
 
 
 def different_readings(first: Recording, second: Recording) -> Iterator[str]:
@@ -102,12 +102,12 @@ class _Rewriter(FleetingWriter):
         """Return when such an event was recorded next. Raises _CutShort where the recording ends without an end."""
         if self._is_cut_short and (kind == "ended" or self._next_event == len(self._log)):
             raise _CutShort("the recording was cut short here")
-        ahead = range(self._next_event, len(self._log))
-        place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
-        if place is None:
+        following = range(self._next_event, len(self._log))
+        position = next((i for i in following if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
+        if position is None:
             return super().instant_ns(kind, trial)
-        self._next_event = place + 1
-        return self._log[place].time_ns
+        self._next_event = position + 1
+        return self._log[position].time_ns
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
@@ -129,7 +129,7 @@ class _CutShort(RecordingError):
     """The recording ends here, without an end."""
 
 
-class _Again(Exception):
+class _ReplayedError(Exception):
     """An error of the program that the recording tells of, raised where it was raised."""
 
 
@@ -208,7 +208,7 @@ class _Player:
             return ()
         if step.end is not None and step.end.get("cause") == "program":
             name, _, message = str(step.end.get("reason", "")).partition(": ")
-            raise type(name, (_Again,), {})(message)
+            raise type(name, (_ReplayedError,), {})(message)
         self.clock.move(step.instant_ns)
         return () if step.act is None else (step.act,)
 
@@ -266,12 +266,12 @@ class _Player:
             time.sleep(min(remaining_s, SLICE))
         return remaining_s > SLICE
 
-    def _move_past(self, what: str, step: Step, every: float) -> None:
+    def _move_past(self, kind: str, step: Step, interval: float) -> None:
         """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
-        last_ns = self._said_ns.get(what)
-        instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(every * 1e9))
+        last_ns = self._said_ns.get(kind)
+        instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(interval * 1e9))
         self.clock.move(instant)
-        self._said_ns[what] = self.clock.now_ns()
+        self._said_ns[kind] = self.clock.now_ns()
 
 
 def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
@@ -291,11 +291,11 @@ def _run(
     readings = RecordedReadings(recording.blocks())
     try:
         for number, log in enumerate(logs):
-            after = logs[number + 1] if number + 1 < len(logs) else None
-            limit = None if after is None else after[0].readings
+            following_log = logs[number + 1] if number + 1 < len(logs) else None
+            limit = None if following_log is None else following_log[0].readings
 
-            def show(part: float, what: str, number: int = number) -> None:
-                progress((number + part) / len(logs), what)
+            def show(share: float, activity: str, number: int = number) -> None:
+                progress((number + share) / len(logs), activity)
 
             player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, show)
             writer.follow_part(log)
@@ -307,22 +307,22 @@ def _run(
 
 def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, continuation: Continuation | None) -> None:
     transducer, settings = player if plan.forces else None, player.settings
-    with suppress(_CutShort, _Again):  # as the part ends
+    with suppress(_CutShort, _ReplayedError):  # as the part ends
         end = run_session(plan, writer, player, transducer, settings=settings, resumed=continuation, stop=player.go_on)
         if end.cause == "stopped" and not player.at_end:
             raise Stopped
 
 
-def _resume_part(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Continuation:
+def _resume_part(plan: SessionPlan, earlier_events: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Continuation:
     """Return where a part of the session continues, after the parts that are replayed already."""
     resumption_data = next(event.data for event in log if event.kind == "resumed")
     seams = [event.data for event in log if event.kind == "readings_joined"]
 
-    def joins(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
+    def seam_between(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
         return _RecordedSeam(**seams[0]) if seams else _RecordedSeam(0, 0.0)
 
     data = {name: value for name, value in resumption_data.items() if name != "run"}
-    return Continuation(resumption(plan, before), data, ReadingBlock.empty(), joins)
+    return Continuation(resumption(plan, earlier_events), data, ReadingBlock.empty(), seam_between)
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,13 +345,9 @@ def _copy(recording: Recording, writer: _Rewriter) -> None:
     writer.finish()
 
 
-def _key(event: LoggedEvent) -> tuple[str, int | None]:
-    return event.kind, event.trial
-
-
 def _name(event: LoggedEvent) -> str:
-    where = "" if event.trial is None else f" in trial {event.trial}"
-    return f"event {event.number} ({event.kind}{where})"
+    trial_text = "" if event.trial is None else f" in trial {event.trial}"
+    return f"event {event.number} ({event.kind}{trial_text})"
 
 
 def _plain(event: LoggedEvent) -> dict[str, Any]:

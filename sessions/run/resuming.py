@@ -132,24 +132,26 @@ class Gap:
     resumed_utc: str
 
 
-def continue_clock(recording: Recording, last: ReadingBlock, clock: Clock, now: datetime) -> tuple[ContinuedClock, Gap]:
+def continue_clock(
+    recording: Recording, last_block: ReadingBlock, clock: Clock, date: datetime
+) -> tuple[ContinuedClock, Gap]:
     """Return a clock that continues the session's, and the gap between.
 
-    `last` holds the last readings (or none), `now` is the date. The session clock goes on from its last instant by as
-    much as the wall clock says has passed, a second more or less: no two clocks of a computer survive its restart.
+    `last_block` holds the last readings (or none). The session clock goes on from its last instant by as much as the
+    wall clock, now at `date`, says has passed, a second more or less: no two clocks of a computer survive its restart.
     """
     clock_readings = [(str(recording.provenance["created_utc"]), int(recording.provenance["clock"]["now_ns"]))]
     resumptions = (e.data for e in recording.events if e.kind == "resumed")
     clock_readings += [(data["resumed_utc"], _clock_at_resumption(data)) for data in resumptions]
     utc, at_ns = clock_readings[-1]
-    instants = [at_ns, *(event.time_ns for event in recording.events), *last.received_ns.tolist()]
+    instants = [at_ns, *(event.time_ns for event in recording.events), *last_block.received_ns.tolist()]
     last_ns = max(instants)
-    elapsed_ns = round((now - datetime.fromisoformat(utc)).total_seconds() * 1e9)
+    elapsed_ns = round((date - datetime.fromisoformat(utc)).total_seconds() * 1e9)
     # A simulated clock ran faster; while nothing ran, time passed as on the wall.
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
     offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()  # as `_clock_at_resumption` reads it again
     duration = gap_ns * 1e-9 if gap_ns * 1e-9 > -CLOCKS_AGREE else None
-    resumed_utc = now.astimezone(UTC).isoformat(timespec="milliseconds")
+    resumed_utc = date.astimezone(UTC).isoformat(timespec="milliseconds")
     gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, resumed_utc)
     return ContinuedClock(clock, offset_ns), gap
 
@@ -167,17 +169,15 @@ class Seam:
     time_offset: float  # [s]
 
     @staticmethod
-    def between(before: ReadingBlock, after: ReadingBlock) -> "Seam":
+    def between(old: ReadingBlock, new: ReadingBlock) -> "Seam":
         """Return the seam of the last readings before and the first after it; the time between is the session clock's.
 
         A seam after no reading adds nothing.
         """
-        if not len(before):
+        if not len(old):
             return Seam(0, 0.0)
-        gap_s = max(int(after.received_ns[0]) - int(before.received_ns[-1]), LEAST_GAP_NS) * 1e-9
-        return Seam(
-            int(before.sequence[-1]) + 1 - int(after.sequence[0]), float(before.time[-1]) + gap_s - float(after.time[0])
-        )
+        gap_s = max(int(new.received_ns[0]) - int(old.received_ns[-1]), LEAST_GAP_NS) * 1e-9
+        return Seam(int(old.sequence[-1]) + 1 - int(new.sequence[0]), float(old.time[-1]) + gap_s - float(new.time[0]))
 
     def join(self, block: ReadingBlock) -> ReadingBlock:
         """Return the readings with continuous numbers and times; raw values, counter and status stay the device's."""

@@ -1,5 +1,6 @@
 """Runs a session: carries out the machine's commands with a transducer, a writer and a clock, and feeds events back."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict, dataclass, field
@@ -15,7 +16,7 @@ from sessions.run.interruptions import Interruptions, interruptions
 from sessions.run.live_detection import TakeWatch
 from sessions.run.machine import advance, start, trial_in_hand
 from sessions.run.resuming import Resumption, Seam
-from sessions.run.states import Ended, Ready, Resting, Scoring, Settling, Stroking, Taring
+from sessions.run.states import Ended, OpenTake, Resting, Taring
 from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell, UndoRedo
 from sessions.strokes.settings import DetectorSettings
 
@@ -53,10 +54,10 @@ class RunnerSettings:
 class Continuation:
     """Where a session that was cut short continues, and the readings before it."""
 
-    at: Resumption
+    resumption: Resumption
     data: Mapping[str, Any]  # of the event `resumed`
-    last: ReadingBlock  # last readings before; empty where there were none
-    joins: Callable[[ReadingBlock, ReadingBlock], Seam] = Seam.between  # last readings before and first after it
+    last_block: ReadingBlock  # the last readings before; empty where there were none
+    seam_between: Callable[[ReadingBlock, ReadingBlock], Seam] = Seam.between  # last readings before and first after it
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +123,9 @@ class _Run:
     resumed: Continuation | None
 
     def __post_init__(self) -> None:
-        at = None if self.resumed is None else self.resumed.at
-        self._state, self._first_commands = start(self.plan) if at is None else (at.state, at.commands)
+        resumption = None if self.resumed is None else self.resumed.resumption
+        begin = start(self.plan) if resumption is None else (resumption.state, resumption.commands)
+        self._state, self._first_commands = begin
         self._watch: TakeWatch | None = None
         self._seam: Seam | None = None
         self._reported = Health()
@@ -158,7 +160,7 @@ class _Run:
         if self.resumed is None:
             self.writer.event("started", data=settings)
             return
-        for line in self.resumed.at.due_lines:
+        for line in self.resumed.resumption.due_lines:
             self.writer.event(*line, commit=False)
         self.writer.event("resumed", data={**self.resumed.data, "run": settings["settings"]})
 
@@ -172,8 +174,8 @@ class _Run:
             if self.writer.must_end is not None:
                 return "disk", self.writer.must_end
             self._listen()
-            over = self._rested_ns is not None and self.clock.now_ns() >= self._rested_ns
-            if over and isinstance(self._state, Resting):
+            rest_over = self._rested_ns is not None and self.clock.now_ns() >= self._rested_ns
+            if rest_over and isinstance(self._state, Resting):
                 self._take(RestOver())
             for event in self.operator.poll():
                 self._take(event)
@@ -203,25 +205,25 @@ class _Run:
         if self.resumed is None or not len(block):
             return block
         if self._seam is None:
-            self._seam = self.resumed.joins(self.resumed.last, block)
+            self._seam = self.resumed.seam_between(self.resumed.last_block, block)
             self.writer.event("readings_joined", data=asdict(self._seam), commit=False)
         return self._seam.join(block)
 
     def _take(self, event: Event) -> None:
         """Let the machine decide about an event, write both down, then show what it asks for."""
-        before, kind = self._state, kind_of(type(event))
-        self._state, commands = advance(before, event)
+        previous, kind = self._state, kind_of(type(event))
+        self._state, commands = advance(previous, event)
         refusals = [command for command in commands if isinstance(command, Refuse)]
         if refusals:
             data = {"event": kind, "sentence": refusals[0].sentence, "given": data_of(event)}
-            self.writer.event("refused", trial_in_hand(before), data)
+            self.writer.event("refused", trial_in_hand(previous), data)
             self.operator.show(refusals[0])
             return
-        entry = self.writer.event(kind, trial_in_hand(before), data_of(event), commit=False)
+        entry = self.writer.event(kind, trial_in_hand(previous), data_of(event), commit=False)
         for command in commands:
             if isinstance(command, AskRest):  # reckoned from the event it follows, whose instant a replay knows
                 self._rested_ns = None if command.duration is None else entry.time_ns + round(command.duration * 1e9)
-        if isinstance(event, UndoRedo) or not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
+        if isinstance(event, UndoRedo) or not isinstance(self._state, OpenTake):
             self._watch = None
         self._carry_out(commands)
 
@@ -243,17 +245,16 @@ class _Run:
         self._watch = TakeWatch(info, self.plan.frame, settings.zero_duration, settings.detection, settings.after_lift)
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 
-    def _report_losses(self, *, now: bool = False) -> None:
+    def _report_losses(self, *, immediately: bool = False) -> None:
         """Write down what the driver lost, repeated or found wrong since the last report."""
         if self.transducer is None:
             return
         health = self.transducer.health
         counts = {name: getattr(health, name) - getattr(self._reported, name) for name in COUNTS}
-        if any(counts.values()) and (now or self._due("losses", self.settings.losses_every)):
+        if any(counts.values()) and (immediately or self._due("losses", self.settings.losses_every)):
             summary = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-            before = self._reported.flagged
-            flags = {words: count - before.get(words, 0) for words, count in health.flagged.items()}
-            flags = {words: count for words, count in flags.items() if count}
+            reported_flags = self._reported.flagged
+            flags = dict(Counter(health.flagged) - Counter(reported_flags))
             causes = [health.rate_words] if counts["off_rate"] else []
             causes += [f"status: {flagged_words(flags)}"] if flags else []
             sentence = f"readings: {summary}" + (f" ({'; '.join(causes)})" if causes else "")
@@ -262,12 +263,12 @@ class _Run:
             self.writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
             self._reported = health
 
-    def _due(self, what: str, every: float) -> bool:
+    def _due(self, name: str, interval: float) -> bool:
         """Say whether it is time for something, and when it is, set the next time."""
         now_ns = self.clock.now_ns()
-        if now_ns < self._due_ns[what]:
+        if now_ns < self._due_ns[name]:
             return False
-        self._due_ns[what] = now_ns + round(every * 1e9)
+        self._due_ns[name] = now_ns + round(interval * 1e9)
         return True
 
     def _tell_status(self) -> None:
@@ -296,7 +297,7 @@ class _Run:
                     if (line := line_of(command)) is not None:
                         self.writer.event(*line, commit=False)
             complete = isinstance(self._state, Ended) and self._state.complete
-            self._report_losses(now=True)
+            self._report_losses(immediately=True)
             end = SessionEnd(reason, cause, complete, self.writer.reading_count, health)
             self.writer.event("ended", data=asdict(end))
         return end

@@ -1,4 +1,4 @@
-"""Where a session is: the states of its course, and the place in the plan that each of them stands at."""
+"""Where a session is: the states of its course, and the position in the plan that each of them stands at."""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +19,7 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Position:
     """Which trial of the plan is in hand, and how far every trial is."""
 
     plan: SessionPlan
@@ -43,14 +43,14 @@ class Place:
         return self.progress[self.index].take
 
     @property
-    def last(self) -> bool:
+    def is_last(self) -> bool:
         """Say whether the trial in hand is the last."""
         return self.index == len(self.progress) - 1
 
     @property
     def first_of_two(self) -> bool:
         """Say whether the trial in hand is the first of two that are compared."""
-        return not self.last and self.plan.trials[self.index + 1].compared_with == self.trial.number
+        return not self.is_last and self.plan.trials[self.index + 1].compared_with == self.trial.number
 
     @property
     def rest_due(self) -> bool:
@@ -65,14 +65,14 @@ class Place:
         number = sum(earlier.compared_with is None for earlier in block.trials[:position])
         return rests.after_trials is not None and number % rests.after_trials == 0
 
-    def at(self, index: int) -> "Place":
-        """Return the place with another trial in hand, to which no redo has led."""
+    def at(self, index: int) -> "Position":
+        """Return the position with another trial in hand, to which no redo has led."""
         return replace(self, index=index, before_redo=None)
 
-    def successor(self) -> "Place":
-        """Return the place with the next trial in hand; in an adaptive block the answers choose its stimuli."""
-        after = self.at(self.index + 1)
-        return replace(after, plan=with_comparison(self.plan, after.trial.number, after.answers))
+    def successor(self) -> "Position":
+        """Return the position with the next trial in hand; in an adaptive block the answers choose its stimuli."""
+        following = self.at(self.index + 1)
+        return replace(following, plan=with_comparison(self.plan, following.trial.number, following.answers))
 
     @property
     def answers(self) -> tuple[tuple[Stimulus, bool], ...]:
@@ -80,25 +80,25 @@ class Place:
         trials = self.plan.trials
         block = trials[self.index].block
         stimuli: list[tuple[Stimulus, bool]] = []
-        for n, (trial, progress) in enumerate(zip(trials, self.progress, strict=True)):
+        for i, (trial, progress) in enumerate(zip(trials, self.progress, strict=True)):
             if trial.block == block and progress.kept and progress.choice is not None:
-                comparison = trials[n - 1] if trial.standard else trial
+                comparison = trials[i - 1] if trial.standard else trial
                 stimuli.append((comparison.stimulus, (progress.choice == "second") == (comparison is trial)))
         return tuple(stimuli)
 
-    def with_take(self, take: int) -> "Place":
-        """Return the place with this take of the trial in hand, the latest or an earlier one, which does not count."""
+    def with_take(self, take: int) -> "Position":
+        """Return the position with this take of the trial in hand, the latest or an earlier one; it does not count."""
         return self.with_progress(Progress(max(take, self.progress[self.index].takes), take))
 
-    def with_progress(self, progress: Progress) -> "Place":
-        """Return the place with the trial in hand that far."""
+    def with_progress(self, progress: Progress) -> "Position":
+        """Return the position with the trial in hand that far."""
         return replace(self, progress=(*self.progress[: self.index], progress, *self.progress[self.index + 1 :]))
 
 
 class _State(Struct, frozen=True):
     """A state of a session that has not ended."""
 
-    place: Place
+    position: Position
 
 
 class Idle(_State, frozen=True):
@@ -157,4 +157,5 @@ class Ended(Struct, frozen=True):
     complete: bool  # True when every trial was done or skipped
 
 
+OpenTake = Taring | Ready | Stroking | Scoring | Settling  # the states in which a take goes on
 State = Idle | Mounting | Taring | Ready | Stroking | Scoring | Settling | Resting | Paused | Closing | Ended

@@ -138,7 +138,7 @@ Event = (
     | MagnitudeEstimate | PairedChoice | Note | Redo | UndoRedo | Skip | Pause | Resume | RestOver | Abort | Finish
 )  # fmt: skip
 
-WORDS: dict[type[Event], str] = {
+EVENT_NAMES: dict[type[Event], str] = {
     Abort: "abort",
     Begin: "begin",
     StimulusMounted: "a mounted stimulus",
@@ -305,15 +305,15 @@ def answer_problem(answer: AnswerEvent, expected: Answer) -> str | None:
     if expected_kind is None:
         return "this trial asks for no answer"
     if not isinstance(answer, expected_kind):
-        return f"this trial asks for {WORDS[expected_kind]}, not for {WORDS[type(answer)]}"
+        return f"this trial asks for {EVENT_NAMES[expected_kind]}, not for {EVENT_NAMES[type(answer)]}"
     if answer.corrections is not None and answer.corrections < 0:
         return f"an answer is corrected a number of times; {answer.corrections} is none"
     match answer:
         case Scored(score) if score is not None and not 0 <= score <= 100:
             return f"a score lies between 0 and 100; {score:g} does not"
-        case Scored(positions=positions) if not all(0 <= at <= 100 and math.isfinite(t) for t, at in positions):
+        case Scored(positions=positions) if not all(0 <= x <= 100 and math.isfinite(t) for t, x in positions):
             return "every position on the line has a time and lies between 0 and 100; one of these does not"
-        case Scored(positions=positions) if any(after < before for (before, _), (after, _) in pairwise(positions)):
+        case Scored(positions=positions) if any(later < earlier for (earlier, _), (later, _) in pairwise(positions)):
             return "positions on the line come in the order of time; these do not"
         case MagnitudeEstimate(number) if number is not None and not (number > 0 and math.isfinite(number)):
             return f"a number on a scale of one's own is above 0; {number:g} is not"

@@ -99,12 +99,12 @@ def test_a_redo_that_is_undone_leaves_every_trial_as_it_was(walk):
             assert isinstance(before, Taring | Ready | Stroking)
             continue
         if isinstance(before, Taring | Ready):
-            assert before.place.before_redo is not None
-            before = before.place.before_redo
-        kept_takes = {number: trial.take for number, trial in enumerate(before.place.progress) if trial.kept}
+            assert before.position.before_redo is not None
+            before = before.position.before_redo
+        kept_takes = {number: trial.take for number, trial in enumerate(before.position.progress) if trial.kept}
         if isinstance(before, Settling):
-            kept_takes[before.place.index] = before.place.take
-        assert {n: trial.take for n, trial in enumerate(after.place.progress) if trial.kept} == kept_takes
-        assert all(a.takes >= b.takes for a, b in zip(after.place.progress, state.place.progress, strict=True))
+            kept_takes[before.position.index] = before.position.take
+        assert {n: trial.take for n, trial in enumerate(after.position.progress) if trial.kept} == kept_takes
+        assert all(a.takes >= b.takes for a, b in zip(after.position.progress, state.position.progress, strict=True))
         if not isinstance(before, Settling):
-            assert (type(after), after.place.index) == (type(before), before.place.index)
+            assert (type(after), after.position.index) == (type(before), before.position.index)

@@ -229,7 +229,7 @@ def scored_visit(folder, subject, *, sealed=True):
     key = study_key(folder)
 
     def judge(command):
-        return [Scored(float(key.of(command.trial).stimulus.index))]
+        return [Scored(float(key.reveal(command.trial).stimulus.index))]
 
     path = folder / f"{subject}_scores"
     writer = SessionWriter.create(path, session_plan, None, provenance(clock), subject_simulated=True, clock=clock)

@@ -86,17 +86,17 @@ CHANCES = st.booleans().flatmap(lambda on: st.none() if on else EVENTS)
 def next_event(state):
     """The event that leads on from `state`."""
     match state:
-        case Mounting(place):
-            return StimulusMounted(place.trial.stimulus.code)
+        case Mounting(position):
+            return StimulusMounted(position.trial.stimulus.code)
         case Taring():
             return Zeroed()
-        case Ready(place):
-            return ContactOnset() if place.plan.forces else StrokeDone()
+        case Ready(position):
+            return ContactOnset() if position.plan.forces else StrokeDone()
         case Stroking():
             return FingerLifted()
-        case Scoring(place):
+        case Scoring(position):
             return {"line": Scored(40.0), "number": MagnitudeEstimate(4.0), "choice": PairedChoice("first")}[
-                place.trial.answer
+                position.trial.answer
             ]
         case Settling(touching=touching):
             return FingerLifted() if touching else Settled()

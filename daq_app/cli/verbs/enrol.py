@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.protocol is not None:
         file = protocol_file(options.protocol)
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed
-        studies.create_study(folder, text_of(file), seed, blinded=options.blind, where=str(file))
+        studies.create_study(folder, text_of(file), seed, blinded=options.blind, source=str(file))
     member = None
     if options.withdraw is not None:
         member = studies.withdraw(folder, options.subject, options.withdraw)

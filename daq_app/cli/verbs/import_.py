@@ -55,7 +55,7 @@ def _whole_session(folder: Path) -> Generator[None]:
             yield
     except DiskRefused as error:
         raise RecordingError(
-            f"{folder} cannot be written {error.why}, and import again: nothing is left of it"
+            f"{folder} cannot be written {error.reason}, and import again: nothing is left of it"
         ) from error
 
 

@@ -34,26 +34,30 @@ def check_language(key: str, language: str) -> None:
 
 
 def check_translations(
-    translations: Sequence[Translation], blocks: Mapping[str, tuple[str, str] | None], own: str, *, pre_evaluation: bool
+    translations: Sequence[Translation],
+    blocks: Mapping[str, tuple[str, str] | None],
+    original: str,
+    *,
+    pre_evaluation: bool,
 ) -> None:
     """Raise NotAllowed unless each language has every text of a protocol once, and none that it has not.
 
     `blocks` holds by name what the ends of a block's line are called; None where it has no line.
     """
     names = [*blocks, *([PRE_EVALUATION] if pre_evaluation else [])]
-    for number, one in enumerate(translations):
-        key = f"translations[{number}]"
-        if one.language == own:
-            raise NotAllowed(f"{key}.language", own, "it is the protocol's own: its texts stand in the blocks")
-        if one.block not in names:
-            raise NotAllowed(f"{key}.block", one.block, f"it must be one of {', '.join(names)}")
-        if any((one.language, one.block) == (other.language, other.block) for other in translations[:number]):
-            raise NotAllowed(f"{key}.block", one.block, f'"{one.language}" has its texts already')
-        if (one.scale_ends is None) != (blocks.get(one.block) is None):
-            what = "name both ends of its line" if one.scale_ends is None else "it has no line: leave its ends out"
-            raise NotAllowed(f"{key}.scale_ends", one.scale_ends and list(one.scale_ends), what)
-        if one.block in blocks and not one.question.strip():
-            raise NotAllowed(f"{key}.question", one.question, f"say what is asked of {one.block} in this language")
+    for number, translation in enumerate(translations):
+        key, block, ends = f"translations[{number}]", translation.block, translation.scale_ends
+        if translation.language == original:
+            raise NotAllowed(f"{key}.language", original, "it is the protocol's own: its texts stand in the blocks")
+        if block not in names:
+            raise NotAllowed(f"{key}.block", block, f"it must be one of {', '.join(names)}")
+        if (translation.language, block) in {(earlier.language, earlier.block) for earlier in translations[:number]}:
+            raise NotAllowed(f"{key}.block", block, f'"{translation.language}" has its texts already')
+        if (ends is None) != (blocks.get(block) is None):
+            remedy = "name both ends of its line" if ends is None else "it has no line: leave its ends out"
+            raise NotAllowed(f"{key}.scale_ends", ends and list(ends), remedy)
+        if block in blocks and not translation.question.strip():
+            raise NotAllowed(f"{key}.question", translation.question, f"say what is asked of {block} in this language")
     for language, block in missing_texts(translations, names):
         raise NotAllowed("translations", language, f'the texts of {block} are missing in "{language}"')
 
@@ -61,10 +65,10 @@ def check_translations(
 def missing_texts(translations: Sequence[Translation], names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield language and block of each text that a language which has others lacks."""
     for language in languages_of(translations):
-        blocks = {one.block for one in translations if one.language == language}
+        blocks = {translation.block for translation in translations if translation.language == language}
         yield from ((language, name) for name in names if name not in blocks)
 
 
 def languages_of(translations: Sequence[Translation]) -> tuple[str, ...]:
     """Return the languages, in the order first met."""
-    return tuple(dict.fromkeys(one.language for one in translations))
+    return tuple(dict.fromkeys(translation.language for translation in translations))

@@ -73,7 +73,7 @@ def plan(
     `forces` is False for a visit that only scores. `phases`, where given, replace the protocol's. Raises
     SettingsError where `subject` is no code or another value is out of range.
     """
-    own, visit_setting = body or Body(), setting or VisitSetting()
+    subject_body, visit_setting = body or Body(), setting or VisitSetting()
     planned_phases = protocol.phases if phases is None else phases
     try:
         protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
@@ -81,7 +81,7 @@ def plan(
             raise NotAllowed("subject", subject, "a code of letters, digits, - and _, never a name")
         check_range("seed", seed, 0, LARGEST_SEED)
         check_phases(protocol, planned_phases)
-        check_body(own, protocol)
+        check_body(subject_body, protocol)
     except NotAllowed as error:
         raise SettingsError(str(error)) from error
     area = protocol.face.contact_area if visit_setting.contact_area is None else visit_setting.contact_area
@@ -90,20 +90,20 @@ def plan(
     design_seed = protocol.label_seed if place is None else place.seed
     outlines = block_order(protocol, seed if place is None else place.slot)
     labels = protocol.labels if place is None else place.labels
-    blocks = _Blocks(protocol, outlines, seed, row, design_seed, own, labels)
+    blocks = _Blocks(protocol, outlines, seed, row, design_seed, subject_body, labels)
     plan = SessionPlan(
         protocol=protocol.name,
         subject=subject,
         seed=seed,
         order_rule=_order_rule(protocol, row, outlines[0]),
-        blocks=tuple(blocks.of(planned_phases)),
+        blocks=tuple(blocks.for_phases(planned_phases)),
         forces=forces,
         frame=visit_setting.frame or protocol.face.frame,
-        contact_angle=protocol.contact_angle if own.contact_angle is None else own.contact_angle,
-        contact_angle_origin="set" if own.contact_angle is None else "measured",
+        contact_angle=protocol.contact_angle if subject_body.contact_angle is None else subject_body.contact_angle,
+        contact_angle_origin="set" if subject_body.contact_angle is None else "measured",
         stroking_hand=visit_setting.stroking_hand,
         answering_hand=visit_setting.answering_hand,
-        finger=own.finger,
+        finger=subject_body.finger,
         rests=protocol.rests,
         shown=protocol.shown,
         masking=protocol.masking,
@@ -118,10 +118,11 @@ def plan(
     return plan if area is None else replace(plan, contact_area=area, contact_area_origin="set")
 
 
-def _order_rule(protocol: Protocol, row: int | None, first: BlockOutline) -> str:
-    """Return in words how the order of a session came about: by which row of a design, with which block `first`."""
+def _order_rule(protocol: Protocol, row: int | None, first_block: BlockOutline) -> str:
+    """Return in words how the order of a session came about: the row of its design, its first block."""
     rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {design_rows(protocol)}"
-    return rule if protocol.order.blocks != "counterbalanced" else f"{rule}; blocks counterbalanced, {first.name} first"
+    counterbalanced = protocol.order.blocks == "counterbalanced"
+    return f"{rule}; blocks counterbalanced, {first_block.name} first" if counterbalanced else rule
 
 
 def is_code(text: str) -> bool:
@@ -141,8 +142,8 @@ def block_order(protocol: Protocol, number: int) -> tuple[BlockOutline, ...]:
 
     With two blocks half of all subjects begin with each; with more, each block comes equally often at each place.
     """
-    first = number % len(protocol.blocks) if protocol.order.blocks == "counterbalanced" else 0
-    return protocol.blocks[first:] + protocol.blocks[:first]
+    start = number % len(protocol.blocks) if protocol.order.blocks == "counterbalanced" else 0
+    return protocol.blocks[start:] + protocol.blocks[:start]
 
 
 def blind(plan: SessionPlan) -> SessionPlan:
@@ -178,7 +179,7 @@ class _Blocks:
     def __post_init__(self) -> None:
         self._numbers = count(1)
 
-    def of(self, phases: Sequence[Phase]) -> Iterator[Block]:
+    def for_phases(self, phases: Sequence[Phase]) -> Iterator[Block]:
         """Yield the pre-evaluation of every descriptor, then each block after its practice."""
         pre_evaluation = self.protocol.pre_evaluation
         for outline in self.outlines if "pre-evaluation" in phases else ():
@@ -211,9 +212,9 @@ class _Blocks:
 
     def _adaptive_orders(self, outline: BlockOutline, standard: int, comparisons: int) -> list[tuple[int, ...]]:
         """Return each comparison as the answers that there are not yet ask for it; half begin with the standard."""
-        first = next_comparison(self._candidates(outline), ()).known_index
+        comparison = next_comparison(self._candidates(outline), ()).known_index
         leaders = shuffle(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
-        return [(first, standard) if n in leaders else (standard, first) for n in range(comparisons)]
+        return [(comparison, standard) if n in leaders else (standard, comparison) for n in range(comparisons)]
 
     def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
         """Return what is compared with the standard of an adaptive block, by index; nothing in any other block."""
@@ -259,7 +260,7 @@ class _Blocks:
     def _block(
         self, outline: BlockOutline, phase: Phase, name: str, orders: Sequence[Sequence[int]], instruction: str
     ) -> Block:
-        own = self.body.indentations.get(outline.name)
+        depth = self.body.indentations.get(outline.name)
         direction = DIRECTIONS[outline.direction]
         answer = self.protocol.scale.answer
         times: Counter[int] = Counter()
@@ -284,13 +285,13 @@ class _Blocks:
             name=name,
             instruction=instruction,
             direction=direction,
-            indentation=outline.indentation if own is None else own,
+            indentation=outline.indentation if depth is None else depth,
             scale_ends=outline.scale_ends or ("", ""),
             trials=tuple(trials),
             phase=phase,
             question=outline.question,
             strokes_allowed=outline.strokes_allowed,
             ticks=self.protocol.scale.ticks,
-            indentation_origin="set" if own is None else "measured",
+            indentation_origin="set" if depth is None else "measured",
             candidates=self._candidates(outline) if phase == "main" else (),
         )

@@ -79,11 +79,11 @@ class BlockOutline(msgspec.Struct, frozen=True):
         if self.standard not in self.indices:
             raise NotAllowed("standard", self.standard, f"it must be one of indices {list(self.indices)}")
         if len(self.indices) < 1 + LEAST_COMPARISONS:
-            few = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
-            raise NotAllowed("indices", list(self.indices), few)
+            reason = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
+            raise NotAllowed("indices", list(self.indices), reason)
         if self.adaptive is None and self.repetitions % 2:
-            even = "with a standard it must be even, so that each comparison comes first as often as second"
-            raise NotAllowed("repetitions", self.repetitions, even)
+            reason = "with a standard it must be even, so that each comparison comes first as often as second"
+            raise NotAllowed("repetitions", self.repetitions, reason)
 
     def _check_adaptive(self) -> None:
         if self.standard is None:
@@ -139,7 +139,7 @@ class OrderRules:
 
     def meets(self, order: Sequence[int], begun_with: Sequence[int] = ()) -> bool:
         """Say whether an order of indices will do, where repetitions before it began with `begun_with`."""
-        rank = {index: place for place, index in enumerate(sorted(order))}
+        rank = {index: position for position, index in enumerate(sorted(order))}
         return (
             not (self.neighbours_apart and any(abs(rank[a] - rank[b]) == 1 for a, b in pairwise(order)))
             and order[0] not in self.not_first
@@ -210,8 +210,8 @@ class Protocol:
                 raise NotAllowed(f"blocks[{i}].name", name, "no two blocks may have the same name")
             self._check_answers(f"blocks[{i}]", block)
             self._check_order(f"blocks[{i}]", block)
-        ends = {block.name: block.scale_ends for block in self.blocks}
-        check_translations(self.translations, ends, self.language, pre_evaluation=self.pre_evaluation is not None)
+        scale_ends = {block.name: block.scale_ends for block in self.blocks}
+        check_translations(self.translations, scale_ends, self.language, pre_evaluation=self.pre_evaluation is not None)
 
     @property
     def labels(self) -> Labels:
@@ -237,7 +237,7 @@ class Protocol:
         """Return the protocol with its texts in a language. Raises NotAllowed where it has none."""
         if language == self.language:
             return self
-        texts = {one.block: one for one in self.translations if one.language == language}
+        texts = {text.block: text for text in self.translations if text.language == language}
         if not texts:
             raise NotAllowed("language", language, f"{self.name} has its texts in {', '.join(self.languages)}")
         blocks = tuple(
@@ -245,9 +245,9 @@ class Protocol:
             for block in self.blocks
             for text in [texts[block.name]]
         )
-        words = texts.get(PRE_EVALUATION)
-        before = self.pre_evaluation if words is None else PreEvaluation(words.instruction)
-        return replace(self, blocks=blocks, pre_evaluation=before, language=language, translations=())
+        translation = texts.get(PRE_EVALUATION)
+        pre_evaluation = self.pre_evaluation if translation is None else PreEvaluation(translation.instruction)
+        return replace(self, blocks=blocks, pre_evaluation=pre_evaluation, language=language, translations=())
 
     def _check_answers(self, key: str, block: BlockOutline) -> None:
         """Check that a block says what its answers need, and nothing that they do not have."""
@@ -269,15 +269,15 @@ class Protocol:
 
     def _check_order(self, key: str, block: BlockOutline) -> None:
         if self.order.constrained and (self.order.rule == "williams" or self.scale.answer == "choice"):
-            what = (
+            reason = (
                 "a Williams design fixes its orders" if self.order.rule == "williams" else "pairs are in no such order"
             )
-            raise NotAllowed("order.rule", self.order.rule, f"{what}: leave the other keys of [order] out")
+            raise NotAllowed("order.rule", self.order.rule, f"{reason}: leave the other keys of [order] out")
         if self.order.rule == "williams" and self.scale.answer == "choice":
             raise NotAllowed("order.rule", self.order.rule, 'pairs are "shuffled"')
         if self.order.first_differs and block.repetitions > len(set(block.indices) - set(self.order.not_first)):
-            what = "more repetitions than stimuli that may be first, and first_differs asks for another each time"
-            raise NotAllowed(f"{key}.repetitions", block.repetitions, what)
+            reason = "more repetitions than stimuli that may be first, and first_differs asks for another each time"
+            raise NotAllowed(f"{key}.repetitions", block.repetitions, reason)
         if self.order.constrained and draw(block.indices, 0, block.name, self.order.meets) is None:
             raise NotAllowed(f"{key}.indices", list(block.indices), "no order of these meets what [order] asks for")
 
@@ -300,7 +300,7 @@ def phases_before(protocol: Protocol) -> tuple[Phase, ...]:
     is_judged = protocol.pre_evaluation is not None and protocol.scale.answer != "choice"
     practised = any(block.practice for block in protocol.blocks)
     has: dict[Phase, bool] = {"pre-evaluation": is_judged, "practice": practised}
-    return tuple(phase for phase, there in has.items() if there)
+    return tuple(phase for phase, present in has.items() if present)
 
 
 def protocol_names() -> tuple[str, ...]:
