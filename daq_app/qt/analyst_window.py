@@ -345,6 +345,8 @@ class TrialsColumn(QWidget):
         for widget in (self.list, self._below, self.responses):
             widget.setHidden(empty)
         words = tr("No trial has both a score and an answer of the model.")
+        if state.stage != "predicted" and state.step is not None:
+            words = tr("The model has not answered yet.")
         say(self.none, tr("This session has no stroke. Its answers are kept: Export… writes them.") if empty else words)
 
     def _choose(self, row: int) -> None:

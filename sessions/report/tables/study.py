@@ -190,7 +190,7 @@ def _forces(study: StudyFindings) -> Table | None:
 
 
 _NOT_WITHIN = "no interval: no two subjects scored every surface, or they differ alike between surfaces"
-_NOT_OF_PEOPLE = "no interval of two subjects, of some who are all alike, or of a perfect r"
+_NOT_OF_PEOPLE = "no interval of fewer than three subjects, of some who are all alike, or of a perfect r"
 _NO_STROKE = "no subject's stroke gives this number"
 
 

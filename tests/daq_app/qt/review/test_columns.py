@@ -123,6 +123,13 @@ def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model
     assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
 
 
+def test_while_the_model_is_at_work_no_trial_is_said_to_lack_its_answer(window):
+    window.trials.show_state(m.AnalystState(SESSION))
+    assert window.trials.none.text() == "The model has not answered yet."
+    window.take(m.ReportReady("predicted", replace(example(), predictions=())))
+    assert window.trials.none.text().startswith("No trial has both")
+
+
 def test_a_plot_of_nothing_has_no_scale_and_a_sentence_says_so(window):
     def scales():
         plots = *window.stroke.stroke._plots, window.model.plot.plot
