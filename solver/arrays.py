@@ -45,18 +45,6 @@ def inverse(matrices: Array) -> Array:
 NEO_HOOKEAN = 2.0  # Ogden's exponent of the neo-Hookean law, which does not stiffen
 
 
-class ElementGeometry(NamedTuple):
-    """Integrals over e elements that do not depend on the material; q = 9 quadrature points."""
-
-    grad_x: Array  # as in `ElementArrays`
-    grad_y: Array
-    weight: Array
-    modes: Array
-    laplace: Array
-    centre: Array  # (e, 2) origin of x and y in the modes [mm]
-    combination: Array  # (e, 3, 3) the modes by 1, x, y: inverse Cholesky factor of their mass matrix
-
-
 class ElementArrays(NamedTuple):
     """Geometry and material of e nine-node elements; q = 9 quadrature points."""
 
@@ -95,7 +83,7 @@ class ElementWork(NamedTuple):
     f_diff: Array  # (q, 4) F - F^-T
     h: Array  # (q, 18) F^-T times gradients of shape functions: in the deformed body
     s: Array  # (q, 18) F - F^-T times these gradients
-    wide: Array  # (q, 3) weights times pressure modes
+    weighted_modes: Array  # (q, 3) weights times pressure modes
     push: Array  # (q,) weight times present shear modulus
     shear_slope: Array  # (q,) weight times twice its derivative by Q
     bend: Array  # (q,) weight times (shear modulus - pressure)
@@ -106,7 +94,7 @@ class ElementWork(NamedTuple):
     laplace: Array  # (9, 9) as in `ElementArrays`, times the present shear modulus [N/mm per mm]
     left: Array  # (18, 5) left @ right is the tangent's part from three pressure modes and the centre
     right: Array  # (5, 16)
-    own: Array  # (18, 18) terms of stiffening and overstress in the tangent
+    dyads: Array  # (18, 18) terms of stiffening and overstress in the tangent
     product: Array  # (16, 16) left @ right
 
 
@@ -115,15 +103,6 @@ class BodyState(NamedTuple):
 
     u: Array  # (nodes, 2) [mm]
     pressure: Array  # (e, 3) modes
-
-
-class ShapeFunctions(NamedTuple):
-    """Shape functions of the nine nodes at the quadrature points."""
-
-    values: Array  # (q, 9)
-    along: Array  # (q, 9) derivatives by the first local coordinate
-    up: Array  # (q, 9) by the second
-    weights: Array  # (q,)
 
 
 class SymbolicFactorization(NamedTuple):
@@ -146,7 +125,7 @@ class SymbolicFactorization(NamedTuple):
     wait_at: Indices  # (p,) start of each part's Schur complement in `waiting`
     leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
     order: Narrow  # (e,) elements, leaf after leaf
-    at: Narrow  # (e, 16) positions of their unknowns in the front of their leaf, in this order; -1 where fixed
+    position: Narrow  # (e, 16) positions of their unknowns in the front of their leaf, in this order; -1 where fixed
     factors: int  # size of the memory for factors
     waiting: int  # size of the memory for Schur complements
 

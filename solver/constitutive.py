@@ -250,10 +250,10 @@ def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
         value = value + term
     far = np.real(Q) > _NEAR
     s = np.arcsinh(np.sqrt(np.where(far, Q, 1.0)) / 2.0)
-    one, two = np.sinh(a * s), np.sinh(2.0 * s)
-    wide = 2.0 / a * one / two
-    bend = (2.0 * np.cosh(a * s) - 2.0 * wide * np.cosh(2.0 * s)) / (4.0 * two**2)
-    return np.where(far, wide, value), np.where(far, bend, slope)
+    sinh_a, sinh_2 = np.sinh(a * s), np.sinh(2.0 * s)
+    factor_far = 2.0 / a * sinh_a / sinh_2
+    slope_far = (2.0 * np.cosh(a * s) - 2.0 * factor_far * np.cosh(2.0 * s)) / (4.0 * sinh_2**2)
+    return np.where(far, factor_far, value), np.where(far, slope_far, slope)
 
 
 def _parts(F: Array) -> tuple[Array, Array, Array]:
@@ -318,8 +318,8 @@ def overstress(T: Array, F: Array) -> Array:
     >>> (overstress(np.array([1.0, 1.0, 0.0, 1.0]), F) @ F.T).round(6)[0, 1].item()
     0.5
     """
-    J, inverse, product, whole = stress_parts(F, T)
-    return (J ** (-2.0 / 3.0))[..., None, None] * (product - (whole / 3.0)[..., None, None] * inverse)
+    J, inverse, product, contraction = stress_parts(F, T)
+    return (J ** (-2.0 / 3.0))[..., None, None] * (product - (contraction / 3.0)[..., None, None] * inverse)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -343,7 +343,7 @@ class Past:
     shear: Array  # (p, m) g G [MPa]
     tau: Array  # (p, m) [s]
     metric: Array  # (p, m, 4) A of each term
-    before: Array  # (p, 4) B at the last instant
+    previous: Array  # (p, 4) B at the last instant
 
     @staticmethod
     def at_rest(shear: Array, tau: Array) -> "Past":
@@ -355,7 +355,7 @@ class Past:
         """Return A' (p, m, 4) at the end of a `step` [s]."""
         ages = step / self.tau
         decay, mean = np.exp(-ages), mean_decay(ages)
-        return decay[..., None] * self.metric + (mean - decay)[..., None] * self.before[:, None]
+        return decay[..., None] * self.metric + (mean - decay)[..., None] * self.previous[:, None]
 
     def over(self, step: float) -> Array:
         """Return T (p, 4) [MPa] for a `step` [s]."""
@@ -365,11 +365,11 @@ class Past:
         """Return the history after a `step` [s] that ends at the deformation gradients F (p, 2, 2)."""
         B = inverse_metric(F)
         metric = self._decay(step) + (1.0 - mean_decay(step / self.tau))[..., None] * B[:, None]
-        return replace(self, metric=metric, before=B)
+        return replace(self, metric=metric, previous=B)
 
     def energy(self) -> Array:
         """Return the energy density (p,) [MPa] stored in the terms."""
-        A, B = self.metric, self.before[:, None]
+        A, B = self.metric, self.previous[:, None]
         det = B[..., 0] * B[..., 1] - B[..., 2] ** 2
         trace = (A[..., 0] * B[..., 1] + A[..., 1] * B[..., 0] - 2.0 * A[..., 2] * B[..., 2]) / det
         trace = trace + A[..., 3] / B[..., 3]

@@ -115,6 +115,6 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     place, forces = arcs.tolist(), force[line : last + 1].tolist()
     gaps = place[line] - place[line - 2], place[line + 2] - place[line]
     forces[0] *= gaps[1] / (gaps[0] + gaps[1])  # the share of the line's own force that acts beyond it
-    moment = sum(one * (at - place[line]) for one, at in zip(forces, place[line : last + 1], strict=True))
+    moment = sum(push * (position - place[line]) for push, position in zip(forces, place[line : last + 1], strict=True))
     least = place[last] - 0.35 * (place[last] - place[last - 1])
     return min(max(place[line] + 2.5 * moment / sum(forces), least), place[min(last + 1, len(place) - 1)])

@@ -37,8 +37,8 @@ class SolveFailure(Exception):
         >>> str(SolveFailure("no equilibrium within 25 iterations").in_a_sentence())
         'No equilibrium within 25 iterations.'
         """
-        words = str(self)
-        return type(self)(words[:1].upper() + words[1:] + ("" if words.endswith(".") else "."), **vars(self))
+        message = str(self)
+        return type(self)(message[:1].upper() + message[1:] + ("" if message.endswith(".") else "."), **vars(self))
 
 
 class NoSteadyState(SolveFailure):
@@ -77,9 +77,9 @@ def at_end_of_path(depth: float, travel: float, reason: object) -> NotConverged:
     'the course was followed to where the drag holds the bone 4.754 mm above fir'
     """
     lift = f"where the drag holds the bone {-depth:.4g} mm above first touch"
-    there = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lift
+    position = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lift
     slip = f" and {abs(travel):.4g} mm of sliding" if travel else ""
     return NotConverged(
-        f"the course was followed to {there}{slip}, and in the smallest steps no further: {reason}; ask for less "
+        f"the course was followed to {position}{slip}, and in the smallest steps no further: {reason}; ask for less "
         "friction, drag or depth."
     )

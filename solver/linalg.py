@@ -34,17 +34,17 @@ def _halve(order: Indices, centres: Array, low: Indices, high: Indices) -> Indic
     size = high - low
     begins = np.cumsum(size) - size
     part = np.repeat(np.arange(len(size)), size)
-    at = np.arange(len(part)) + (low - begins)[part]
-    x = centres[order[at]]
+    position = np.arange(len(part)) + (low - begins)[part]
+    x = centres[order[position]]
     along = np.argmax(np.maximum.reduceat(x, begins) - np.minimum.reduceat(x, begins), axis=1)
     x = x[np.arange(len(x)), along[part]]
     ascending = np.lexsort((x, part))
-    order[at], x = order[at][ascending], x[ascending]
-    between = np.append(False, x[1:] != x[:-1]) & (at != low[part])
+    order[position], x = order[position][ascending], x[ascending]
+    between = np.append(False, x[1:] != x[:-1]) & (position != low[part])
     ends = (low + high)[part]  # a part in which all have the same x is cut in its middle
-    distance = np.where(between, np.abs(2 * at - ends), 2 * len(order) + (at != ends // 2))
+    distance = np.where(between, np.abs(2 * position - ends), 2 * len(order) + (position != ends // 2))
     nearest = np.flatnonzero(distance == np.minimum.reduceat(distance, begins)[part])
-    return at[nearest[np.searchsorted(part[nearest], np.arange(len(size)))]]
+    return position[nearest[np.searchsorted(part[nearest], np.arange(len(size)))]]
 
 
 def _bisect(centres: Array, most: int) -> _Tree:
@@ -98,8 +98,8 @@ def _assign_unknowns(tree: _Tree, elements: Indices, free: Flags, interface: Ind
     inner: list[Indices] = []
     border: list[Indices] = [np.empty(0, np.int64)]
     for level in range(int(tree.level.max()), -1, -1):
-        there = tree.level[tree.leaf] == level
-        of_leaves = (tree.leaf[there, None] * size + elements[there])[free[elements[there]]]
+        in_leaves = tree.level[tree.leaf] == level
+        of_leaves = (tree.leaf[in_leaves, None] * size + elements[in_leaves])[free[elements[in_leaves]]]
         part, unknown = np.divmod(border[-1], size)
         pairs = distinct(np.concatenate([of_leaves, tree.parent[part] * size + unknown]))
         part, unknown = np.divmod(pairs, size)
@@ -179,8 +179,8 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     def position(part: Indices, unknown: Indices) -> Indices:
         """Return where unknowns stand in the front of a part: those that it eliminates, then its border."""
         in_border = np.searchsorted(keys, part * len(sequence) + unknown) - border_at[part]
-        own = unknown - start[part]
-        return np.where(own < inner[part], own, inner[part] + in_border)
+        in_inner = unknown - start[part]
+        return np.where(in_inner < inner[part], in_inner, inner[part] + in_border)
 
     number[fixed] = -1
     joined = owner < parts - 1
@@ -205,7 +205,7 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
         wait_at=wait_at,
         leaf=_narrow(np.where(tree.children[:, :1] < 0, np.stack([tree.low, tree.high], axis=1), 0)),
         order=_narrow(tree.order),
-        at=_narrow(np.where(of_leaves < 0, -1, position(tree.leaf[:, None], of_leaves))),
+        position=_narrow(np.where(of_leaves < 0, -1, position(tree.leaf[:, None], of_leaves))),
         factors=int(sizes.sum()),
         waiting=waiting,
     )

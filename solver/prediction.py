@@ -144,8 +144,12 @@ class Prediction:
         plain["sed_ending_corrected"] = None if self.nested is None else self.sed_ending_corrected
         plain["row"] = {name: _plain(getattr(self.row, name)) for name in ("arc", "sed", "error")}
         plain["responses"] = {
-            one.name: {"unit": one.unit, "meaning": one.meaning, **_response(self.responses[one.name])}
-            for one in QUANTITIES
+            quantity.name: {
+                "unit": quantity.unit,
+                "meaning": quantity.meaning,
+                **_response(self.responses[quantity.name]),
+            }
+            for quantity in QUANTITIES
         }
         plain["model"] = dict(self.model)
         plain["audits"] = dict(self.audits)

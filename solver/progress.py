@@ -33,11 +33,11 @@ _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: Non
 @contextmanager
 def listening(listener: Listener) -> Generator[None]:
     """Send the progress reports of this thread to `listener` until the block ends."""
-    before = _AUDIENCE.set(_Audience(listener))
+    token = _AUDIENCE.set(_Audience(listener))
     try:
         yield
     finally:
-        _AUDIENCE.reset(before)
+        _AUDIENCE.reset(token)
 
 
 def report_progress(doing: str, part: float = 0.0) -> None:
@@ -59,11 +59,11 @@ def report_progress(doing: str, part: float = 0.0) -> None:
 @contextmanager
 def interruptible(progress: Progress | None, part: Callable[[], float]) -> Generator[None]:
     """Let `check_stop` call `progress` with the `part` done in this thread, until the block ends."""
-    before = _CHECK.set(lambda: report_part(progress, part()))
+    token = _CHECK.set(lambda: report_part(progress, part()))
     try:
         yield
     finally:
-        _CHECK.reset(before)
+        _CHECK.reset(token)
 
 
 def check_stop() -> None:
@@ -92,9 +92,9 @@ def aside(doing: str) -> Generator[None]:
     ['compiling', 'solving', 'estimating', 'compiling', 'estimating']
     """
     audience = _AUDIENCE.get()
-    before = (audience.doing if audience is not None else "") or "solving"
+    previous = (audience.doing if audience is not None else "") or "solving"
     report_progress(doing)
     try:
         yield
     finally:
-        report_progress(before)
+        report_progress(previous)

@@ -36,26 +36,26 @@ class Quantity:
         return ("kPa", 1e3) if self.unit == "MPa" else ("1", 1.0)
 
 
-def _small_energy(at: LocalState) -> Array:
+def _small_energy(local: LocalState) -> Array:
     """Return W = G eps:eps + lambda/2 theta^2 [MPa]."""
-    squares = at.xx**2 + at.yy**2 + at.engineering_shear**2 / 2.0
-    return at.shear * squares + at.lame / 2.0 * at.dilatation**2
+    squares = local.xx**2 + local.yy**2 + local.engineering_shear**2 / 2.0
+    return local.shear * squares + local.lame / 2.0 * local.dilatation**2
 
 
-def _finite_energy(at: LocalState) -> Array:
+def _finite_energy(local: LocalState) -> Array:
     """Return W of `solver.constitutive` [MPa]; ln J is the element's best fit."""
-    return at.shear / 2.0 * shape(at.stiffening, at.excess) + at.lame / 2.0 * at.dilatation**2
+    return local.shear / 2.0 * shape(local.stiffening, local.excess) + local.lame / 2.0 * local.dilatation**2
 
 
-def _small_volumetric(at: LocalState) -> Array:
+def _small_volumetric(local: LocalState) -> Array:
     """Return K/2 theta^2, K = lambda + 2 G/3; the part of G is from the volume strain at the point itself."""
-    return at.lame / 2.0 * at.dilatation**2 + at.shear / 3.0 * at.trace**2
+    return local.lame / 2.0 * local.dilatation**2 + local.shear / 3.0 * local.trace**2
 
 
-def _finite_volumetric(at: LocalState) -> Array:
+def _finite_volumetric(local: LocalState) -> Array:
     """Return W of the same change of volume, equal in all three directions."""
-    dilated = 3.0 * np.expm1(2.0 / 3.0 * at.log_volume) - 2.0 * at.log_volume  # tr C - 3 - 2 ln J
-    return at.shear / 2.0 * shape(at.stiffening, dilated) + at.lame / 2.0 * at.dilatation**2
+    dilated = 3.0 * np.expm1(2.0 / 3.0 * local.log_volume) - 2.0 * local.log_volume  # tr C - 3 - 2 ln J
+    return local.shear / 2.0 * shape(local.stiffening, dilated) + local.lame / 2.0 * local.dilatation**2
 
 
 SED = Quantity("sed", "SED", "MPa", "strain-energy density", _small_energy, _finite_energy, signed=False)
@@ -73,56 +73,56 @@ DEVIATORIC = Quantity(
     "SED of shape",
     "MPa",
     "strain-energy density less that of the change of volume",
-    lambda at: _small_energy(at) - _small_volumetric(at),
-    lambda at: _finite_energy(at) - _finite_volumetric(at),
+    lambda local: _small_energy(local) - _small_volumetric(local),
+    lambda local: _finite_energy(local) - _finite_volumetric(local),
     signed=False,
 )
 
 
-def _small_radius(at: LocalState) -> Array:
+def _small_radius(local: LocalState) -> Array:
     """Return the radius of Mohr's circle of strains [-]."""
-    return np.sqrt((at.xx - at.yy) ** 2 + at.engineering_shear**2) / 2.0
+    return np.sqrt((local.xx - local.yy) ** 2 + local.engineering_shear**2) / 2.0
 
 
-def _finite_sum(at: LocalState) -> Array:
+def _finite_sum(local: LocalState) -> Array:
     """Return the sum of the principal stretches in the plane [-]."""
-    return np.sqrt((2.0 + at.xx + at.yy) ** 2 + (at.xy - at.yx) ** 2)
+    return np.sqrt((2.0 + local.xx + local.yy) ** 2 + (local.xy - local.yx) ** 2)
 
 
-def _finite_difference(at: LocalState) -> Array:
+def _finite_difference(local: LocalState) -> Array:
     """Return the difference of the principal stretches in the plane [-]."""
-    return np.sqrt((at.xx - at.yy) ** 2 + at.engineering_shear**2)
+    return np.sqrt((local.xx - local.yy) ** 2 + local.engineering_shear**2)
 
 
-def _small_along(at: LocalState) -> Array:
-    x, y = at.tangent
-    return x * x * at.xx + y * y * at.yy + x * y * at.engineering_shear
+def _small_along(local: LocalState) -> Array:
+    x, y = local.tangent
+    return x * x * local.xx + y * y * local.yy + x * y * local.engineering_shear
 
 
-def _small_shear_along(at: LocalState) -> Array:
-    x, y = at.tangent
-    return _size((x * x - y * y) * at.engineering_shear + 2.0 * x * y * (at.yy - at.xx))
+def _small_shear_along(local: LocalState) -> Array:
+    x, y = local.tangent
+    return _size((x * x - y * y) * local.engineering_shear + 2.0 * x * y * (local.yy - local.xx))
 
 
-def _lines(at: LocalState) -> tuple[Array, Array, Array, Array]:
+def _lines(local: LocalState) -> tuple[Array, Array, Array, Array]:
     """Return F t and F n, x and y of each, for the skin's tangent t and normal n."""
-    x, y = at.tangent
+    x, y = local.tangent
     return (
-        x + at.xx * x + at.xy * y,
-        y + at.yx * x + at.yy * y,
-        -y - at.xx * y + at.xy * x,
-        x - at.yx * y + at.yy * x,
+        x + local.xx * x + local.xy * y,
+        y + local.yx * x + local.yy * y,
+        -y - local.xx * y + local.xy * x,
+        x - local.yx * y + local.yy * x,
     )
 
 
-def _finite_along(at: LocalState) -> Array:
-    x, y, _, _ = _lines(at)
+def _finite_along(local: LocalState) -> Array:
+    x, y, _, _ = _lines(local)
     return np.sqrt(x * x + y * y) - 1.0
 
 
-def _finite_shear_along(at: LocalState) -> Array:
-    x, y, across, up = _lines(at)
-    return _size((x * across + y * up) / at.volume)
+def _finite_shear_along(local: LocalState) -> Array:
+    x, y, across, up = _lines(local)
+    return _size((x * across + y * up) / local.volume)
 
 
 def _size(number: Array) -> Array:
@@ -135,23 +135,23 @@ GREATEST_STRAIN = Quantity(
     "greatest principal strain",
     "-",
     "greatest principal stretch in the plane, less one",
-    lambda at: at.trace / 2.0 + _small_radius(at),
-    lambda at: (_finite_sum(at) + _finite_difference(at)) / 2.0 - 1.0,
+    lambda local: local.trace / 2.0 + _small_radius(local),
+    lambda local: (_finite_sum(local) + _finite_difference(local)) / 2.0 - 1.0,
 )
 LEAST_STRAIN = Quantity(
     "principal_strain_least",
     "least principal strain",
     "-",
     "least principal stretch in the plane, less one",
-    lambda at: at.trace / 2.0 - _small_radius(at),
-    lambda at: (_finite_sum(at) - _finite_difference(at)) / 2.0 - 1.0,
+    lambda local: local.trace / 2.0 - _small_radius(local),
+    lambda local: (_finite_sum(local) - _finite_difference(local)) / 2.0 - 1.0,
 )
 SHEAR = Quantity(
     "shear_greatest",
     "greatest shear",
     "-",
     "difference of the principal stretches in the plane: the greatest engineering shear at small strain",
-    lambda at: 2.0 * _small_radius(at),
+    lambda local: 2.0 * _small_radius(local),
     _finite_difference,
     signed=False,
 )
@@ -177,26 +177,26 @@ STRETCH_ALONG = Quantity(
 Stress = tuple[Array, Array, Array, Array]  # xx, yy, xy, zz [MPa], tension positive
 
 
-def _small_stress(at: LocalState) -> Stress:
+def _small_stress(local: LocalState) -> Stress:
     """Return sigma = 2 G eps + lambda theta 1 of plane strain."""
-    bulk = at.lame * at.dilatation
+    bulk = local.lame * local.dilatation
     return (
-        2.0 * at.shear * at.xx + bulk,
-        2.0 * at.shear * at.yy + bulk,
-        at.shear * at.engineering_shear,
+        2.0 * local.shear * local.xx + bulk,
+        2.0 * local.shear * local.yy + bulk,
+        local.shear * local.engineering_shear,
         bulk,
     )
 
 
-def _finite_stress(at: LocalState) -> Stress:
+def _finite_stress(local: LocalState) -> Stress:
     """Return sigma = (G f (F F^T - 1) + lambda ln J 1) / J of plane strain."""
-    J = at.volume
-    shear = at.shear * slopes(at.stiffening, at.excess)[0] / J
-    bulk = at.lame * at.dilatation / J
+    J = local.volume
+    shear = local.shear * slopes(local.stiffening, local.excess)[0] / J
+    bulk = local.lame * local.dilatation / J
     return (
-        shear * (2.0 * at.xx + at.xx**2 + at.xy**2) + bulk,
-        shear * (2.0 * at.yy + at.yy**2 + at.yx**2) + bulk,
-        shear * (at.xy + at.yx + at.xx * at.yx + at.xy * at.yy),
+        shear * (2.0 * local.xx + local.xx**2 + local.xy**2) + bulk,
+        shear * (2.0 * local.yy + local.yy**2 + local.yx**2) + bulk,
+        shear * (local.xy + local.yx + local.xx * local.yx + local.xy * local.yy),
         bulk,
     )
 
@@ -227,8 +227,8 @@ def _of_stress(
         label,
         "MPa",
         meaning,
-        lambda at: invariant(_small_stress(at)),
-        lambda at: invariant(_finite_stress(at)),
+        lambda local: invariant(_small_stress(local)),
+        lambda local: invariant(_finite_stress(local)),
         signed,
     )
 

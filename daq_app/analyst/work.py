@@ -33,7 +33,7 @@ from solver import Cancelled, Prediction, Scene
 from solver.equilibrium.load_path import Instant as Step
 from solver.mesh import Mesh
 from solver.prediction import ROW, Skin
-from solver.response.fields import Fields, Sketch, Still, fields_of, place_of_least_stretch, stills, way_until
+from solver.response.fields import Fields, Sketch, Still, fields_of, path_until_failure, place_of_least_stretch, stills
 
 if TYPE_CHECKING:
     from sessions.report.figures import Panel
@@ -353,7 +353,7 @@ def film_of(way: SolutionPath, instants: Sequence[Step], sketch: Sketch, progres
 
 def lost_film(way: SolutionPath, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
     """Return the states up to where a solve that has no answer came, and what stopped it there."""
-    instants, failure = way_until(way.scene, way.finger, progress)
+    instants, failure = path_until_failure(way.scene, way.finger, progress)
     every = max(1, -(-len(instants) // _MOST))
     film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, progress)
     if failure is None:

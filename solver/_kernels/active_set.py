@@ -139,7 +139,7 @@ def solve_active_set(
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
     may_hold = load.mu > 0.0 and load.tau > 0.0
     one_by_one, records = size < 0, min(size, 0)  # False and 0; numba compiles subroutines again for literals
-    for turn in range(control.rounds + 1):
+    for round_number in range(control.rounds + 1):
         bounded_length(position.x, skin, system.length)
         if by_forces:
             count = assemble_force_system(compliance, skin, states, load, position, unloaded_step, system, answer)
@@ -149,7 +149,7 @@ def solve_active_set(
             return SINGULAR
         scatter_answer(system, count, by_forces, states, load.mu, answer)
         sticks, by_drag = count_in(states.state, STICK) > 0, control.kind == DRAG_CONTROL
-        if by_drag and not sticks and may_hold and turn < control.rounds:
+        if by_drag and not sticks and may_hold and round_number < control.rounds:
             hold(states.state)  # free along x, the body needs sticking nodes: all stick, then change one by one
             may_hold, one_by_one = False, True
             continue
@@ -158,12 +158,12 @@ def solve_active_set(
             regular &= recover_steps(compliance, answer, unloaded_step, steps, states.reaction)
         else:
             regular &= recover_reaction(body, steps, states.reaction)
-        if not regular or turn == control.rounds:
+        if not regular or round_number == control.rounds:
             return UNSETTLED if regular else SINGULAR
         look_ahead(position, steps, motion, by_drag and not sticks, ahead, above, slip)
         bounded_length(ahead, skin, system.length)
         if contradictions(states, above, slip, system.length, load, changes) == 0:
-            return turn + 1
+            return round_number + 1
         change_states(states, changes, slip, entries, one_by_one)
         cycle = record_states(states, history, records)
         one_by_one, records = one_by_one or cycle, 1 if cycle else records + 1
@@ -240,29 +240,29 @@ def hold(state: Narrow) -> None:
 @subroutine
 def recover_reaction(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
     """Fill the surface's `reaction` (k, 2) to `steps` (2 k, 4); return False where a number is not finite."""
-    whole = 0.0
+    resultant = 0.0
     for i in range(steps.shape[0]):
         total = body.force[i]
         for c in range(steps.shape[0]):
             total += body.stiffness[i, c] * steps[c, 0]
         reaction[i // 2, i % 2] = total
-        whole += total
-    return np.isfinite(whole)
+        resultant += total
+    return np.isfinite(resultant)
 
 
 @subroutine
 def recover_steps(compliance: Array, answer: Array, unloaded_step: Array, steps: Array, reaction: Array) -> bool:
     """Fill the surface's `reaction` (k, 2) and the step to equilibrium; return False where a number is not finite."""
-    size, whole = steps.shape[0], 0.0
+    size, resultant = steps.shape[0], 0.0
     for i in range(size):
         reaction[i // 2, i % 2] = answer[i, 0]
         steps[i, 0] = unloaded_step[i]
-        whole += answer[i, 0]
+        resultant += answer[i, 0]
     for i in range(answer.shape[0]):
         if answer[i, 0] != 0.0:
             for c in range(size):
                 steps[c, 0] += answer[i, 0] * compliance[i, c]
-    return np.isfinite(whole)
+    return np.isfinite(resultant)
 
 
 @subroutine

@@ -41,14 +41,14 @@ def _cache_folder() -> Path:
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
     setting = os.environ.get("NUMBA_CACHE_DIR")
-    own = user_cache_path("daq-app", appauthor=False)
-    places = [_FOLDER / "__pycache__", own] if is_private(_FOLDER) else [own]
+    user_cache = user_cache_path("daq-app", appauthor=False)
+    places = [_FOLDER / "__pycache__", user_cache] if is_private(_FOLDER) else [user_cache]
     if setting:
         places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
     for place in places:
         with suppress(OSError):
             place.mkdir(mode=0o700, parents=True, exist_ok=True)  # `mode` is not that of the parents it makes
-            if place == own:
+            if place == user_cache:
                 place.chmod(0o700)  # another program, or an earlier run, may have made it open to a group
             (place / version).mkdir(mode=0o700, exist_ok=True)
             if all(is_private(folder) for folder in (place, place / version)):
@@ -155,7 +155,7 @@ def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a t
     if not isinstance(argument, tuple):
         return kind
     parts = cast("tuple[Any, ...]", argument)
-    return kind, *[_array_kind(one) if one.__class__ is np.ndarray else one.__class__ for one in parts]
+    return kind, *[_array_kind(part) if part.__class__ is np.ndarray else part.__class__ for part in parts]
 
 
 def _array_kind(array: Any) -> object:  # noqa: ANN401 - of any type

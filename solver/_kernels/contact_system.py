@@ -28,14 +28,14 @@ STEEP = 1.0  # above this coefficient of friction, a node that comes into contac
 
 
 @compile_loop
-def tributary(x: Array, at: Narrow, out: Array) -> None:
+def tributary(x: Array, middle: Narrow, out: Array) -> None:
     """Fill `out` (k,) with the tributary length of skin of each node, `x` (k,) being positions along the surface.
 
-    Simpson's rule on edges of three nodes; `at` (k,) is 0 at edge ends, 1 in the middle. The lengths are linear in x.
+    Simpson's rule on edges of three nodes; `middle` (k,) is 1 in the middle, 0 at ends. Lengths are linear in x.
     """
     out[:] = 0.0
-    for i in range(at.shape[0]):
-        if at[i] == 1:
+    for i in range(middle.shape[0]):
+        if middle[i] == 1:
             for n in range(3):
                 row = _LENGTHS[n]
                 out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
@@ -70,27 +70,27 @@ def assemble_contact_system(
     state, sense, _ = states
     free, steps, force = system.free, system.steps, body.force
     f = prescribe(skin, state, position, system)
-    spot = np.full(steps.shape[0], -1)
+    position_of = np.full(steps.shape[0], -1)
     for r in range(f):
-        spot[free[r]] = r
-    square = system.matrix[: f * f].reshape(f, f)
+        position_of[free[r]] = r
+    matrix = system.matrix[: f * f].reshape(f, f)
     for r in range(f):
         i: int = free[r] // 2
-        right, share, drag = system.right[r], 0.0, 0.0
+        right, sense_of_slip, drag = system.right[r], 0.0, 0.0
         if state[i] == SLIP:  # T = s mu N, with the normal force N of the row below
-            share, drag = sense[i], sense[i] * load.mu
+            sense_of_slip, drag = sense[i], sense[i] * load.mu
         row, push = body.stiffness[free[r]], body.stiffness[2 * i + 1]
         right[0], right[1] = drag * force[2 * i + 1] - force[free[r]], 0.0
-        right[2], right[3] = share * force[2 * i + 1], 0.0
-        for j in range(spot.shape[0]):
+        right[2], right[3] = sense_of_slip * force[2 * i + 1], 0.0
+        for j in range(position_of.shape[0]):
             value = row[j] - drag * push[j]
-            if spot[j] >= 0:
-                square[r, spot[j]] = value
+            if position_of[j] >= 0:
+                matrix[r, position_of[j]] = value
             else:
                 for s in range(RIGHT_SIDES):
                     right[s] -= value * steps[j, s]
         if state[i] == SHEAR_LIMITED:
-            add_bound(i, sense[i] * load.tau, skin.middle, spot, system, square[r])
+            add_bound(i, sense[i] * load.tau, skin.middle, position_of, system, matrix[r])
     return f
 
 
@@ -118,12 +118,12 @@ def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: Contact
 
 
 @subroutine
-def add_bound(i: int, drag: float, middle: Narrow, spot: Indices, system: ContactSystem, square: Array) -> None:
-    """Add the traction bound to the row `square` (f,) of node i: `drag` [MPa] times the node's length of skin.
+def add_bound(i: int, drag: float, middle: Narrow, position_of: Indices, system: ContactSystem, row: Array) -> None:
+    """Add the traction bound to the `row` (f,) of node i: `drag` [MPa] times the node's length of skin.
 
-    `spot` (2 k,) is the position of each skin unknown in the system, -1 where its step is prescribed.
+    `position_of` (2 k,) is the position of each skin unknown in the system, -1 where its step is prescribed.
     """
-    r, steps = spot[2 * i], system.steps
+    r, steps = position_of[2 * i], system.steps
     right = system.right[r]
     right[0] += drag * system.length[i]
     for edge in range(max(i - 1, 0), min(i + 2, middle.shape[0])):
@@ -132,8 +132,8 @@ def add_bound(i: int, drag: float, middle: Narrow, spot: Indices, system: Contac
         for n in range(3):
             x = 2 * (edge - 1 + n)
             slope = drag * _LENGTHS[i - edge + 1, n]
-            if spot[x] >= 0:
-                square[spot[x]] -= slope
+            if position_of[x] >= 0:
+                row[position_of[x]] -= slope
             else:
                 right[0] += slope * steps[x, 0]
                 right[3] += slope * steps[x, 3]
@@ -212,17 +212,17 @@ def assemble_force_system(
     state, sense, _ = states
     pushes, f = list_forces(skin.held, states, load.tau, system, forces)
     free, right = system.free, system.right
-    square = system.matrix[: f * f].reshape(f, f)
+    matrix = system.matrix[: f * f].reshape(f, f)
     right[:f] = 0.0
     for r in range(f):
         row = free[r]
         i, response = row // 2, compliance[row]
         for c in range(f):
-            square[r, c] = response[free[c]]
+            matrix[r, c] = response[free[c]]
         for c in range(pushes):
             j = free[c] // 2
             if state[j] == SLIP:
-                square[r, c] += sense[j] * load.mu * response[2 * j]
+                matrix[r, c] += sense[j] * load.mu * response[2 * j]
         right[r, 0] = -unloaded_step[row]
         for j in range(state.shape[0]):
             if state[j] == SHEAR_LIMITED:

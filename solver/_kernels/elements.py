@@ -1,4 +1,4 @@
-"""Integrals, forces and tangents of e nine-node elements with q = 9 quadrature points."""
+"""Forces and tangents of e nine-node elements with q = 9 quadrature points."""
 
 import numpy as np
 
@@ -8,12 +8,9 @@ from solver.arrays import (
     Array,
     BodyState,
     ElementArrays,
-    ElementGeometry,
     ElementSystem,
     ElementWork,
-    Indices,
     Narrow,
-    ShapeFunctions,
 )
 
 
@@ -59,72 +56,10 @@ def excess_of(xx: float, xy: float, yx: float, yy: float, log: float) -> float:
 
 
 @subroutine
-def gather(u: Array, nodes: Narrow | Indices, e: int, ux: Array, uy: Array) -> None:
+def gather(u: Array, nodes: Narrow, e: int, ux: Array, uy: Array) -> None:
     """Fill `ux`, `uy` (9,) with the nodal displacements of element `e`."""
     for i in range(9):
         ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
-
-
-@compile_loop
-def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
-    """Fill the `geometry` of elements with `nodes` (e, 9) at `place` (n, 2); return False where one is folded."""
-    px, py, work = np.empty(9), np.empty(9), np.empty(9)
-    for e in range(nodes.shape[0]):
-        gather(place, nodes, e, px, py)
-        if not map_points(e, px, py, shapes, geometry):
-            return False
-        modes, own = geometry.modes[e], geometry.combination[e]
-        m00 = m01 = m02 = m11 = m12 = m22 = 0.0
-        for q in range(9):
-            w, x, y = geometry.weight[e, q], modes[q, 1], modes[q, 2]
-            m00 += w
-            m01 += w * x
-            m02 += w * y
-            m11 += w * x * x
-            m12 += w * x * y
-            m22 += w * y * y
-            work[q] = w
-        l00 = np.sqrt(m00)
-        l10, l20 = m01 / l00, m02 / l00
-        l11 = np.sqrt(m11 - l10 * l10)
-        l21 = (m12 - l20 * l10) / l11
-        l22 = np.sqrt(m22 - l20 * l20 - l21 * l21)
-        own[0, 0], own[1, 1], own[2, 2] = 1.0 / l00, 1.0 / l11, 1.0 / l22
-        own[1, 0], own[2, 1] = -l10 * own[0, 0] * own[1, 1], -l21 * own[1, 1] * own[2, 2]
-        own[2, 0] = -(l20 * own[0, 0] + l21 * own[1, 0]) * own[2, 2]
-        own[0, 1] = own[0, 2] = own[1, 2] = 0.0
-        for q in range(9):
-            x, y = modes[q, 1], modes[q, 2]
-            modes[q, 0], modes[q, 1] = own[0, 0], own[1, 0] + own[1, 1] * x
-            modes[q, 2] = own[2, 0] + own[2, 1] * x + own[2, 2] * y
-        sum_laplace(geometry.grad_x[e], geometry.grad_y[e], work, geometry.laplace[e])
-    return True
-
-
-@subroutine
-def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
-    """Fill an element's gradients and weights for nodes at `px`, `py` (9,), and x, y in place of its modes."""
-    values, along, up, weights = shapes
-    centre = geometry.centre[e]
-    centre[0] = centre[1] = 0.0
-    for q in range(9):
-        for i in range(9):
-            centre[0] += values[q, i] * px[i] / 9.0
-            centre[1] += values[q, i] * py[i] / 9.0
-    for q in range(9):
-        x_xi, x_eta, y_xi, y_eta = displacement_gradient(px, py, along[q], up[q])
-        det = x_xi * y_eta - x_eta * y_xi
-        if not det > 0.0:
-            return False
-        a00, a01, a10, a11 = y_eta / det, -y_xi / det, -x_eta / det, x_xi / det
-        x, y = -centre[0], -centre[1]
-        for i in range(9):
-            x += values[q, i] * px[i]
-            y += values[q, i] * py[i]
-            geometry.grad_x[e, q, i] = a00 * along[q, i] + a01 * up[q, i]
-            geometry.grad_y[e, q, i] = a10 * along[q, i] + a11 * up[q, i]
-        geometry.weight[e, q], geometry.modes[e, q, 1], geometry.modes[e, q, 2] = det * weights[q], x, y
-    return True
 
 
 @compile_loop
@@ -172,7 +107,13 @@ def assemble(u: Array, pressure: Array, new_tangent: bool, elements: ElementArra
 @subroutine
 def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: ElementWork, volume: Array) -> float:
     """Fill the deformation at an element's quadrature points, and its modes of `volume`; return its least det F."""
-    f_inv_t, f_diff, wide, push, shear_slope = work.f_inv_t, work.f_diff, work.wide, work.push, work.shear_slope
+    f_inv_t, f_diff, modes, push, shear_slope = (
+        work.f_inv_t,
+        work.f_diff,
+        work.weighted_modes,
+        work.push,
+        work.shear_slope,
+    )
     v0 = v1 = v2 = 0.0
     exponent, shear = elements.stiffening[e], elements.shear[e]
     least = np.inf
@@ -185,7 +126,7 @@ def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: E
             break
         w = elements.weight[e, q]
         w0, w1, w2 = w * elements.modes[e, q, 0], w * elements.modes[e, q, 1], w * elements.modes[e, q, 2]
-        wide[q, 0], wide[q, 1], wide[q, 2] = w0, w1, w2
+        modes[q, 0], modes[q, 1], modes[q, 2] = w0, w1, w2
         log = np.log1p(dilation)
         v0 += w0 * log
         v1 += w1 * log
@@ -208,14 +149,14 @@ def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: E
 @subroutine
 def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's internal forces `f` (18,)."""
-    f_inv_t, f_diff, wide, push, f = work.f_inv_t, work.f_diff, work.wide, work.push, work.f
+    f_inv_t, f_diff, modes, push, f = work.f_inv_t, work.f_diff, work.weighted_modes, work.push, work.f
     lam, relaxes = elements.lame[e], system.overstress_force.shape[0] > 0
     v0, v1, v2 = lam * system.volume[e, 0], lam * system.volume[e, 1], lam * system.volume[e, 2]
     for c in range(18):
         f[c] = system.overstress_force[e, c] if relaxes else 0.0
     for q in range(9):
         gx, gy, g = elements.grad_x[e, q], elements.grad_y[e, q], push[q]
-        pressure = wide[q, 0] * v0 + wide[q, 1] * v1 + wide[q, 2] * v2
+        pressure = modes[q, 0] * v0 + modes[q, 1] * v1 + modes[q, 2] * v2
         p00, p01 = g * f_diff[q, 0] + pressure * f_inv_t[q, 0], g * f_diff[q, 1] + pressure * f_inv_t[q, 1]
         p10, p11 = g * f_diff[q, 2] + pressure * f_inv_t[q, 2], g * f_diff[q, 3] + pressure * f_inv_t[q, 3]
         for i in range(8):
@@ -228,29 +169,30 @@ def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: Eleme
 @subroutine
 def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementArrays, work: ElementWork) -> None:
     """Fill the deformed gradients of shape functions, the derivatives of an element's volume modes, and `bend`."""
-    h, s, wide, bend, d, left, lam = work.h, work.s, work.wide, work.bend, work.d, work.left, elements.lame[e]
+    h, s, modes, bend, d, left = work.h, work.s, work.weighted_modes, work.bend, work.d, work.left
+    lam = elements.lame[e]
     p0, p1, p2 = pressure[e, 0], pressure[e, 1], pressure[e, 2]
     for q in range(9):
-        bend[q] = work.push[q] - (wide[q, 0] * p0 + wide[q, 1] * p1 + wide[q, 2] * p2)
+        bend[q] = work.push[q] - (modes[q, 0] * p0 + modes[q, 1] * p1 + modes[q, 2] * p2)
         push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.f_inv_t[q], h[q])
         if stiffens:
             push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.f_diff[q], s[q])
     for c in range(18):
         d0 = d1 = d2 = 0.0
         for q in range(9):
-            d0 += wide[q, 0] * h[q, c]
-            d1 += wide[q, 1] * h[q, c]
-            d2 += wide[q, 2] * h[q, c]
+            d0 += modes[q, 0] * h[q, c]
+            d1 += modes[q, 1] * h[q, c]
+            d2 += modes[q, 2] * h[q, c]
         d[0, c], d[1, c], d[2, c] = d0, d1, d2
         left[c, 0], left[c, 1], left[c, 2] = lam * d0, lam * d1, lam * d2
 
 
 @subroutine
-def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
-    """Fill `out` (18,) with a matrix `by` (xx, xy, yx, yy) times each node's gradient, ordered as in `ElementWork`."""
+def push_forward(gx: Array, gy: Array, matrix: Array, out: Array) -> None:
+    """Fill `out` (18,) with a `matrix` (xx, xy, yx, yy) times each node's gradient, ordered as in `ElementWork`."""
     for i in range(8):
-        out[i], out[8 + i] = by[0] * gx[i] + by[1] * gy[i], by[2] * gx[i] + by[3] * gy[i]
-    out[16], out[17] = by[0] * gx[8] + by[1] * gy[8], by[2] * gx[8] + by[3] * gy[8]
+        out[i], out[8 + i] = matrix[0] * gx[i] + matrix[1] * gy[i], matrix[2] * gx[i] + matrix[3] * gy[i]
+    out[16], out[17] = matrix[0] * gx[8] + matrix[1] * gy[8], matrix[2] * gx[8] + matrix[3] * gy[8]
 
 
 @subroutine
@@ -284,23 +226,23 @@ def sum_geometric(work: ElementWork) -> None:
 
 @subroutine
 def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
-    """Fill `own` (18, 18) with the stiffening term of an element's tangent and the tangent of the overstress."""
-    s, shear_slope, own = work.s, work.shear_slope, work.own
+    """Fill `dyads` (18, 18) with the stiffening term of an element's tangent and the tangent of the overstress."""
+    s, shear_slope, dyads = work.s, work.shear_slope, work.dyads
     for i in range(18):
         for c in range(18):
-            own[i, c] = system.overstress_tangent[e, i, c] if system.overstress_tangent.shape[0] > 0 else 0.0
+            dyads[i, c] = system.overstress_tangent[e, i, c] if system.overstress_tangent.shape[0] > 0 else 0.0
         for q in range(9 if stiffens else 0):
             x = shear_slope[q] * s[q, i]
             for c in range(18):
-                own[i, c] += x * s[q, c]
+                dyads[i, c] += x * s[q, c]
 
 
 @subroutine
 def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Eliminate an element's centre node, which no other element shares: fill the `system`, `left` and `right`."""
-    h, bend, d, own, by_x, by_y = work.h, work.bend, work.d, work.own, work.by_x, work.by_y
+    h, bend, d, dyads, by_x, by_y = work.h, work.bend, work.d, work.dyads, work.by_x, work.by_y
     left, right, even, inverse = work.left, work.right, work.laplace, system.condensed_inverse
-    xx, yy, xy = even[8, 8] + own[16, 16], even[8, 8] + own[17, 17], own[17, 16]
+    xx, yy, xy = even[8, 8] + dyads[16, 16], even[8, 8] + dyads[17, 17], dyads[17, 16]
     for q in range(9):
         x, y = bend[q] * h[q, 16], bend[q] * h[q, 17]
         xx += x * h[q, 16]
@@ -315,9 +257,9 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
     inverse[e, 0], inverse[e, 1], inverse[e, 2] = k00, k01, k11
     for c in range(16):
         i, a = c % 8, c // 8
-        by = by_x if a == 0 else by_y
-        x = own[16, c] + by[8, i] + (1 - a) * even[8, i]
-        y = own[17, c] + by[8, 8 + i] + a * even[8, i]
+        products = by_x if a == 0 else by_y
+        x = dyads[16, c] + products[8, i] + (1 - a) * even[8, i]
+        y = dyads[17, c] + products[8, 8 + i] + a * even[8, i]
         for m in range(3):
             x += left[16, m] * d[m, c]
             y += left[17, m] * d[m, c]
@@ -330,7 +272,7 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
 @subroutine
 def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's condensed tangent, lower half, and the derivatives of its volume modes by displacements."""
-    left, right, own, even, tangent = work.left, work.right, work.own, work.laplace, system.tangent
+    left, right, dyads, even, tangent = work.left, work.right, work.dyads, work.laplace, system.tangent
     by_x, by_y, product = work.by_x, work.by_y, work.product
     for m in range(3):
         for c in range(18):
@@ -343,10 +285,10 @@ def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
             product[i, c] = total
     for i in range(8):
         for c in range(i + 1):
-            tangent[e, 2 * i, 2 * c] = product[i, c] + own[i, c] + by_x[i, c] + even[i, c]
-            tangent[e, 2 * i, 2 * c + 1] = product[i, 8 + c] + own[i, 8 + c] + by_y[i, c]
-            tangent[e, 2 * i + 1, 2 * c] = product[8 + i, c] + own[8 + i, c] + by_x[i, 8 + c]
-            tangent[e, 2 * i + 1, 2 * c + 1] = product[8 + i, 8 + c] + own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
+            tangent[e, 2 * i, 2 * c] = product[i, c] + dyads[i, c] + by_x[i, c] + even[i, c]
+            tangent[e, 2 * i, 2 * c + 1] = product[i, 8 + c] + dyads[i, 8 + c] + by_y[i, c]
+            tangent[e, 2 * i + 1, 2 * c] = product[8 + i, c] + dyads[8 + i, c] + by_x[i, 8 + c]
+            tangent[e, 2 * i + 1, 2 * c + 1] = product[8 + i, 8 + c] + dyads[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
 
 
 @subroutine
@@ -357,9 +299,9 @@ def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None
         recovery_matrix[e, m, 16] = inverse[e, m] * f[16] + inverse[e, m + 1] * f[17]
     for i in range(8):
         for a in range(2):
-            row, at = unknown[e, i, a], 2 * i + a
+            row, column = unknown[e, i, a], 2 * i + a
             if row >= 0:
-                centre = recovery_matrix[e, 0, at] * f[16] + recovery_matrix[e, 1, at] * f[17]
+                centre = recovery_matrix[e, 0, column] * f[16] + recovery_matrix[e, 1, column] * f[17]
                 system.force[row] += f[i + 8 * a] - centre
 
 

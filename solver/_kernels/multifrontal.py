@@ -26,13 +26,13 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
     sign = DEFINITE
     for p in range(inner.shape[0]):
         k, b = inner[p], border[p]
-        wide = k + b
-        top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
+        width = k + b
+        top = factors[factor_at[p] : factor_at[p] + k * width].reshape(k, width)
         complement = waiting[wait_at[p] : wait_at[p] + b * b].reshape(b, b)
         top[:, :] = 0.0
         complement[:, :] = 0.0
         for n in range(plan.leaf[p, 0], plan.leaf[p, 1]):
-            _add_element(tangent[plan.order[n]], plan.at[n], top, complement)
+            _add_element(tangent[plan.order[n]], plan.position[n], top, complement)
         for child in plan.children[p]:
             if child >= 0:
                 size, first = border[child], plan.border_at[child]
@@ -52,16 +52,16 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
 
 
 @compile_loop
-def _add_element(own: Array, at: Narrow, top: Array, complement: Array) -> None:
-    """Add an element's tangent `own` (16, 16), lower half, to a front; `at` (16,) are its unknowns' positions there."""
+def _add_element(element: Array, position: Narrow, top: Array, complement: Array) -> None:
+    """Add the tangent of an `element` (16, 16), lower half, to a front where its unknowns have a `position` (16,)."""
     k = top.shape[0]
     for i in range(16):
         for j in range(i + 1):
-            low, high = min(at[i], at[j]), max(at[i], at[j])
+            low, high = min(position[i], position[j]), max(position[i], position[j])
             if 0 <= low < k:
-                top[low, high] += own[i, j]
+                top[low, high] += element[i, j]
             elif low >= k:
-                complement[low - k, high - k] += own[i, j]
+                complement[low - k, high - k] += element[i, j]
 
 
 @compile_loop
@@ -97,17 +97,17 @@ def _factorise(top: Array, complement: Array) -> bool:
     k, b = top.shape[0], complement.shape[0]
     over = np.empty(k)  # reciprocal pivots
     for r in range(0, k - 1, 2):
-        one, two = top[r, r:], top[r + 1, r:]
-        _update_two(top, over, r, r, one, two)
-        if one[0] == 0.0:
+        upper, lower = top[r, r:], top[r + 1, r:]
+        _update_two(top, over, r, r, upper, lower)
+        if upper[0] == 0.0:
             return False
-        over[r] = 1.0 / one[0]
-        factor = one[1] * over[r]
-        for c in range(1, one.shape[0]):
-            two[c] -= factor * one[c]
-        if two[1] == 0.0:
+        over[r] = 1.0 / upper[0]
+        factor = upper[1] * over[r]
+        for c in range(1, upper.shape[0]):
+            lower[c] -= factor * upper[c]
+        if lower[1] == 0.0:
             return False
-        over[r + 1] = 1.0 / two[1]
+        over[r + 1] = 1.0 / lower[1]
     if k % 2 == 1:
         _update_one(top, over, k - 1, k - 1, top[k - 1, k - 1 :])
         if top[k - 1, k - 1] == 0.0:
@@ -121,9 +121,9 @@ def _factorise(top: Array, complement: Array) -> bool:
 
 
 @subroutine
-def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Array) -> None:
+def _update_two(top: Array, over: Array, count: int, r: int, upper: Array, lower: Array) -> None:
     """Subtract the contributions of the first `count` rows from rows r and r + 1 of a front, given from column r on."""
-    size = one.shape[0]
+    size = upper.shape[0]
     p = 0
     while p + 4 <= count:
         d0, d1, d2, d3 = over[p], over[p + 1], over[p + 2], over[p + 3]
@@ -132,26 +132,26 @@ def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Ar
         b0, b1, b2, b3 = s0[1] * d0, s1[1] * d1, s2[1] * d2, s3[1] * d3
         for c in range(size):
             x0, x1, x2, x3 = s0[c], s1[c], s2[c], s3[c]
-            one[c] -= a0 * x0 + a1 * x1 + a2 * x2 + a3 * x3
-            two[c] -= b0 * x0 + b1 * x1 + b2 * x2 + b3 * x3
+            upper[c] -= a0 * x0 + a1 * x1 + a2 * x2 + a3 * x3
+            lower[c] -= b0 * x0 + b1 * x1 + b2 * x2 + b3 * x3
         p += 4
     while p < count:
         s0 = top[p, r:]
         a0, b0 = s0[0] * over[p], s0[1] * over[p]
         for c in range(size):
-            one[c] -= a0 * s0[c]
-            two[c] -= b0 * s0[c]
+            upper[c] -= a0 * s0[c]
+            lower[c] -= b0 * s0[c]
         p += 1
 
 
 @subroutine
-def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None:
+def _update_one(top: Array, over: Array, count: int, r: int, row: Array) -> None:
     """Subtract the contributions of the first `count` rows from row r of a front, given from column r on."""
     for p in range(count):
         s0 = top[p, r:]
         a0 = s0[0] * over[p]
-        for c in range(one.shape[0]):
-            one[c] -= a0 * s0[c]
+        for c in range(row.shape[0]):
+            row[c] -= a0 * s0[c]
 
 
 @compile_loop
@@ -181,26 +181,26 @@ def back_substitute_part(p: int, condensed_force: Array, factors: Factors, out: 
     """Fill `out` (n,) with the displacements that part `p` of the body eliminates, from those of its border."""
     start, inner, border, border_at, numbers, factor_at, values, near = factors
     k, b, first = inner[p], border[p], start[p]
-    wide = k + b
-    top = values[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
+    width = k + b
+    top = values[factor_at[p] : factor_at[p] + k * width].reshape(k, width)
     beyond = numbers[border_at[p] : border_at[p] + b]
     for j in range(b):
         near[k + j] = out[beyond[j]]
     i = k
     while i >= 2:  # two rows at a time: they share the reads of `solution`
         i -= 2
-        one, two, solution = top[i, i:], top[i + 1, i:], near[i:wide]
+        upper, lower, solution = top[i, i:], top[i + 1, i:], near[i:width]
         x, y = condensed_force[first + i], condensed_force[first + i + 1]
-        for j in range(2, wide - i):
-            x += one[j] * solution[j]
-            y += two[j] * solution[j]
-        y = -y / two[1]
-        near[i], near[i + 1] = -(x + one[1] * y) / one[0], y
+        for j in range(2, width - i):
+            x += upper[j] * solution[j]
+            y += lower[j] * solution[j]
+        y = -y / lower[1]
+        near[i], near[i + 1] = -(x + upper[1] * y) / upper[0], y
     if i == 1:
-        one, x = top[0], condensed_force[first]
-        for j in range(1, wide):
-            x += one[j] * near[j]
-        near[0] = -x / one[0]
+        upper, x = top[0], condensed_force[first]
+        for j in range(1, width):
+            x += upper[j] * near[j]
+        near[0] = -x / upper[0]
     for i in range(k):
         out[first + i] = near[i]
 

@@ -32,10 +32,10 @@ def overstress(u: Array, tensor: Array, elements: ElementArrays, force: Array, t
             t0, t1, t2 = tensor[e, q, 0], tensor[e, q, 1], tensor[e, q, 2]
             m00, m01 = f00 * t0 + f01 * t2, f00 * t2 + f01 * t1
             m10, m11 = f10 * t0 + f11 * t2, f10 * t2 + f11 * t1
-            whole = f00 * m00 + f01 * m01 + f10 * m10 + f11 * m11 + tensor[e, q, 3]
+            contraction = f00 * m00 + f01 * m01 + f10 * m10 + f11 * m11 + tensor[e, q, 3]
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # F^-T
-            part, third = c * 2.0 / 3.0, c * whole / 3.0
-            dyadic = part * whole / 3.0
+            part, third = c * 2.0 / 3.0, c * contraction / 3.0
+            dyadic = part * contraction / 3.0
             for i in range(9):
                 x, y = i + 8 * (i == 8), i + 8 + (i == 8)
                 hx[i] = a00 * gx[i] + a01 * gy[i]
@@ -46,11 +46,11 @@ def overstress(u: Array, tensor: Array, elements: ElementArrays, force: Array, t
                 force[e, y] += c * my[i] - third * hy[i]
                 px, py = c * (t0 * gx[i] + t2 * gy[i]), c * (t2 * gx[i] + t1 * gy[i])
                 for k in range(i + 1):
-                    at, up = k + 8 * (k == 8), k + 8 + (k == 8)
+                    across, up = k + 8 * (k == 8), k + 8 + (k == 8)
                     laplace = px * gx[k] + py * gy[k]
                     xx, yy = mx[i] * hx[k] + hx[i] * mx[k], my[i] * hy[k] + hy[i] * my[k]
                     xy, yx = mx[i] * hy[k] + hx[i] * my[k], my[i] * hx[k] + hy[i] * mx[k]
-                    tangent[e, x, at] += laplace - part * xx + (dyadic + third) * hx[i] * hx[k]
+                    tangent[e, x, across] += laplace - part * xx + (dyadic + third) * hx[i] * hx[k]
                     tangent[e, y, up] += laplace - part * yy + (dyadic + third) * hy[i] * hy[k]
                     tangent[e, x, up] += dyadic * hx[i] * hy[k] + third * hy[i] * hx[k] - part * xy
-                    tangent[e, y, at] += dyadic * hy[i] * hx[k] + third * hx[i] * hy[k] - part * yx
+                    tangent[e, y, across] += dyadic * hy[i] * hx[k] + third * hx[i] * hy[k] - part * yx

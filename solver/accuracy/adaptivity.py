@@ -62,7 +62,7 @@ class NestedGrid:
         wide, five = 4 * rows + 1, np.arange(5)
         along = 4 * np.arange(columns)[:, None, None, None] + five[:, None]
         nodes = along * wide + 4 * np.arange(rows)[:, None, None] + five
-        moduli = [Moduli(one.shear, 0.0) for one in settled_moduli(finger.scene.materials)]
+        moduli = [Moduli(tissue.shear, 0.0) for tissue in settled_moduli(finger.scene.materials)]
         shear = Elastic.of(mesh, moduli).stiffness.reshape(columns, 2, rows, 2, 18, 18)
         place = mesh.nodes.take(nodes, axis=0).reshape(columns, rows, 25, 2)
         affine = np.concatenate([np.ones((*place.shape[:3], 1)), place - place.mean(axis=2, keepdims=True)], axis=3)
@@ -76,10 +76,12 @@ class NestedGrid:
         `displacement` (nodes, 2) and the contact states of `state` are those on this mesh.
         """
         dual = adjoint(self.finger, displacement, state)
-        primal, dual = (self._curvature(one) for one in (displacement, dual))
+        primal, dual = (self._curvature(field) for field in (displacement, dual))
         five = (*self.nodes.shape, 2)
-        columns = [one - (QUADRATIC @ one[:, :, ::2].reshape(*five[:2], 3, 10)).reshape(five) for one in (primal, dual)]
-        rows = [one - QUADRATIC @ one[:, :, :, ::2] for one in (primal, dual)]
+        columns = [
+            field - (QUADRATIC @ field[:, :, ::2].reshape(*five[:2], 3, 10)).reshape(five) for field in (primal, dual)
+        ]
+        rows = [field - QUADRATIC @ field[:, :, :, ::2] for field in (primal, dual)]
         return np.abs(self._energy(*columns).sum(axis=1)), np.abs(self._energy(*rows).sum(axis=0))
 
     def _curvature(self, values: Array) -> Array:
@@ -135,8 +137,9 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
     change = abs(float(nested.numbers[0] - numbers[0]))
     parts *= from_halving(order_of(scene)) * change / max(float(parts.sum()), np.finfo(float).tiny)
-    before = np.flatnonzero(np.diff(state.state))
-    columns = np.searchsorted(finger.geometry.lines.arcs, (finger.arcs[before] + finger.arcs[before + 1]) / 2.0) - 1
+    edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
+    middle = (finger.arcs[edge] + finger.arcs[edge + 1]) / 2.0
+    columns = np.searchsorted(finger.geometry.lines.arcs, middle) - 1
     np.add.at(parts, columns, FROM_EDGES * nested.of_edges[:, 0])
     whole = float(parts.sum())
     return replace(nested, shares=parts / whole if whole > 0.0 else None)

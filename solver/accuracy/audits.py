@@ -49,8 +49,8 @@ def audits(
     residual[mesh.skin] -= state.reaction
     residual[mesh.held] = 0.0
     work = float(np.sum(state.reaction * displacement[mesh.skin]))
-    whole = finger.geometry.whole
-    height = mesh.nodes[whole, 1] + displacement[whole, 1] - state.load.depth
+    skin = finger.geometry.all_skin
+    height = mesh.nodes[skin, 1] + displacement[skin, 1] - state.load.depth
     push = max(float(state.normal.max(initial=0.0)), np.finfo(float).tiny)
     length = np.empty(len(state.state))
     x = np.ascontiguousarray(state.place(condensed)[:, 0])

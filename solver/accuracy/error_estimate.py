@@ -141,13 +141,13 @@ def edge_changes(
     equilibrium exists with the edge moved.
     """
     variants = [_move_edges(newton, state, forces) for state, forces in states]
-    solutions = [one for edges in variants for sides in edges for one in sides if one is not None]
+    solutions = [state for edges in variants for sides in edges for state in sides if state is not None]
     values = numbers([*(state for state, _ in states), *solutions])
     base, variant_values = values[: len(states)], iter(values[len(states) :])
     size = base.shape[1]
 
     def change(sides: list[EquilibriumState | None], before: Array) -> Array:
-        changes = [np.full(size, np.inf) if one is None else np.abs(next(variant_values) - before) for one in sides]
+        changes = [np.full(size, np.inf) if state is None else np.abs(next(variant_values) - before) for state in sides]
         return np.max(changes, axis=0)
 
     return base, [
@@ -189,12 +189,12 @@ def _move_edges(
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     reuse = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
     solvable = newton.linearise(state, state.load, x, 0, forces, reuse=reuse)
-    alone = np.count_nonzero(state.touching) == 1
+    is_single = np.count_nonzero(state.touching) == 1
     return [
         [
             _move_edge(newton, state, forces, x, *pair) if solvable else None
             for pair in ((edge, edge + 1), (edge + 1, edge))
-            if not (alone and state.touching[pair[0]])
+            if not (is_single and state.touching[pair[0]])
         ]
         for edge in edges
     ]
@@ -227,15 +227,15 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     if nested is None:
         return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     change = nested.numbers - numbers
-    off = half_width(change, nested.of_edges, order_of(scene), _PARTS_OF_EDGES)
+    error = half_width(change, nested.of_edges, order_of(scene), _PARTS_OF_EDGES)
     if steps is not None:
-        off += steps.error
-    relative = off / np.maximum(np.abs(numbers), np.finfo(float).tiny)
+        error += steps.error
+    relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
-    corrected = float(off[0] - abs(change[0])) / max(abs(float(nested.numbers[0])), np.finfo(float).tiny)
-    own = off[FORCES_AND_PLACES:]
+    corrected = float(error[0] - abs(change[0])) / max(abs(float(nested.numbers[0])), np.finfo(float).tiny)
+    of_quantities = error[FORCES_AND_PLACES:]
     return _without_prescribed(
-        scene, Errors(sed, corrected, normal, tangential, depth, float(off[SHIFT]), width, point, own)
+        scene, Errors(sed, corrected, normal, tangential, depth, float(error[SHIFT]), width, point, of_quantities)
     )
 
 
@@ -249,8 +249,8 @@ def row_errors(scene: Scene, row: Array, nested: NestedNumbers | None) -> Array:
     """Return the errors of the SED of a row of receptors `row` (r,), relative (r,); nan where nothing is known."""
     if nested is None:
         return np.full(len(row), np.nan)
-    off = half_width(nested.row - row, nested.row_of_edges, order_of(scene))
-    return off / np.maximum(row, np.finfo(float).tiny)
+    error = half_width(nested.row - row, nested.row_of_edges, order_of(scene))
+    return error / np.maximum(row, np.finfo(float).tiny)
 
 
 def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
@@ -287,7 +287,7 @@ def stiffness_warning(scene: Scene) -> str:
 def _stiffness_ratio(materials: Materials) -> tuple[float, str, str]:
     """Return the largest ratio of stiffnesses of neighbouring tissues without its round-off, the stiffer and softer."""
     stiffness = {name: moduli.engineering[0] for name, moduli in zip(TISSUES, settled_moduli(materials), strict=True)}
-    pairs = [pair for one, other in pairwise(TISSUES[:-1]) for pair in ((one, other), (other, one))]
+    pairs = [pair for outer, inner in pairwise(TISSUES[:-1]) for pair in ((outer, inner), (inner, outer))]
     ratio, stiff, soft = max((stiffness[a] / stiffness[b], a, b) for a, b in pairs)
     return ratio * (1.0 - _ROUND_OFF), stiff, soft
 
@@ -324,7 +324,7 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     For forces and depth, only errors above the resolution of sensors give a warning. A surface without a state on the
     nested mesh is left out, since its error is unknown.
     """
-    with_estimate = [(one, one.nested) for one in predictions if one.nested is not None]
+    with_estimate = [(prediction, prediction.nested) for prediction in predictions if prediction.nested is not None]
     if len(with_estimate) < 2:
         return ContrastError(0.0)
     count = len(COMPARED)
@@ -380,13 +380,15 @@ def estimate_errors(
     the load steps. Errors are infinite where contact with a moved edge has no equilibrium.
     """
     value = numbers(newton, state)
-    finer, there = nested
+    nested_newton, nested_equilibrium = nested
     (corrected,), (edges,) = edge_changes(
-        finer, [(there, forces)], lambda states: np.array([numbers(finer, one) for one in states])
+        nested_newton,
+        [(nested_equilibrium, forces)],
+        lambda states: np.array([numbers(nested_newton, state) for state in states]),
     )
     error = half_width(corrected - value, edges)
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")
-        error += Steps.of(value, np.array([numbers(newton, one) for one in fewer]), None).bound
+        error += Steps.of(value, np.array([numbers(newton, state) for state in fewer]), None).bound
     return ErrorInterval(value, corrected, error)

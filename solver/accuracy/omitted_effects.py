@@ -195,24 +195,24 @@ def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
         return {"estimate": 0.0, "from": {"longest_relaxation_s": longest}, "how": how}
     if scene.materials.relax:
         series = [[(t.tau, t.g) for t in tissue.prony] for tissue in scene.materials.by_region]
-        whose = "the tissues relaxing by the scene's own series, the largest of them"
+        series_text = "the tissues relaxing by the scene's own series, the largest of them"
     else:
         series = [list(RELAXATION)]
-        whose = (
+        series_text = (
             "all layers relaxing alike with the times of Pawluk and Howe (1999) and assumed weights of a fifth each; "
             "it would scale all surfaces alike"
         )
     return {
         "estimate": max(_overstress_after(duration, terms) for terms in series),
         "from": {"slide_s": duration, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
-        "how": f"stress above its relaxed value when sliding has settled, {whose}",
+        "how": f"stress above its relaxed value when sliding has settled, {series_text}",
     }
 
 
 def _overstress_after(duration: float, terms: Sequence[tuple[float, float]]) -> float:
     """Return the relative overstress after a press of 1 s and a slide that lasts `duration` [s]."""
-    after = sum(g * tau * (np.exp(-duration / tau) - np.exp(-(duration + 1.0) / tau)) for tau, g in terms)
-    return float(after) / (1.0 - sum(g for _, g in terms))
+    overstress = sum(g * tau * (np.exp(-duration / tau) - np.exp(-(duration + 1.0) / tau)) for tau, g in terms)
+    return float(overstress) / (1.0 - sum(g for _, g in terms))
 
 
 def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
@@ -262,11 +262,11 @@ def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
 def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], start: float) -> Prediction:
     """Return `prediction` with new entries `left_out` and their warnings; `start` is when the work on them began."""
     usual = warnings(prediction.scene, prediction.model["left_out"])
-    own = tuple(one for one in prediction.warnings if one not in usual)
+    remaining = tuple(warning for warning in prediction.warnings if warning not in usual)
     return replace(
         prediction,
         model={**prediction.model, "left_out": left_out},
-        warnings=(*own, *warnings(prediction.scene, left_out)),
+        warnings=(*remaining, *warnings(prediction.scene, left_out)),
         evidence_s=perf_counter() - start + (prediction.evidence_s or 0.0),
     )
 
@@ -292,29 +292,31 @@ def _with_meshed_bone(scene: Scene, answers: Answers) -> Answer | SceneError:
         return error
 
 
-def _difference(base: Prediction, variant: Answer | SceneError, how: str) -> dict[str, Any]:
+def _difference(base: Prediction, variant: Answer | SceneError, variation: str) -> dict[str, Any]:
     if isinstance(variant, NoSteadyState):
         return {
             "estimate": None,
             "from": {"limit_mu": variant.limit_mu},
-            "how": f"{MEASURED}{how}: no settled state is there",
+            "how": f"{MEASURED}{variation}: no settled state is there",
         }
     if not isinstance(variant, Prediction):
-        return {"how": f"{MEASURED}{how} was to be measured, but: {variant}"}
+        return {"how": f"{MEASURED}{variation} was to be measured, but: {variant}"}
     change = abs(variant.sed_ending / base.sed_ending - 1.0) if base.sed_ending else None
     numbers = {"without_MPa": base.sed_ending, "with_MPa": variant.sed_ending}
-    return {"estimate": change, "from": numbers, "how": MEASURED + how}
+    return {"estimate": change, "from": numbers, "how": MEASURED + variation}
 
 
-def _beyond_errors(base: Prediction, variant: Answer, how: str) -> dict[str, Any]:
+def _beyond_errors(base: Prediction, variant: Answer, variation: str) -> dict[str, Any]:
     """Return the entry of a solve on another mesh, without `estimate` where the mesh errors explain the change."""
-    entry = _difference(base, variant, how)
+    entry = _difference(base, variant, variation)
     if not isinstance(variant, Prediction) or base.sed_ending == 0.0:
         return entry
     change, errors = entry["estimate"], base.error_estimate + variant.error_estimate
     if change > errors:
         return entry
-    return {"how": f"{MEASURED}{how}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"}
+    return {
+        "how": f"{MEASURED}{variation}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"
+    }
 
 
 def _at_finite_strain(scene: Scene) -> Scene:

@@ -17,7 +17,7 @@ from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled_state
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.load_path import PRESSING_TIME, Aim, way_of
+from solver.equilibrium.load_path import PRESSING_TIME, Aim, undeformed_path
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
@@ -71,9 +71,9 @@ def with_viscosity(prediction: Prediction) -> Prediction:
     still = residual_overstress(prediction)
     if still is None:
         return replace(prediction, evidence_s=perf_counter() - start)
-    whose = "with the scene's own series"
+    series_text = "with the scene's own series"
     if not scene.materials.relax:
-        whose = (
+        series_text = (
             "to the moduli of the scene with the times of Pawluk and Howe (1999) and assumed weights of a fifth each"
         )
     before = prediction.model["left_out"]
@@ -81,7 +81,7 @@ def with_viscosity(prediction: Prediction) -> Prediction:
         "estimate": still.part,
         "from": {**before["viscosity"]["from"], "slide_s": still.slide_s},
         "how": "change of the ending's SED when an elastic finger's slide has settled, all soft tissues relaxing "
-        f"{whose}: press and slide marched on a coarse mesh in few steps",
+        f"{series_text}: press and slide marched on a coarse mesh in few steps",
     }
     return with_left_out(prediction, {**before, "viscosity": entry}, start)
 
@@ -107,12 +107,12 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
         finger = _coarse_finger(scene.frictionless_press(depth), get_ident())
         state = roughly(finger, scene) if isinstance(finger, FiniteFinger) else settled_state(scene, finger)
         at_last = finger.sed_ending(finger.displacement(state))
-        way = way_of(scene, finger, relaxing=True)
+        path = undeformed_path(scene, finger, relaxing=True)
         for aim in aims:
-            way.go(aim)
+            path.go(aim)
     except SolveFailure:
         return None
-    return ResidualOverstress(abs(way.energies[-1][0] / at_last - 1.0), slide_s) if at_last > 0.0 else None
+    return ResidualOverstress(abs(path.energies[-1][0] / at_last - 1.0), slide_s) if at_last > 0.0 else None
 
 
 @lru_cache(maxsize=1)

@@ -9,9 +9,8 @@ from typing import ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels import elements as element_loops
 from solver._kernels.compiling import HELD_X, HELD_Y
-from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, ElementGeometry, Indices, Narrow, ShapeFunctions, inverse
+from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, Indices, Narrow, inverse
 from solver.constitutive import Elasticity, LocalState
 from solver.mesh import Q2P1, Mesh, distinct
 
@@ -65,7 +64,7 @@ class CondensedBody(Protocol):
         """Return the energy stored at displacements `u`, held by surface forces `reaction` (k, 2) [N mm per mm]."""
         ...
 
-    def work(self, way: Sequence[Array], trapezoid: float) -> float:
+    def work(self, path: Sequence[Array], trapezoid: float) -> float:
         """Return the work of the skin's forces along a path [N mm per mm]; `trapezoid` is its trapezoidal sum."""
         ...
 
@@ -178,7 +177,7 @@ class CondensedLinear:
         """Return the energy stored once the body is relaxed under forces `reaction` (k, 2) [N mm per mm]."""
         return 0.5 * float(np.sum(reaction * self.displacement_under(reaction)))
 
-    def work(self, way: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
+    def work(self, path: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
         """Return `trapezoid`: forces grow in proportion to displacements, so that the rule is exact."""
         return trapezoid
 
@@ -252,9 +251,7 @@ class Endings:
 
 
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
-_SHAPES = ShapeFunctions(
-    VALUES, np.ascontiguousarray(_SLOPES[..., 0]), np.ascontiguousarray(_SLOPES[..., 1]), Q2P1.weights
-)
+_XI, _ETA = np.ascontiguousarray(np.moveaxis(_SLOPES, 2, 0))  # derivatives by the local coordinates, (9, 9) each
 
 
 class Places(NamedTuple):
@@ -306,9 +303,10 @@ class MeshElements:
         hosts, wide = places.hosts, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
         local = self.mesh.about_centre(displacement, hosts)
         gradient = places.probes.gradient_of(local.take(places.number, axis=0))
-        by = places.gradients @ local.reshape(len(hosts), 9, -1)
-        by = np.moveaxis(by.reshape(2, len(hosts), 9, *displacement.shape[1:]), 3, 1)
-        fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), hosts)[places.number]
+        gradients = places.gradients @ local.reshape(len(hosts), 9, -1)
+        gradients = np.moveaxis(gradients.reshape(2, len(hosts), 9, *displacement.shape[1:]), 3, 1)
+        volume = self.volume(gradients[0, 0], gradients[1, 0], gradients[0, 1], gradients[1, 1])
+        fit = self.volume_modes(volume, hosts)[places.number]
         shear, lame, stiffening, x, y = places.constants[wide]
         return LocalState(
             gradient[:, 0, 0], gradient[:, 0, 1], gradient[:, 1, 0], gradient[:, 1, 1],
@@ -329,13 +327,26 @@ class MeshElements:
 
 @lru_cache(maxsize=4)  # consecutive bodies often share a mesh and differ in materials
 def _geometry(mesh: Mesh) -> tuple[Array, ...]:
-    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`."""
-    count = len(mesh.elements)
-    sizes = (9, 9), (9, 9), (9,), (9, 3), (9, 9), (2,), (3, 3)
-    out = tuple(np.empty((count, *size)) for size in sizes)
-    if not element_loops.integrate(mesh.nodes, mesh.elements, _SHAPES, ElementGeometry(*out)):
+    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`.
+
+    The modes are 1, x, y about the centre, made orthonormal by the Cholesky factor of their mass matrix.
+    """
+    x, y = np.moveaxis(mesh.local(mesh.nodes), 2, 0)  # (e, 9) each
+    x_xi, x_eta, y_xi, y_eta = x @ _XI.T, x @ _ETA.T, y @ _XI.T, y @ _ETA.T
+    det = x_xi * y_eta - x_eta * y_xi
+    if not det.min() > 0.0:
         raise LinAlgError("an element is folded")
-    return out
+    x_xi, x_eta, y_xi, y_eta = (slope[:, :, None] / det[:, :, None] for slope in (x_xi, x_eta, y_xi, y_eta))
+    grad_x, grad_y = y_eta * _XI - y_xi * _ETA, x_xi * _ETA - x_eta * _XI
+    weight = det * Q2P1.weights
+    points = np.stack([x @ VALUES.T, y @ VALUES.T], axis=2)
+    centre = points.mean(axis=1)
+    affine = np.concatenate([np.ones((*det.shape, 1)), points - centre[:, None]], axis=2)  # (e, q, 3)
+    wide = weight[:, :, None]
+    mass: Array = np.swapaxes(affine, 1, 2) @ (wide * affine)
+    combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
+    laplace = np.swapaxes(grad_x, 1, 2) @ (wide * grad_x) + np.swapaxes(grad_y, 1, 2) @ (wide * grad_y)
+    return grad_x, grad_y, weight, affine @ np.swapaxes(combination, 1, 2), laplace, centre, combination
 
 
 def integrate_elements(

@@ -89,13 +89,13 @@ class FiniteBody(MeshElements):
         """Return the energy stored in the body [N mm per mm]."""
         return self._energy(self.gradient(u)).real
 
-    def energy_slope(self, u: Array, way: Array) -> float:
-        """Return the derivative of the stored energy at `u` along `way` (nodes, 2) [N mm per mm].
+    def energy_slope(self, u: Array, direction: Array) -> float:
+        """Return the derivative of the stored energy at `u` along a `direction` (nodes, 2) [N mm per mm].
 
         It is a complex-step derivative of the energy, independent of the stresses (Squire and Trapp 1998, SIAM Rev. 40,
         110).
         """
-        H = self.gradient(cast("Array", u + 1j * IMAGINARY * way))
+        H = self.gradient(cast("Array", u + 1j * IMAGINARY * direction))
         return self._energy(H).imag / IMAGINARY
 
     def energy_growth(self, displacement: Array) -> float:
@@ -222,9 +222,9 @@ class CondensedFinite:
         """Return the energy stored in the body at `u` (nodes, 2) [N mm per mm]."""
         return self.body.energy(u)
 
-    def work(self, way: Sequence[Array], trapezoid: float) -> float:
+    def work(self, path: Sequence[Array], trapezoid: float) -> float:
         """Do as `CondensedBody` says, by Simpson's rule, with the internal forces at the mean displacements."""
-        halfway = (self.body.energy_slope((one + other) / 2.0, other - one) for one, other in pairwise(way))
+        halfway = (self.body.energy_slope((before + after) / 2.0, after - before) for before, after in pairwise(path))
         return (trapezoid + 2.0 * sum(halfway)) / 3.0
 
 

@@ -88,14 +88,14 @@ class LinearElimination:
         """Return dead `loads` (nodes, 2) after forward elimination."""
         mesh, plan = self.elastic.mesh, self._inside.plan
         centre = loads[mesh.elements[:, 8], :, None]
-        own = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
+        of_centres = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
         from_centre = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
         free = plan.unknown >= 0
         force = np.zeros(plan.size)
         force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
         np.add.at(force, plan.unknown[free], from_centre[free])
         self._inside.condense(force)
-        return force, own
+        return force, of_centres
 
     def skin_load(self, load: CondensedLoad) -> Array:
         """Return a load condensed to the skin (2 k,), 0 where that is held."""
@@ -165,16 +165,16 @@ class LinearBody:
             check_body(mesh, materials)
             check_loads(mesh, loads, prescribed)
             check_held(mesh, free)
-        whole = LinearElimination(mesh, materials)
+        elimination = LinearElimination(mesh, materials)
         displacement = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
         force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
         if prescribed is not None:
-            force -= mesh.assemble(whole.elastic.forces(mesh.local(displacement)))
-        load = whole.condense(force) if force.any() else whole.no_load
-        condensed = _condense_skin(mesh, whole.stiffness, whole.skin_load(load), free)
+            force -= mesh.assemble(elimination.elastic.forces(mesh.local(displacement)))
+        load = elimination.condense(force) if force.any() else elimination.no_load
+        condensed = _condense_skin(mesh, elimination.stiffness, elimination.skin_load(load), free)
         if not checked and len(mesh.skin):
             _ = condensed.compliance  # raises where the body can move
-        return LinearBody(mesh, whole.elastic, whole, load, condensed, displacement)
+        return LinearBody(mesh, elimination.elastic, elimination, load, condensed, displacement)
 
     def displacement(self, u: Array, only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, ...) of all nodes for those of the skin `u` (k, 2, ...).
@@ -315,8 +315,8 @@ class LinearPatches(Patches):
 def _condense_skin(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
     """Return the condensed body with a `stiffness` (2 k, 2 k) and dead `load` (2 k,) of its skin."""
     place = mesh.nodes[mesh.skin]
-    (x, y), one, zero = place.T, np.ones(len(place)), np.zeros(len(place))
-    shapes = {"x": np.c_[one, zero].ravel(), "y": np.c_[zero, one].ravel(), "turn": np.c_[-y, x].ravel()}
+    (x, y), ones, zeros = place.T, np.ones(len(place)), np.zeros(len(place))
+    shapes = {"x": np.c_[ones, zeros].ravel(), "y": np.c_[zeros, ones].ravel(), "turn": np.c_[-y, x].ravel()}
     rigid = np.stack(list(shapes.values()), axis=1) @ loose(mesh)
     skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held_directions(mesh))
     skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid

@@ -44,12 +44,12 @@ def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
     return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, np.repeat(tangent, 2, axis=0))
 
 
-def join(head: Endings, tail: Endings) -> Endings:
-    """Return the endings of `head`, then those of `tail`."""
-    probes = (np.concatenate([getattr(e.probes, f.name) for e in (head, tail)]) for f in fields(Probes))
-    weights, tangent = (np.concatenate(pair) for pair in ((head.weights, tail.weights), (head.tangent, tail.tangent)))
-    patch = np.concatenate([head.patch, head.count + tail.patch])
-    return Endings(Probes(*probes), weights, patch, head.count + tail.count, tangent)
+def join(first: Endings, second: Endings) -> Endings:
+    """Return the endings of `first`, then those of `second`."""
+    probes = (np.concatenate([getattr(e.probes, f.name) for e in (first, second)]) for f in fields(Probes))
+    weights, tangent = np.concatenate([first.weights, second.weights]), np.concatenate([first.tangent, second.tangent])
+    patch = np.concatenate([first.patch, first.count + second.patch])
+    return Endings(Probes(*probes), weights, patch, first.count + second.count, tangent)
 
 
 def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
@@ -79,8 +79,8 @@ def _along_side(finger: FingerMesh, arc: Array, station: Indices) -> tuple[Array
     its angle a, and e_m, e_t radial and tangential in its middle. The distance is 1 where the skin is straight.
     """
     start, stop = finger.arcs[station], finger.arcs[station + 1]
-    here, first, last = (finger.outline.angle(place) for place in (arc, start, stop))
-    half, angle = (last - first) / 2.0, here - (first + last) / 2.0
+    angles, first, last = (finger.outline.angle(place) for place in (arc, start, stop))
+    half, angle = (last - first) / 2.0, angles - (first + last) / 2.0
     sine, rise = np.sin(half), 1.0 - np.cos(half)
     slope = np.tan(angle)
     straight = half == 0.0

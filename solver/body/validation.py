@@ -135,8 +135,8 @@ def _check_skin(mesh: Mesh) -> None:
     corner = np.arange(4)
     around = mesh.elements[:, np.stack([corner, corner + 4, (corner + 1) % 4], axis=1)].reshape(-1, 3)
     middles, first, counts = np.unique(around[:, 1], return_index=True, return_counts=True)
-    at = np.minimum(np.searchsorted(middles, sides[:, 1]), len(middles) - 1)
-    wrong = (around[first[at]] != sides).any(axis=1) | (counts[at] > 1)
+    position = np.minimum(np.searchsorted(middles, sides[:, 1]), len(middles) - 1)
+    wrong = (around[first[position]] != sides).any(axis=1) | (counts[position] > 1)
     if wrong.any():
         nodes = ", ".join(str(node) for node in sides[int(np.argmax(wrong))])
         raise BodyError(f"nodes {nodes} of mesh.skin are no free side of an element with the body above it; {advice}")
@@ -162,7 +162,7 @@ def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> No
     if stray.any():
         raise BodyError(f"loads pull at node {np.argmax(stray)}, which belongs to no element; give 0 there")
     if prescribed is not None and np.asarray(prescribed)[~mesh.driven].any():
-        row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))
+        row, along = (int(index[0]) for index in np.nonzero(prescribed * ~mesh.driven))
         raise BodyError(
             f"prescribed moves node {row} along {'xy'[along]}, where nothing holds it; name it in mesh.held, or in "
             f"mesh.held_{'xy'[along]}"
@@ -181,8 +181,8 @@ def loose(mesh: Mesh) -> Array:
     if len(distinct(mesh.held)) > 1:
         return np.zeros((3, 0))
     x, y = (mesh.nodes / np.ptp(mesh.nodes)).T
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    moves = np.stack([np.c_[one, zero].ravel(), np.c_[zero, one].ravel(), np.c_[-y, x].ravel()], axis=1)[mesh.fixed]
+    ones, zeros = np.ones_like(x), np.zeros_like(x)
+    moves = np.stack([np.c_[ones, zeros].ravel(), np.c_[zeros, ones].ravel(), np.c_[-y, x].ravel()], axis=1)[mesh.fixed]
     _, sizes, ways = np.linalg.svd(np.concatenate([moves, np.zeros((3, 3))]), full_matrices=False)
     ways[:, 2] /= np.ptp(mesh.nodes)
     return ways[sizes[:3] < CUT * np.sqrt(len(mesh.fixed) + 1.0)].T

@@ -14,7 +14,7 @@ strain (Dowaikh and Ogden 1990, IMA J. Appl. Math. 44, 261), here for any law in
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,196 +91,189 @@ class Branch:
         return self.states[-1]
 
 
-def continue_branch(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
-    """Follow a branch as `trace` does, up to exactly `target`."""
-    return stop_at(finger, trace(finger, start, by, target, folds), by, target)
+class _Point(NamedTuple):
+    state: EquilibriumState
+    compression: SkinCompression
+    value: float  # of the parameter
 
 
-def trace(
-    finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float, length: float | None = None
-) -> Branch:
-    """Follow a branch as `follow` does, and continue where it turns back only over a short stretch."""
-    branch = follow(finger, start, by, target, folds, length)
-    for _ in range(BRANCH.hops):
-        beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
-        if beyond is None:
-            break
-        hop = follow(finger, beyond, by, target, folds)
-        branch = replace(hop, states=(*branch.states, *hop.states))
-    return branch
+class _Tangent(NamedTuple):
+    """A unit tangent of a branch."""
 
-
-def _beyond(finger: BranchBody, branch: Branch, by: int, target: float, folds: float) -> EquilibriumState | None:
-    """Return a state a little beyond the end of a branch; None where it really ends.
-
-    Where a node of the contact reaches the shear limit, a discrete branch may turn back over a short stretch.
-    """
-    last = branch.last
-    compression = finger.skin_compression(last)
-    if compression.least < folds + BRANCH.apart:
-        return None
-    for part in BRANCH.hop:
-        value = min((1.0 + part) * branch.value, target)
-        try:
-            there = finger.newton.settle(last, with_value(last.load, by, value), BRANCH.tolerance)
-        except NotConverged:
-            continue
-        near = abs(there.force - last.force).max() <= BRANCH.force_change * abs(last.force).max()
-        if (
-            near
-            and finger.skin_compression(there).least > compression.least - BRANCH.apart
-            and not jumped_branch(finger, last, there)
-        ):
-            return there
-    return None
-
-
-def follow(
-    finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float, length: float | None = None
-) -> Branch:
-    """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) passes `target`.
-
-    It ends where that parameter passes a maximum, or where the least stretch of the skin reaches `folds`. `length` is
-    that of the first step. In friction no step depends on `target`, so that all targets beyond the end have one limit.
-    """
-    way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
-    best = 0  # the point with the largest parameter
-    scale = LARGEST_MU if by == BY_FRICTION else target - way[0].value
-    shortest = BRANCH.shortest * scale
-    length = BRANCH.first * scale if length is None else length
-    direction, rate = _tangent(finger.newton, start, by)
-    doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
-
-    def finish(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
-        return Branch(tuple(point.state for point in way[: best + 1]), value, limited, lost, length)
-
-    while way[best].value < target * (1.0 - _ROUND_OFF):
-        check_stop()
-        report_progress(doing, way[best].value / target)
-        last = way[-1]
-        step = _further(finger, last, by, direction, rate, length, shortest)
-        if step is None or len(way) > BRANCH.most:
-            lost = rate > BRANCH.steep and last.compression.least > folds + BRANCH.apart
-            return finish(way[best].value, lost=lost)
-        point, length = step
-        fall = last.compression.least - point.compression.least
-        if point.compression.least < folds:
-            part = min(max((last.compression.least - folds) / fall, 0.0), 1.0)
-            return finish(max(way[best].value, last.value + part * (point.value - last.value)))
-        way.append(point)
-        if point.value > way[best].value:
-            best = len(way) - 1
-        easy = point.state.iterations - last.state.iterations <= BRANCH.easy
-        most = BRANCH.growth * length if easy else length
-        if fall > 0.0:  # the next step aims at a part of the largest fall of the stretch, or just beyond the fold
-            aim = min(BRANCH.aim * BRANCH.apart, BRANCH.growth * (point.compression.least - folds))
-            most = min(most, max(aim / fall * length, shortest))
-        before, length = (direction, rate), most
-        direction, rate = _tangent(finger.newton, point.state, by)
-        if direction @ before[0] + rate * before[1] < 0.0:
-            direction, rate = -direction, -rate
-        if rate <= 0.0:
-            return finish(way[best].value)
-    return finish(way[best].value, limited=False)
-
-
-def stop_at(finger: BranchBody, branch: Branch, by: int, target: float) -> Branch:
-    """Return a branch up to `target`; the whole branch where it ends before."""
-    if branch.value < target * (1.0 - _ROUND_OFF):
-        return branch
-    values = [value_of(state.load, by) for state in branch.states]
-    after = next((number for number, value in enumerate(values) if value >= target), len(values))
-    if after < len(values) and values[after] <= target * (1.0 + _ROUND_OFF):
-        return Branch(branch.states[: after + 1], values[after], limited=False)
-    for near in branch.states[max(after - 1, 0) : after + 1]:
-        with suppress(NotConverged):
-            state = finger.newton.settle(near, with_value(near.load, by, target), BRANCH.tolerance)
-            if not jumped_branch(finger, near, state):
-                return Branch((*branch.states[:after], state), target, limited=False)
-    return Branch(branch.states[:after], values[after - 1], limited=True, lost=True)
+    direction: Array  # (2 k,) unknowns of the skin over root n [mm]
+    rate: float  # of the parameter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
-    state: EquilibriumState
-    compression: SkinCompression
-    value: float
+class Continuation:
+    """The continuation of settled slides of a body in friction or depth, up to where its skin folds."""
+
+    body: BranchBody
+    parameter: int  # BY_FRICTION or BY_DEPTH
+    folds: float  # least stretch of the skin at which a branch ends [-]
+
+    def branch(self, start: EquilibriumState, target: float) -> Branch:
+        """Follow a branch as `trace` does, up to exactly `target`."""
+        return self.stop_at(self.trace(start, target), target)
+
+    def trace(self, start: EquilibriumState, target: float, length: float | None = None) -> Branch:
+        """Follow a branch as `follow` does, and continue where it turns back only over a short stretch."""
+        branch = self.follow(start, target, length)
+        for _ in range(BRANCH.hops):
+            beyond = self._beyond(branch, target) if branch.limited else None
+            if beyond is None:
+                break
+            hop = self.follow(beyond, target)
+            branch = replace(hop, states=(*branch.states, *hop.states))
+        return branch
+
+    def _beyond(self, branch: Branch, target: float) -> EquilibriumState | None:
+        """Return a state a little beyond the end of a branch; None where it really ends.
+
+        Where a node of the contact reaches the shear limit, a discrete branch may turn back over a short stretch.
+        """
+        last = branch.last
+        least = self.body.skin_compression(last).least
+        if least < self.folds + BRANCH.apart:
+            return None
+        for part in BRANCH.hop:
+            load = self._with_value(last.load, min((1.0 + part) * branch.value, target))
+            try:
+                state = self.body.newton.settle(last, load, BRANCH.tolerance)
+            except NotConverged:
+                continue
+            near = abs(state.force - last.force).max() <= BRANCH.force_change * abs(last.force).max()
+            if near and self._is_next(least, last, state):
+                return state
+        return None
+
+    def _is_next(self, least: float, last: EquilibriumState, state: EquilibriumState) -> bool:
+        """Return whether a state follows the `last` one, with skin stretched to `least`, without a jump."""
+        return self.body.skin_compression(state).least >= least - BRANCH.apart and not jumped_branch(
+            self.body, last, state
+        )
+
+    def follow(self, start: EquilibriumState, target: float, length: float | None = None) -> Branch:
+        """Follow the branch from `start` until the parameter passes `target`.
+
+        It ends where the parameter passes a maximum, or where the least stretch of the skin reaches `folds`. `length`
+        is that of the first step. In friction no step depends on `target`, so that all targets beyond the end have one
+        limit.
+        """
+        points = [self._point(start)]
+        best = 0  # the point with the largest parameter
+        in_friction = self.parameter == BY_FRICTION
+        scale = LARGEST_MU if in_friction else target - points[0].value
+        shortest = BRANCH.shortest * scale
+        length = BRANCH.first * scale if length is None else length
+        tangent = self._tangent(start)
+        doing = f"following sliding to its {'largest friction' if in_friction else 'largest depth'}"
+
+        def finish(value: float, *, limited: bool = True, lost: bool = False) -> Branch:
+            return Branch(tuple(point.state for point in points[: best + 1]), value, limited, lost, length)
+
+        while points[best].value < target * (1.0 - _ROUND_OFF):
+            check_stop()
+            report_progress(doing, points[best].value / target)
+            last = points[-1]
+            step = self._further(last, tangent, length, shortest)
+            if step is None or len(points) > BRANCH.most:
+                lost = tangent.rate > BRANCH.steep and last.compression.least > self.folds + BRANCH.apart
+                return finish(points[best].value, lost=lost)
+            point, length = step
+            fall = last.compression.least - point.compression.least
+            if point.compression.least < self.folds:
+                part = min(max((last.compression.least - self.folds) / fall, 0.0), 1.0)
+                return finish(max(points[best].value, last.value + part * (point.value - last.value)))
+            points.append(point)
+            if point.value > points[best].value:
+                best = len(points) - 1
+            easy = point.state.iterations - last.state.iterations <= BRANCH.easy
+            most = BRANCH.growth * length if easy else length
+            if fall > 0.0:  # the next step aims at a part of the largest fall of the stretch, or just beyond the fold
+                aim = min(BRANCH.aim * BRANCH.apart, BRANCH.growth * (point.compression.least - self.folds))
+                most = min(most, max(aim / fall * length, shortest))
+            previous, length, tangent = tangent, most, self._tangent(point.state)
+            if tangent.direction @ previous.direction + tangent.rate * previous.rate < 0.0:
+                tangent = _Tangent(-tangent.direction, -tangent.rate)
+            if tangent.rate <= 0.0:
+                return finish(points[best].value)
+        return finish(points[best].value, limited=False)
+
+    def stop_at(self, branch: Branch, target: float) -> Branch:
+        """Return a branch up to `target`; the whole branch where it ends before."""
+        if branch.value < target * (1.0 - _ROUND_OFF):
+            return branch
+        values = [self._value(state.load) for state in branch.states]
+        after = next((number for number, value in enumerate(values) if value >= target), len(values))
+        if after < len(values) and values[after] <= target * (1.0 + _ROUND_OFF):
+            return Branch(branch.states[: after + 1], values[after], limited=False)
+        for near in branch.states[max(after - 1, 0) : after + 1]:
+            with suppress(NotConverged):
+                state = self.body.newton.settle(near, self._with_value(near.load, target), BRANCH.tolerance)
+                if not jumped_branch(self.body, near, state):
+                    return Branch((*branch.states[:after], state), target, limited=False)
+        return Branch(branch.states[:after], values[after - 1], limited=True, lost=True)
+
+    def _point(self, state: EquilibriumState) -> _Point:
+        return _Point(state, self.body.skin_compression(state), self._value(state.load))
+
+    def _further(self, last: _Point, tangent: _Tangent, length: float, shortest: float) -> tuple[_Point, float] | None:
+        """Return the next point of the branch and the length of the step to it; None where every step fails."""
+        while length >= shortest:
+            state = self._next(last, tangent, length)
+            if state is not None and self._is_next(last.compression.least, last.state, state):
+                return self._point(state), length
+            length /= 2.0
+        return None
+
+    def _value(self, load: LoadState) -> float:
+        """Return the coefficient of friction or the depth [mm]."""
+        return load.mu if self.parameter == BY_FRICTION else load.depth
+
+    def _with_value(self, load: LoadState, value: float) -> LoadState:
+        """Return `load` with another coefficient of friction or depth [mm]."""
+        return load._replace(mu=value) if self.parameter == BY_FRICTION else load._replace(depth=value)
+
+    def _tangent(self, state: EquilibriumState) -> _Tangent:
+        newton = self.body.newton
+        newton.linearise(state, state.load, newton.skin_x)
+        direction = newton.steps[:, self.parameter] / np.sqrt(len(newton.steps))
+        size = np.sqrt(direction @ direction + 1.0)
+        return _Tangent(direction / size, 1.0 / size)
+
+    def _next(self, start: _Point, tangent: _Tangent, length: float) -> EquilibriumState | None:
+        """Return the state a step of `length` along the branch; None where the corrector fails."""
+        newton, (direction, rate) = self.body.newton, tangent
+        root = np.sqrt(len(newton.steps))
+        state, load = start.state, start.state.load
+        total = np.zeros(len(newton.steps))
+        for _ in range(BRANCH.corrections):
+            if not newton.linearise(state, load, newton.skin_x):
+                return None
+            to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, self.parameter] / root
+            current = self._value(load)
+            ahead = direction @ along + rate
+            if ahead == 0.0:
+                return None
+            change = (length - direction @ (total + to) - rate * (current - start.value)) / ahead
+            step = to + change * along
+            load = self._with_value(load, current + change)
+            state, largest, changes = newton.apply_step(state, load, step * root, newton.skin_x)
+            total = total + step
+            if not largest < 10.0:
+                return None
+            if largest < BRANCH.tolerance and not changes:
+                moved = self._value(load) - start.value
+                distance = np.sqrt(total @ total + moved**2)
+                return state if direction @ total + rate * moved > BRANCH.turn * distance else None
+        return None
 
 
-def _further(
-    finger: BranchBody,
-    last: _Point,
-    by: int,
-    direction: Array,
-    rate: float,
-    length: float,
-    shortest: float,
-) -> tuple[_Point, float] | None:
-    """Return the next point of the branch and the length of the step to it; None where every step fails."""
-    while length >= shortest:
-        state = _next(finger.newton, last.state, by, direction, rate, length)
-        if state is not None:
-            compression = finger.skin_compression(state)
-            if compression.least >= last.compression.least - BRANCH.apart and not jumped_branch(
-                finger, last.state, state
-            ):
-                return _Point(state, compression, value_of(state.load, by)), length
-        length /= 2.0
-    return None
-
-
-def value_of(load: LoadState, by: int) -> float:
-    """Return the coefficient of friction or the depth [mm]."""
-    return load.mu if by == BY_FRICTION else load.depth
-
-
-def with_value(load: LoadState, by: int, value: float) -> LoadState:
-    """Return `load` with another coefficient of friction or depth [mm]."""
-    return load._replace(mu=value) if by == BY_FRICTION else load._replace(depth=value)
-
-
-def jumped_branch(finger: BranchBody, before: EquilibriumState, after: EquilibriumState) -> bool:
+def jumped_branch(body: BranchBody, before: EquilibriumState, after: EquilibriumState) -> bool:
     """Return whether a step led to another branch, on which the skin is folded."""
-    start, end = finger.skin_compression(before), finger.skin_compression(after)
-    return end.least < BRANCH.squeeze * start.least or end.kink > BRANCH.crease or finger.crosses(after)
-
-
-def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, float]:
-    """Return the unit tangent of the branch: unknowns over root n [mm], and the parameter."""
-    newton.linearise(state, state.load, newton.skin_x)
-    direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
-    size = np.sqrt(direction @ direction + 1.0)
-    return direction / size, 1.0 / size
-
-
-def _next(
-    newton: Newton, start: EquilibriumState, by: int, direction: Array, rate: float, length: float
-) -> EquilibriumState | None:
-    """Return the state a step of `length` along the branch; None where the corrector fails."""
-    root = np.sqrt(len(newton.steps))
-    value = value_of(start.load, by)
-    state, load = start, start.load
-    total = np.zeros(len(newton.steps))
-    for _ in range(BRANCH.corrections):
-        if not newton.linearise(state, load, newton.skin_x):
-            return None
-        to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
-        current = value_of(load, by)
-        ahead = direction @ along + rate
-        if ahead == 0.0:
-            return None
-        change = (length - direction @ (total + to) - rate * (current - value)) / ahead
-        step = to + change * along
-        load = with_value(load, by, current + change)
-        state, largest, changes = newton.apply_step(state, load, step * root, newton.skin_x)
-        total = total + step
-        if not largest < 10.0:
-            return None
-        if largest < BRANCH.tolerance and not changes:
-            way = np.sqrt(total @ total + (value_of(load, by) - value) ** 2)
-            straight = direction @ total + rate * (value_of(load, by) - value)
-            return state if straight > BRANCH.turn * way else None
-    return None
+    start, end = body.skin_compression(before), body.skin_compression(after)
+    return end.least < BRANCH.squeeze * start.least or end.kink > BRANCH.crease or body.crosses(after)
 
 
 Waves = NDArray[np.complex128]

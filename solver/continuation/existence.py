@@ -15,7 +15,7 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED
 from solver._kernels.contact_system import STEEP
 from solver.arrays import Array
-from solver.continuation import BRANCH, LARGEST_MU, Branch, folds_at, stop_at, trace
+from solver.continuation import BRANCH, LARGEST_MU, Branch, Continuation, folds_at
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -95,7 +95,7 @@ class _Search:
 
     scene: Scene  # unloaded
     load: LoadState  # at the beginning of the branch by friction, at the end of one by depth
-    by: int  # the parameter: BY_FRICTION or BY_DEPTH
+    parameter: int  # the parameter: BY_FRICTION or BY_DEPTH
     target: float  # its last value
 
     @property
@@ -110,7 +110,7 @@ class _Search:
     @property
     def last(self) -> float:
         """The largest value to which the branch is followed; beyond LARGEST_MU the bound governs."""
-        return self.target if self.by == BY_DEPTH else min(self.target, LARGEST_MU)
+        return self.target if self.parameter == BY_DEPTH else min(self.target, LARGEST_MU)
 
     def to(self, target: float) -> "_Search":
         """Return the search with another target."""
@@ -118,11 +118,14 @@ class _Search:
 
     def trace(self, finger: FiniteFinger, start: EquilibriumState, length: float | None = None) -> Branch:
         """Return the branch from `start` until it passes the target; its first step has the `length`."""
-        return trace(finger, start, self.by, self.last, self.folds, length)
+        return self._on(finger).trace(start, self.last, length)
+
+    def _on(self, finger: FiniteFinger) -> Continuation:
+        return Continuation(finger, self.parameter, self.folds)
 
     def stop(self, finger: FiniteFinger, branch: Branch) -> Branch:
         """Return a branch up to the target, which one step from LARGEST_MU reaches."""
-        branch = stop_at(finger, branch, self.by, self.last)
+        branch = self._on(finger).stop_at(branch, self.last)
         if branch.limited or self.last == self.target:
             return branch
         load = branch.last.load._replace(mu=self.target)
@@ -140,7 +143,7 @@ class _Search:
 
     def start(self, finger: FiniteFinger) -> EquilibriumState:
         """Return the state at which the branch begins. Raises NotConverged."""
-        if self.by == BY_FRICTION:
+        if self.parameter == BY_FRICTION:
             return solve_full_slip(finger.newton, self.load, None, BRANCH.tolerance)
         for part in PROOF.starts:
             with suppress(NotConverged):
@@ -177,7 +180,7 @@ def _coarse_branch(search: _Search) -> Branch:
     It is cached, because all friction coefficients of a scene share it.
     """
     finger = search.finger()
-    if search.by == BY_DEPTH or search.target == PIECES[0]:
+    if search.parameter == BY_DEPTH or search.target == PIECES[0]:
         return search.trace(finger, search.start(finger))
     before = _coarse_branch(search.to(search.target / 2.0))
     if before.limited:
@@ -189,7 +192,7 @@ def _coarse_branch(search: _Search) -> Branch:
 @lru_cache(maxsize=32)
 def _reach(search: _Search) -> Reach:
     """Return the range of a branch, cached because all meshes of a scene need the same."""
-    by_depth = search.by == BY_DEPTH
+    by_depth = search.parameter == BY_DEPTH
     coarse = _coarse_branch(search if by_depth else search.to(min(end for end in PIECES if end >= search.last)))
     if coarse.value < search.last < LARGEST_MU and not by_depth:
         end = _reach(search.to(LARGEST_MU))
@@ -243,7 +246,7 @@ def steady(
             "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
         )
     begin = solve_full_slip(finger.newton, load._replace(mu=0.0), None, tolerance)
-    branch = trace(finger, begin, BY_FRICTION, load.mu, 0.0)
+    branch = Continuation(finger, BY_FRICTION, 0.0).trace(begin, load.mu)
     if not branch.limited:
         state = solve_full_slip(finger.newton, load, branch.last, tolerance)
         if _proven(finger, state, proof):
@@ -295,9 +298,9 @@ def _direct_states(
         ways.append(lambda: all_at_the_bound(newton, load, tolerance))
     if start is not None:
         ways.insert(0, lambda: solve_full_slip(newton, load, start, tolerance))
-    for way in ways:
+    for search in ways:
         with suppress(NotConverged):
-            yield way()
+            yield search()
 
 
 def doubts(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:

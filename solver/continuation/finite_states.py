@@ -11,7 +11,7 @@ from solver.body.finite import FiniteBody
 from solver.body.skin import SkinCompression, crosses_itself
 from solver.body.validation import check_loads
 from solver.constitutive import Law
-from solver.continuation import LARGEST_MU, continue_branch, folds_at, jumped_branch
+from solver.continuation import LARGEST_MU, Continuation, folds_at, jumped_branch
 from solver.continuation.existence import BEYOND_LIMIT, Reach, all_at_the_bound, of_depth, stands, steady, steep
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_stepping
 from solver.equilibrium.finger import FiniteFinger
@@ -74,8 +74,8 @@ def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = 
     The search begins at `near`, the settled state of another surface, where that slides in the same direction.
     """
     if near is not None:
-        alike = near.load.sense == -(scene.loading.direction or 1)
-        near = replace(near, iterations=0) if alike else None
+        same_direction = near.load.sense == -(scene.loading.direction or 1)
+        near = replace(near, iterations=0) if same_direction else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
         return settled_state(finger, scene, near)
     load = sliding_load(scene)
@@ -231,11 +231,11 @@ def solve_dead_load(
     driven = body.mesh.driven
     held_at = state.u[driven]
     motion = 0.0 if prescribed is None else prescribed[driven] - held_at
-    before = condensed.load.copy()
+    present = condensed.load.copy()
 
     def step(part: float) -> None:
         nonlocal state
-        condensed.load[:] = before + part * (vector - before)
+        condensed.load[:] = present + part * (vector - present)
         u = state.u.copy()
         u[driven] = held_at + part * motion
         state = newton.settle(replace(state, u=u), load)
@@ -258,7 +258,7 @@ def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
 
 
 def steady_body(
-    whole: FiniteBody, load: LoadState, skin: Law, start: EquilibriumState | None = None
+    body: FiniteBody, load: LoadState, skin: Law, start: EquilibriumState | None = None
 ) -> EquilibriumState:
     """Return the settled slide of a body under `load`, followed on its mesh from the frictionless state.
 
@@ -266,17 +266,17 @@ def steady_body(
     NoSteadyState with the largest friction on this mesh where the branch ends before, at a limit point or where the
     skin folds; NotConverged where it is lost before, or has no first state.
     """
-    newton = Newton(whole.condensed)
-    body = _OwnBody(whole, newton)
+    newton = Newton(body.condensed)
+    branch_body = _OwnBody(body, newton)
     bare = load_stepping.solve_full_slip(newton, load._replace(mu=0.0), start)
-    branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin))
+    branch = Continuation(branch_body, BY_FRICTION, folds_at(skin)).branch(bare, min(load.mu, LARGEST_MU))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
-    if branch.limited and (branch.lost or body.is_unusable(branch.last)):
+    if branch.limited and (branch.lost or branch_body.is_unusable(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
     state = load_stepping.solve_full_slip(newton, load, branch.last)
-    if jumped_branch(body, branch.last, state):
+    if jumped_branch(branch_body, branch.last, state):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
     return state
 

@@ -294,13 +294,13 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
 def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
     """Return the failure of a scene without a slide, with the limits that are known."""
     force = scene.normal_force
-    at = f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
-    at += f" and mu = {float(scene.friction.mu):g}"
+    conditions = f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
+    conditions += f" and mu = {float(scene.friction.mu):g}"
     if scene.friction.tau_max is not None:
-        at += f" with tau_max = {scene.friction.tau_max:g} MPa"
+        conditions += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:
         return NotConverged(
-            f"No settled state was found at {at}, from any first guess: {why}; ask for less friction or depth."
+            f"No settled state was found at {conditions}, from any first guess: {why}; ask for less friction or depth."
         )
     limit_force = limit_depth = None
     with suppress(NotConverged):  # stiffnesses that a mesh for less depth does not stand
@@ -310,8 +310,8 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
     along = "+x" if scene.loading.direction > 0 else "-x"
     where = "at this depth" if force is None else "under this force"
     message = (
-        f"There is no steady sliding along {along} at {at}: the drag presses the finger against the surface faster "
-        f"than it yields, so it wedges; followed from mu = 0, steady sliding {where} ends at mu = {limit_mu:.3g}"
+        f"There is no steady sliding along {along} at {conditions}: the drag presses the finger against the surface "
+        f"faster than it yields, so it wedges; followed from mu = 0, steady sliding {where} ends at mu = {limit_mu:.3g}"
     )
     if elsewhere:
         message += f", and with this friction at {elsewhere}"

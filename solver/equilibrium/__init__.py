@@ -287,32 +287,32 @@ class Newton:
         self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
     ) -> EquilibriumState:
         """Return the equilibrium as `settle` does, from the contact states of `start`, with known `anchor` (k,)."""
-        state = before = start
+        state = previous = start
         reuse = self.condensed.equilibrium is start.u
-        scale, last, new, alike = 1.0, 0.0, False, 0
+        scale, last, new, equal_steps = 1.0, 0.0, False, 0
         for _ in range(limit):
             if reuse:
                 if not self.linearise(state, load, anchor, CONTROL.rounds, reuse=True):
                     reuse = False
                     continue
-                before = state
+                previous = state
             elif not self.linearise(state, load, anchor, CONTROL.rounds):
                 scale /= 2.0  # the last step went too far
                 if (
-                    state is before
+                    state is previous
                     or scale < CONTROL.shortest
-                    or not self.linearise(before, load, anchor, CONTROL.rounds)
+                    or not self.linearise(previous, load, anchor, CONTROL.rounds)
                 ):
                     raise NotConverged("the body would turn inside out")
-                state = before
-            elif state is not before:
-                before, scale = state, min(1.0, 2.0 * scale)
-            state, largest, changes = self.apply_step(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+                state = previous
+            elif state is not previous:
+                previous, scale = state, min(1.0, 2.0 * scale)
+            state, largest, changes = self.apply_step(previous, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < CONTROL.unbounded:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
-            alike = alike + 1 if changes and abs(largest - last) <= CONTROL.same * last else 0
-            if alike == CONTROL.repeats:
+            equal_steps = equal_steps + 1 if changes and abs(largest - last) <= CONTROL.same * last else 0
+            if equal_steps == CONTROL.repeats:
                 raise NotConverged("states of contact come again and again")
             remainder = min((2.0 * fall) ** 2 if not reuse else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * remainder < CONTROL.margin * tolerance and not changes and scale == 1.0:

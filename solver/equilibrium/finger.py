@@ -177,21 +177,21 @@ class LinearFinger(Finger[LinearPatches]):
     def ending_by_skin(self) -> Array:
         """A matrix B (a, 2 k) with which the reference ending's SED is |B u|^2 for displacements u of the skin."""
         endings, elastic = self.ending.endings, self.body.elastic
-        at = elastic.state(elastic.places(endings.probes), self.body.every_step())  # (p, 2 k)
-        whole = np.sqrt(endings.weights / endings.areas)[:, None]
-        strain = np.sqrt(at.shear) * np.stack([at.xx, at.yy, at.engineering_shear / np.sqrt(2.0)])
-        lines = np.vstack([*(whole * strain), whole * np.sqrt(at.lame / 2.0) * at.dilatation])
+        local = elastic.state(elastic.places(endings.probes), self.body.every_step())  # (p, 2 k)
+        weights = np.sqrt(endings.weights / endings.areas)[:, None]
+        strain = np.sqrt(local.shear) * np.stack([local.xx, local.yy, local.engineering_shear / np.sqrt(2.0)])
+        lines = np.vstack([*(weights * strain), weights * np.sqrt(local.lame / 2.0) * local.dilatation])
         _, sizes, turns = np.linalg.svd(lines, full_matrices=False)
         large = sizes**2 > NO_ENERGY * sizes[0] ** 2
         return sizes[large, None] * turns[large]
 
     def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
         """Return whether skin would touch outside the part that may, so that this part must be larger."""
-        whole = self.geometry.whole
-        below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
+        skin = self.geometry.all_skin
+        below = self.geometry.mesh.nodes[skin, 1] + displacement[skin, 1] < indentation * (1.0 - 1e-9)
         may = np.zeros(len(displacement), bool)
         may[self.geometry.mesh.skin] = True
-        may = may[whole]
+        may = may[skin]
         ends = bool(state.touching[0] and not may[0]) or bool(state.touching[-1] and not may[-1])
         return ends or bool((below & ~may).any())
 
@@ -229,14 +229,14 @@ class FiniteFinger(Finger[FinitePatches]):
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return the compression of the skin, with its least stretch and its kinks."""
-        mesh, whole = self.geometry.mesh, self.geometry.whole
-        touching = np.zeros(len(whole), bool)
-        touching[np.searchsorted(whole, mesh.skin)] = state.touching
-        return SkinCompression.of(mesh.nodes[whole], state.u[whole], self.geometry.loose, touching)
+        mesh, skin = self.geometry.mesh, self.geometry.all_skin
+        touching = np.zeros(len(skin), bool)
+        touching[np.searchsorted(skin, mesh.skin)] = state.touching
+        return SkinCompression.of(mesh.nodes[skin], state.u[skin], self.geometry.loose, touching)
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return crosses_itself((self.geometry.mesh.nodes + state.u)[self.geometry.whole])
+        return crosses_itself((self.geometry.mesh.nodes + state.u)[self.geometry.all_skin])
 
 
 KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": FiniteFinger}  # by kinematics
@@ -314,8 +314,10 @@ class MeshTransfer:
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
         station = _piece(old.arcs[::2], new.inner_arcs)
         layer = _piece(old.heights[::2], new.inner_heights)
-        onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
-        forces = new.lengths[:, None] * onto / old.lengths
+        interpolation = np.stack(
+            [np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1
+        )
+        forces = new.lengths[:, None] * interpolation / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
         return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
@@ -359,9 +361,9 @@ def _heights(finger: FingerMesh) -> Array:
     """Return the heights of the nodes of a column: 0 on the bone, 1 between fat and skin, 2 on the outside."""
     wide = 2 * (finger.fat + len(finger.depths) - 1) + 1
     fat = finger.mesh.nodes[: 2 * finger.fat + 1]
-    way = np.linalg.norm(fat - fat[0], axis=1)
+    distance = np.linalg.norm(fat - fat[0], axis=1)
     outer = 2.0 - with_middles(finger.depths) / finger.depths[0]
-    out = np.concatenate([way / way[-1], outer[1:]])
+    out = np.concatenate([distance / distance[-1], outer[1:]])
     assert len(out) == wide
     return out
 

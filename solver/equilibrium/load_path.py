@@ -101,7 +101,7 @@ class Aim(NamedTuple):
         return Aim(*(a + part * (b - a) for a, b in zip(self, target, strict=True)))
 
 
-class Way:
+class LoadPath:
     """A load path: its states so far, the step to the next one, and the energies of relaxing tissues."""
 
     def __init__(
@@ -138,27 +138,27 @@ class Way:
         begin = self.aim
 
         def step(part: float) -> None:
-            there = aim if part == 1.0 else begin.towards(aim, part)
-            self.instants.append(Instant(there.time, self.solve_step(self.last, there)))
-            self.aim = there
+            step_aim = aim if part == 1.0 else begin.towards(aim, part)
+            self.instants.append(Instant(step_aim.time, self.solve_step(self.last, step_aim)))
+            self.aim = step_aim
 
         advance(step, self._refusal, _CONTROL)
 
     def _refusal(self, _fraction: float, _part: float, reason: NotConverged) -> NotConverged:
         return at_end_of_path(self.last.load.depth, self.last.load.travel, reason)
 
-    def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
-        """Return the state at `aim` one step from `before`, and advance the tissues. Raises NotConverged."""
+    def solve_step(self, previous: EquilibriumState, aim: Aim) -> EquilibriumState:
+        """Return the state at `aim` one step from `previous`, and advance the tissues. Raises NotConverged."""
         step = aim.time - self.aim.time
         if self.tissue is not None:
             self.newton = self.tissue.ready(step)
-            before = replace(before, load=before.load._replace(sense=self.sense))
+            previous = replace(previous, load=previous.load._replace(sense=self.sense))
         if self.by_force:
             forces = ForceLoad(aim.press, aim.along) if self.by_drag else ForceLoad(aim.press, None, -aim.along)
-            state = solve_under_forces(self.newton, lower_onto_surface(self.newton.condensed, before), forces)
+            state = solve_under_forces(self.newton, lower_onto_surface(self.newton.condensed, previous), forces)
         else:
-            load = before.load._replace(depth=aim.press, travel=-aim.along)
-            state = self.newton.settle(before, load, self._tolerance)
+            load = previous.load._replace(depth=aim.press, travel=-aim.along)
+            state = self.newton.settle(previous, load, self._tolerance)
         if self.tissue is not None:
             self.energies.append(self.tissue.commit(state, step))
         return state
@@ -171,7 +171,7 @@ def march(
     *,
     relaxing: bool = False,
     report: Report = report_progress,
-) -> Way:
+) -> LoadPath:
     """Return the load path of a scene by backward Euler steps: the press, then settled slides or a drag.
 
     It takes `times` the usual steps. With `relaxing` the tissues relax, and a wait for them ends the path; else they
@@ -179,11 +179,11 @@ def march(
     fails or a slide does not settle, Cancelled.
     """
     steps, loading = steps_of(finger, relaxing=relaxing).finer(times), scene.loading_per_mm
-    way = way_of(scene, finger, relaxing=relaxing)
-    follow(way, finger, loading, steps, times, report)
-    if way.tissue is not None:
-        _wait(way, loading, scene.materials.longest_creep, times, report)
-    return way
+    path = undeformed_path(scene, finger, relaxing=relaxing)
+    follow(path, finger, loading, steps, times, report)
+    if path.tissue is not None:
+        _wait(path, loading, scene.materials.longest_creep, times, report)
+    return path
 
 
 def end(scene: Scene, finger: Finger[Patches], times: float = 1.0) -> EquilibriumState:
@@ -219,14 +219,14 @@ def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
     return SMALL_STEPS if isinstance(finger, LinearFinger) else RELAXING if relaxing else _FINITE
 
 
-def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> Way:
+def undeformed_path(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> LoadPath:
     """Return the load path of a scene at its beginning, undeformed."""
     steps, loading = steps_of(finger, relaxing=relaxing), scene.loading_per_mm
-    good = steps.tolerance
+    tolerance = steps.tolerance
     if loading.normal_force is None:
-        good = min(good, steps.by_depth * loading.depth)
+        tolerance = min(tolerance, steps.by_depth * loading.depth)
     tissue = tissue_of(scene, finger) if relaxing else None
-    return Way(finger.newton, load_of(scene), loading, good, tissue)
+    return LoadPath(finger.newton, load_of(scene), loading, tolerance, tissue)
 
 
 def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
@@ -246,37 +246,37 @@ def _relaxing_body(mesh: Mesh, materials: Materials) -> RelaxingBody:
 
 
 def follow(
-    way: Way, finger: Finger[Patches], loading: Loading, steps: CourseSteps, times: float, report: Report
+    path: LoadPath, finger: Finger[Patches], loading: Loading, steps: CourseSteps, times: float, report: Report
 ) -> None:
     """Append the press, and the slides or the drag. Raises as `march`."""
     press = loading.depth if loading.normal_force is None else loading.normal_force
     share = 1.0 if loading.dragged else 0.5  # of the work, for progress
     count = steps.press * (2 if loading.dragged else 1)
-    doing = "pressing and dragging step by step" + _why(way)
+    doing = "pressing and dragging step by step" + _why(path)
     for number in range(1, steps.press + 1):
         part = number / steps.press
-        way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
+        path.go(Aim(PRESSING_TIME * part, press * part, 0.0))
         report(doing, share * number / count)
     if loading.tangential_force is not None:
         load = -loading.direction * loading.tangential_force
         for number in range(1, steps.press + 1):
             part = number / steps.press
-            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
+            path.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
             report(doing, share * (steps.press + number) / count)
         return
     for direction in loading.directions:
-        _slide(way, direction * loading.speed, steps, _EndOfSlide(way, finger, direction, times), report)
+        _slide(path, direction * loading.speed, steps, _EndOfSlide(path, finger, direction, times), report)
 
 
-def _why(way: Way) -> str:
-    return ", since the tissues relax" if way.tissue is not None else ""
+def _why(path: LoadPath) -> str:
+    return ", since the tissues relax" if path.tissue is not None else ""
 
 
 class _EndOfSlide:
     """Criterion for a settled slide, evaluated before every step."""
 
-    def __init__(self, way: Way, finger: Finger[Patches], direction: int, times: float) -> None:
-        self._way, self._finger, self._direction, self._times = way, finger, direction, times
+    def __init__(self, path: LoadPath, finger: Finger[Patches], direction: int, times: float) -> None:
+        self._path, self._finger, self._direction, self._times = path, finger, direction, times
         self._sed: float | None = None
 
     def __call__(self) -> bool:
@@ -285,56 +285,56 @@ class _EndOfSlide:
         At small strain it is once every point in contact slips against the slide. At finite strain the ending's SED
         must be constant too, unless tissues relax, for which a wait follows.
         """
-        state = self._way.last
+        state = self._path.last
         if isinstance(self._finger, LinearFinger):
-            slips = (state.sense == -self._direction) | self._way.frictionless
+            slips = (state.sense == -self._direction) | self._path.frictionless
             return bool(((state.state == OPEN) | ((state.state != STICK) & slips)).all())
-        before = self._sed
-        relaxes = self._way.tissue is not None
+        previous = self._sed
+        relaxes = self._path.tissue is not None
         sed = self._sed = 0.0 if relaxes else self._finger.sed_ending(state.u)
-        still = before is not None and (relaxes or abs(sed - before) * self._times <= SED_STILL * sed)
+        still = previous is not None and (relaxes or abs(sed - previous) * self._times <= SED_STILL * sed)
         return still and not (state.state == STICK).any()
 
 
-def _slide(way: Way, speed: float, steps: CourseSteps, settled: Callable[[], bool], report: Report) -> None:
+def _slide(path: LoadPath, speed: float, steps: CourseSteps, settled: Callable[[], bool], report: Report) -> None:
     """Append the states of a slide until it is settled, and the plateau beyond. Raises NotConverged."""
-    start, depth = way.aim, way.instants[-1].depth
+    start, depth = path.aim, path.instants[-1].depth
     step, distance = steps.first * depth, 0.0
     direction, longest = np.sign(speed).item(), min(LONG, steps.furthest) * depth
 
     def go(distance: float) -> None:
-        way.go(Aim(start.time + distance / abs(speed), start.press, start.along + direction * distance))
+        path.go(Aim(start.time + distance / abs(speed), start.press, start.along + direction * distance))
 
     while not settled():
         if distance >= steps.furthest * depth:
             raise NotConverged(
-                f"after {distance:.3g} mm of sliding at {depth:.4g} mm of indentation and mu = {way.last.load.mu:.3g} "
+                f"after {distance:.3g} mm of sliding at {depth:.4g} mm of indentation and mu = {path.last.load.mu:.3g} "
                 "the state still changes, as it does where the finger wedges itself in; ask for less friction or depth"
             )
         distance += step
         go(distance)
         step = min(step * steps.growth, steps.largest * depth)
-        report("sliding step by step until nothing changes" + _why(way), 0.5 + 0.5 * min(distance / longest, 1.0))
+        report("sliding step by step until nothing changes" + _why(path), 0.5 + 0.5 * min(distance / longest, 1.0))
     beyond = max(0.3 * distance, depth)
     for number in range(1, steps.plateau + 1):
         go(distance + beyond * number / steps.plateau)
 
 
-def _wait(way: Way, loading: Loading, slowest: float, times: float, report: Report) -> None:
+def _wait(path: LoadPath, loading: Loading, slowest: float, times: float, report: Report) -> None:
     """Append states in doubling steps until the `slowest` tissue [s] has relaxed, while a slide continues.
 
     Near a limit of sliding a body relaxes more slowly than its tissues, so that the energy must be constant too.
     """
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
-    if not isinstance(way.tissue, LinearTissue):
-        way.sense = -int(np.sign(speed))  # by now all skin in contact slips
-    step, elapsed, longest = way.instants[-1].time - way.instants[-2].time, 0.0, WAITING.shortest * slowest
+    if not isinstance(path.tissue, LinearTissue):
+        path.sense = -int(np.sign(speed))  # by now all skin in contact slips
+    step, elapsed, longest = path.instants[-1].time - path.instants[-2].time, 0.0, WAITING.shortest * slowest
     for _ in range(WAITING.doublings):
-        before = way.energies[-1][0]
+        previous = path.energies[-1][0]
         for _ in range(ceil(WAITING.equal * times)):
             report("waiting step by step until the tissues have relaxed", min(elapsed / longest, 1.0))
-            way.go(Aim(way.aim.time + step, way.aim.press, way.aim.along + speed * step))
+            path.go(Aim(path.aim.time + step, path.aim.press, path.aim.along + speed * step))
             elapsed += step
-        if elapsed >= longest and abs(way.energies[-1][0] - before) <= WAITING.still * abs(way.energies[-1][0]):
+        if elapsed >= longest and abs(path.energies[-1][0] - previous) <= WAITING.still * abs(path.energies[-1][0]):
             return
         step *= 2.0

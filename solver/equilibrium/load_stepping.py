@@ -103,8 +103,8 @@ def march(
             nonlocal state
             if isinstance(aim, ForceLoad):
                 drag, normal = begin.force.tolist()
-                there = ForceLoad(normal, drag, begin.load.travel).towards(aim, part)
-                state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), there)
+                forces = ForceLoad(normal, drag, begin.load.travel).towards(aim, part)
+                state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), forces)
             else:
                 state = newton.settle(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), tolerance)
 
@@ -117,56 +117,56 @@ FIRST, FURTHEST = 1e-7, 1.0  # first and largest stride of the search for a brac
 SEARCHES = 60  # evaluations within the bracket, at most
 
 
-def find_root(at: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:
+def find_root(function: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:
     """Return the state at the root of an increasing function, to within `close`; None where there is no bracket.
 
-    `at` returns the function's value at a place, and the state there. Strides from `start` that double find a bracket,
+    `function` returns its value at a place, and the state there. Strides from `start` that double find a bracket,
     and regula falsi with the Illinois rule the root (Dowell and Jarratt 1971).
 
     >>> round(find_root(lambda x: (x**3 - 8e-9, x), 0.0, 1e-18), 9)
     0.002
     """
     previous = latest = start
-    off, state = at(start)
-    beyond, stride = off, FIRST if off < 0.0 else -FIRST
-    while beyond * off > 0.0:
-        previous, off = latest, beyond
+    bracket, state = function(start)
+    beyond, stride = bracket, FIRST if bracket < 0.0 else -FIRST
+    while beyond * bracket > 0.0:
+        previous, bracket = latest, beyond
         latest, stride = latest + stride, 2.0 * stride
         if abs(stride) > FURTHEST:
             return None
-        beyond, state = at(latest)
+        beyond, state = function(latest)
     for _ in range(SEARCHES):
         if abs(beyond) <= close:
             return state
-        between = latest - beyond * (latest - previous) / (beyond - off)
-        new, state = at(between)
+        between = latest - beyond * (latest - previous) / (beyond - bracket)
+        new, state = function(between)
         if new * beyond < 0.0:
-            previous, off = latest, beyond
+            previous, bracket = latest, beyond
         else:
-            off /= 2.0
+            bracket /= 2.0
         latest, beyond = between, new
     return None
 
 
 def correct(
-    newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, before: float, *, reuse: bool = False
+    newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, travel: float, *, reuse: bool = False
 ) -> tuple[EquilibriumState, float, int] | None:
     """Return the state after one iteration towards the forces, its largest displacement, and its changed states.
 
-    `origin` (k,) are the positions of the skin's nodes along x when the surface's travel was `before`. With `reuse` the
+    `origin` (k,) are the positions of the skin's nodes along x when the surface's was `travel`. With `reuse` the
     last tangent serves again. None where the linear system fails.
     """
     load = state.load
     if forces.tangential is None:
         load = load._replace(travel=forces.travel)
-    if not newton.linearise(state, load, origin + load.travel - before, 0, forces, reuse=reuse):
+    if not newton.linearise(state, load, origin + load.travel - travel, 0, forces, reuse=reuse):
         return None
     deeper, along = newton.system.motion.tolist()
     load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-    after, largest, changes = newton.apply_step(
-        state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before
+    corrected, largest, changes = newton.apply_step(
+        state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - travel
     )
-    return after, max(largest, abs(deeper), abs(along)), changes
+    return corrected, max(largest, abs(deeper), abs(along)), changes
 
 
 def solve_under_forces(
@@ -189,14 +189,14 @@ def _iterate(
     newton: Newton, start: EquilibriumState, begin: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
     """Return the equilibrium one step from `start`; the iteration begins at `begin`. Raises NotConverged."""
-    origin, before = start.place(newton.condensed)[:, 0], start.load.travel
+    origin, travel = start.place(newton.condensed)[:, 0], start.load.travel
     state = begin
     if newton.condensed.constant:
         if forces.tangential is None:
             state = replace(state, load=state.load._replace(travel=forces.travel))
-        return newton.solve_linear(state, state.load, origin + state.load.travel - before, forces)
+        return newton.solve_linear(state, state.load, origin + state.load.travel - travel, forces)
     for _ in range(limit):
-        correction = correct(newton, state, forces, origin, before)
+        correction = correct(newton, state, forces, origin, travel)
         if correction is None:
             raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
         state, largest, changes = correction
@@ -223,15 +223,15 @@ def _find_travel(
     """
     drag, near = forces.tangential or 0.0, state
 
-    def at(travel: float) -> tuple[float, EquilibriumState]:
+    def drag_error(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
         near = _iterate(newton, start, near, ForceLoad(forces.normal, None, travel), tolerance, limit)
         return float(near.force[0]) - drag, near
 
-    there = find_root(at, state.load.travel, DRAG_TOLERANCE * state.load.mu * forces.normal)
-    if there is None:
+    state_at_drag = find_root(drag_error, state.load.travel, DRAG_TOLERANCE * state.load.mu * forces.normal)
+    if state_at_drag is None:
         raise NotConverged("no travel meets the drag")
-    return there
+    return state_at_drag
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,14 +47,14 @@ class Q2P1:
     weights = np.tile(GAUSS_3[1], 3) * np.repeat(GAUSS_3[1], 3)  # (9,)
 
     @staticmethod
-    def shape(at: Array) -> tuple[Array, Array]:
+    def shape(points: Array) -> tuple[Array, Array]:
         """Return the shape functions (..., 9) at local points (..., 2), and their gradients (..., 9, 2).
 
         >>> values, gradients = Q2P1.shape(np.array([1.0, 1.0]))
         >>> values
         array([0., 0., 1., 0., 0., 0., 0., 0., 0.])
         """
-        (nx, dx), (ny, dy) = line(at[..., 0]), line(at[..., 1])
+        (nx, dx), (ny, dy) = line(points[..., 0]), line(points[..., 1])
         across, up = nx[..., _ACROSS], ny[..., _UP]
         gradients = np.stack([dx[..., _ACROSS] * up, across * dy[..., _UP]], axis=-1)
         return across * up, gradients
@@ -140,7 +140,9 @@ class Mesh:
     def assemble(self, local: Array) -> Array:
         """Return the nodal sums (n, 2) of `local` (e, 18): x, y of each node of an element in turn."""
         node, along = self.elements.ravel(), local.reshape(-1, 2).T
-        return np.stack([np.bincount(node, one, len(self.nodes)) for one in along], axis=1, dtype=np.float64)
+        return np.stack(
+            [np.bincount(node, component, len(self.nodes)) for component in along], axis=1, dtype=np.float64
+        )
 
 
 # node offsets of an element along the grid's two directions, the first of which turns to the second clockwise
@@ -183,12 +185,12 @@ def quality(mesh: Mesh) -> dict[str, float]:
     return {"jacobian_ratio": float((det.min(axis=1) / det.max(axis=1)).min()), "aspect": float(aspect.max())}
 
 
-def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
-    """Return the Jacobians (e, p, 2, 2) of all elements at local coordinates `at` (p, 2), and their determinants.
+def jacobians(mesh: Mesh, points: Array) -> tuple[Array, Array]:
+    """Return the Jacobians (e, p, 2, 2) of all elements at local `points` (p, 2), and their determinants.
 
     Raises MeshError where a determinant is not positive: the element is folded there.
     """
-    jacobian = np.swapaxes(np.tensordot(mesh.local(mesh.nodes), Q2P1.shape(at)[1], axes=(1, 1)), 1, 2)
+    jacobian = np.swapaxes(np.tensordot(mesh.local(mesh.nodes), Q2P1.shape(points)[1], axes=(1, 1)), 1, 2)
     det = determinant(jacobian)
     if not det.min() > 0.0:
         worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]
@@ -287,19 +289,19 @@ class HalvedMesh:
         grid: Indices = np.full((len(elements), 25), -1, np.int64)
         grid[:, _OWN] = elements
         ends = [(side[end], side[1]) for side in _SIDES for end in (0, 2)]
-        places: Indices = np.array([(_OWN[one] + _OWN[other]) // 2 for one, other in ends])
-        keys = np.stack([_pair(elements[:, one], elements[:, other], count) for one, other in ends], axis=1)
+        places: Indices = np.array([(_OWN[end_node] + _OWN[middle]) // 2 for end_node, middle in ends])
+        keys = np.stack([_pair(elements[:, end_node], elements[:, middle], count) for end_node, middle in ends], axis=1)
         pairs, first, number = np.unique(keys, return_index=True, return_inverse=True)
         grid[:, places] = count + number.reshape(keys.shape)
         inner = np.flatnonzero(grid[0] < 0)
         grid[:, inner] = count + len(pairs) + np.arange(grid[:, inner].size).reshape(len(elements), -1)
-        of = np.concatenate([first // len(ends), np.repeat(np.arange(len(elements)), len(inner))])
-        at = np.concatenate([places[first % len(ends)], np.tile(inner, len(elements))])
-        new = _VALUES[at]
+        host = np.concatenate([first // len(ends), np.repeat(np.arange(len(elements)), len(inner))])
+        local_number = np.concatenate([places[first % len(ends)], np.tile(inner, len(elements))])
+        new = _VALUES[local_number]
         # A new node is driven where all nodes of its side, or of its element, are.
-        held = mesh.driven[elements[of]] | (new == 0.0)[..., None]
+        held = mesh.driven[elements[host]] | (new == 0.0)[..., None]
         driven = np.concatenate([mesh.driven, held.all(axis=1)])
-        nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[of]])])
+        nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[host]])])
         halved = Mesh(
             nodes,
             grid[:, _QUARTERS].reshape(-1, 9),
@@ -307,7 +309,7 @@ class HalvedMesh:
             _refine_chain(mesh.skin, pairs, count),
             *_by_axis(driven),
         )
-        return HalvedMesh(halved, mesh, pairs, new, of)
+        return HalvedMesh(halved, mesh, pairs, new, host)
 
     def chain(self, nodes: Indices) -> Indices:
         """Return a chain of edges (2 k + 1,) of the coarse mesh, end, middle, ... end, with its new nodes."""

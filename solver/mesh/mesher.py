@@ -173,13 +173,13 @@ class FingerMesh:
     arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
     fat: int  # number of elements below the dermis: of the fat, and of a meshed bone
-    whole: Indices  # (2 a + 1,) nodes of all the skin, whether they may touch or not
+    all_skin: Indices  # (2 a + 1,) nodes of all the skin, whether they may touch or not
     loose: NDArray[np.bool_]  # (a,) elements along the skin that are not close to held skin
 
     @property
     def skin_arcs(self) -> Array:
         """Arc positions (k,) of the nodes that may touch [mm]."""
-        return with_middles(self.arcs)[np.searchsorted(self.whole, self.mesh.skin)]
+        return with_middles(self.arcs)[np.searchsorted(self.all_skin, self.mesh.skin)]
 
 
 def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
@@ -339,8 +339,8 @@ class _Row:
     def lines(self, gaps: Sequence[int], *, shift: bool = False) -> Array:
         """Return the lines for `gaps` elements between each two ends; `shift` moves them half an element."""
         out: list[Array] = []
-        at = np.interp(self.ends, self.place, self.number)
-        for (first, last), (start, stop), count in zip(pairwise(at), pairwise(self.ends), gaps, strict=True):
+        numbers = np.interp(self.ends, self.place, self.number)
+        for (first, last), (start, stop), count in zip(pairwise(numbers), pairwise(self.ends), gaps, strict=True):
             steps = np.arange(count + 1.0)
             if shift:  # except the ends
                 steps = np.concatenate([[0.0], steps[:-1] + 0.5, [float(count)]])
@@ -372,7 +372,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
         sizes = np.minimum(sizes, largest)
     ends = _framed([0.0, finger.epidermis, skin, skin + thick], near, far)
     # a single element between epidermis and ending is too stiff in shear, whatever its size
-    least = [2 if end < near <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
+    least = [2 if end < near <= next_end and end > 0.0 else 1 for end, next_end in pairwise(ends[:-1])]
     row = _Row(depth, _cumulative_count(depth, sizes), ends, (*least, 2), 0.1)
     gaps = row.gaps()
     every = row.lines(gaps)

@@ -15,7 +15,7 @@ from solver.body import Patches
 from solver.contact import STATE_NAMES
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, LinearFinger
-from solver.equilibrium.load_path import Instant, Way
+from solver.equilibrium.load_path import Instant, LoadPath
 from solver.failures import SolveFailure
 from solver.mesh import Lines
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
@@ -36,15 +36,15 @@ class SceneSolution:
     displacement: Array  # (nodes, 2) [mm]
     audits: dict[str, float]
     steps: Steps | None  # where the state depends on its load path
-    way: Way | None  # the load path, where the scene asks for it
+    path: LoadPath | None  # the load path, where the scene asks for it
     warnings: tuple[str, ...] = ()  # of its kinematics
     wall_s: float = 0.0
     setup_s: float = 0.0
 
     @property
-    def elastic_way(self) -> tuple[Instant, ...] | None:
+    def elastic_path(self) -> tuple[Instant, ...] | None:
         """The load path, where nothing relaxes on it, so that forces alone determine its pictures."""
-        return None if self.way is None or self.way.tissue is not None else tuple(self.way.instants)
+        return None if self.path is None or self.path.tissue is not None else tuple(self.path.instants)
 
 
 def prediction(
@@ -62,7 +62,7 @@ def prediction(
     entry = model(driven, finger, state, solution.displacement, width)
     has_shift = scene.loading.dragged and state.load.path_dependent  # the shift of a sliding finger is arbitrary
     numbers[4] = shift if has_shift else 0.0
-    off = errors(scene, numbers, nested, solution.steps)
+    estimates = errors(scene, numbers, nested, solution.steps)
     return Prediction(
         scene=scene,
         sed_ending=sed,
@@ -72,28 +72,28 @@ def prediction(
         contact_width=width,
         indentation=depth,
         shift=shift if has_shift else None,
-        error_estimate=off.sed,
-        corrected_error=off.corrected,
-        normal_force_error=off.normal,
-        tangential_force_error=off.tangential,
-        indentation_error=off.indentation,
-        shift_error=off.shift if has_shift else None,
-        contact_width_error=off.width,
+        error_estimate=estimates.sed,
+        corrected_error=estimates.corrected,
+        normal_force_error=estimates.normal,
+        tangential_force_error=estimates.tangential,
+        indentation_error=estimates.indentation,
+        shift_error=estimates.shift if has_shift else None,
+        contact_width_error=estimates.width,
         nested=nested,
-        sed_point_error=off.point,
+        sed_point_error=estimates.point,
         dofs=finger.body.mesh.dofs,
         newton_iterations=state.iterations,
         wall_s=solution.wall_s,
         setup_s=solution.setup_s,
         estimate_s=estimate_s,
         row=Row(ROW, row, row_errors(scene, row, nested)),
-        responses=responses(numbers, off),
+        responses=responses(numbers, estimates),
         model=entry,
         audits=solution.audits,
         skin=skin_of(finger, state),
         geometry=finger.geometry,
         displacement=solution.displacement,
-        history=None if solution.way is None else history(scene, finger, solution.way),
+        history=None if solution.path is None else history(scene, finger, solution.path),
         warnings=(*warnings(driven, entry["left_out"]), *solution.warnings, *audits.rounding(solution.audits)),
     )
 
@@ -112,13 +112,13 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
     )
 
 
-def history(scene: Scene, finger: Finger[Patches], way: Way) -> History:
+def history(scene: Scene, finger: Finger[Patches], path: LoadPath) -> History:
     """Return a load path as arrays; at small strain it begins with the finger at rest."""
-    relaxing = way.tissue is not None
+    relaxing = path.tissue is not None
     first = 0 if isinstance(finger, LinearFinger) else 1
-    instants = way.instants[first:]
+    instants = path.instants[first:]
     states = [instant.state for instant in instants]
-    sed = np.array([(0.0, 0.0), *way.energies])[first:] if relaxing else finger.seds(states)
+    sed = np.array([(0.0, 0.0), *path.energies])[first:] if relaxing else finger.seds(states)
     return History(
         time=np.array([i.time for i in instants]),
         bone_x=np.array([i.travel for i in instants]),
@@ -166,13 +166,13 @@ def complete_audits(
     `newton` belongs to the body that stores the energy of the load path. `settled_sed` returns the SED of the state
     that was solved directly, with which a load path must end.
     """
-    checks, state, way = solution.audits, solution.state, solution.way
+    checks, state, path = solution.audits, solution.state, solution.path
     audits.refuse_unsound(checks, state.load.depth)
     audits.refuse_beyond_finger(finger, state, solution.displacement)
     checks |= audits.force_residuals(scene, float(state.force[1]), float(state.force[0]))
-    if way is None:
+    if path is None:
         return
-    relaxing = way.tissue is not None
-    checks |= audits.course_audits(newton, [instant.state for instant in way.instants], relaxing=relaxing)
+    relaxing = path.tissue is not None
+    checks |= audits.course_audits(newton, [instant.state for instant in path.instants], relaxing=relaxing)
     if not relaxing or state.sticking == 0.0:  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(solution.displacement) - 1.0)

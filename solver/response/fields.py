@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
-from solver.equilibrium.load_path import SMALL_STEPS, Instant, follow, way_of
+from solver.equilibrium.load_path import SMALL_STEPS, Instant, follow, undeformed_path
 from solver.failures import SolveFailure
 from solver.mesh import Q2P1, Mesh, local_coordinates
 from solver.mesh.mesher import Outline
@@ -104,7 +104,7 @@ class Sketch:
         position = self.mesh.nodes + displacement - [0.0, indentation]
         place = self._place.ravel()
         count = np.bincount(place)
-        means = {field.name: np.bincount(place, one) / count for field, one in zip(FIELDS, values, strict=True)}
+        means = {field.name: np.bincount(place, value) / count for field, value in zip(FIELDS, values, strict=True)}
         means[DISPLACEMENT] = np.hypot(*displacement[self._nodes].T)
         curves = {
             name: (shape[:, None] @ self.mesh.local(position, element))[:, 0]
@@ -201,7 +201,7 @@ def stills(finger: LinearFinger, instants: Sequence[Instant], sketch: Sketch) ->
     )
 
 
-def way_until(
+def path_until_failure(
     scene: Scene, finger: LinearFinger, progress: Progress | None = None
 ) -> tuple[tuple[Instant, ...], SolveFailure | None]:
     """Return the states from first touch on, and why there are no more where they end before the finger settles.
@@ -209,12 +209,12 @@ def way_until(
     They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
     Cancelled where `progress` says so.
     """
-    way = way_of(scene, finger)
+    path = undeformed_path(scene, finger)
     try:
-        follow(way, finger, scene.loading_per_mm, SMALL_STEPS, 1.0, lambda _, part: report_part(progress, part))
+        follow(path, finger, scene.loading_per_mm, SMALL_STEPS, 1.0, lambda _, part: report_part(progress, part))
     except SolveFailure as failure:
-        return _before_folding(finger, way.instants), failure
-    return tuple(way.instants), None
+        return _before_folding(finger, path.instants), failure
+    return tuple(path.instants), None
 
 
 def _before_folding(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instant, ...]:

@@ -260,7 +260,7 @@ class FiniteMeshing(Meshing):
         """Do as `Meshing` says."""
         answers: dict[int, Answer] = {}
         with interruptible(self.progress, lambda: len(answers) / len(scenes)):
-            for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
+            for number in sorted(range(len(scenes)), key=lambda n: solution_order(scenes[n])):
                 check_stop()
                 start, scene = perf_counter(), scenes[number]
                 report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
@@ -274,7 +274,7 @@ class FiniteMeshing(Meshing):
         return [answers[number] for number in range(len(scenes))]
 
 
-def alike(scene: Scene) -> tuple[LoadingGroup, float]:
+def solution_order(scene: Scene) -> tuple[LoadingGroup, float]:
     """Return a key that sorts scenes by how they are pressed, then by friction, so that neighbours are similar."""
     return scene.loading_group, float(scene.friction.mu)
 
@@ -282,23 +282,23 @@ def alike(scene: Scene) -> tuple[LoadingGroup, float]:
 def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float) -> Prediction:
     """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
     top, steps = nested.top, nested.steps
-    finger, state, way = top.finger, top.state, None
+    finger, state, path = top.finger, top.state, None
     setup = nested.coarse.setup_s + top.setup_s
     if scene.solve.course == "history":
         times = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.times
         for leg in scene.earlier_slides():  # one that never settles is refused with its limits
             settled_state(finger, leg)
-        way = march(scene, finger, times, relaxing=scene.materials.relax)
-        state = way.last
+        path = march(scene, finger, times, relaxing=scene.materials.relax)
+        state = path.last
     if not state.touching.any():
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
     within_reach(scene, state.load.depth)
-    newton = finger.newton if way is None else way.newton
+    newton = finger.newton if path is None else path.newton
     # Under a light touch, errors of displacements far below a nanometre leave a large part of the forces unbalanced.
     checks = _audits(finger, newton, state)
     correct = partial(_correct, finger, newton)
     state, checks = audits.balance(state, checks, FINITE_IMBALANCE, correct)
-    solution = SceneSolution(scene, state, state.u, checks, steps, way)
+    solution = SceneSolution(scene, state, state.u, checks, steps, path)
     complete_audits(scene, finger, solution, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
     solved_at = perf_counter()

@@ -72,8 +72,8 @@ def of_slide(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> 
 
 def _derivatives(rows: Sequence[By]) -> Derivatives:
     """Return the derivatives of every quantity, both forces and the indentation by their names."""
-    of = dict(zip(NAMES, rows, strict=False))
-    return Derivatives(of[SED.name], *rows[len(NAMES) :], responses=of)
+    by_name = dict(zip(NAMES, rows, strict=False))
+    return Derivatives(by_name[SED.name], *rows[len(NAMES) :], responses=by_name)
 
 
 def of_skin(newton: Newton, state: EquilibriumState) -> Array:
@@ -94,14 +94,14 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
         newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_arguments(load),
         position, system,
     )  # fmt: skip
-    free, by = system.free[:count], np.zeros((count, 3))
-    by[:, _MU], by[:, _DEPTH] = system.right[:count, BY_FRICTION], system.right[:count, BY_DEPTH]
-    at, along = np.divmod(free, 2)
-    at_bound = (state.state[at] == SHEAR_LIMITED) & (along == 0)
-    by[:, TAU_MAX] = np.where(at_bound, state.sense[at] * system.length[at], 0.0)
+    free, right_sides = system.free[:count], np.zeros((count, 3))
+    right_sides[:, _MU], right_sides[:, _DEPTH] = system.right[:count, BY_FRICTION], system.right[:count, BY_DEPTH]
+    node, along = np.divmod(free, 2)
+    at_bound = (state.state[node] == SHEAR_LIMITED) & (along == 0)
+    right_sides[:, TAU_MAX] = np.where(at_bound, state.sense[node] * system.length[node], 0.0)
     out = np.zeros((2 * size, 3))
     out[:, _DEPTH] = newton.steps[:, BY_DEPTH]
-    out[free] = np.linalg.solve(system.matrix[: count * count].reshape(count, count), by)
+    out[free] = np.linalg.solve(system.matrix[: count * count].reshape(count, count), right_sides)
     return out
 
 
@@ -144,12 +144,12 @@ class Nearby:
     """A settled slide, and those near it."""
 
     scene: Scene
-    here: EquilibriumState
+    state: EquilibriumState
     finger: Finger[Any]
 
     def derivatives(self) -> Derivatives:
         """Return the derivatives of the slide from the tangent at convergence."""
-        return of_slide(self.finger, self.scene, self.here)
+        return of_slide(self.finger, self.scene, self.state)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         """Return the SED (n, 2) [MPa] of scenes, as `responses` does."""
@@ -164,10 +164,10 @@ class Nearby:
         near: dict[int, EquilibriumState] = {}
         for number, scene in enumerate(scenes):
             with suppress(NotConverged):
-                there = self._slide(scene)
+                slide = self._slide(scene)
                 # where a state newly touches at an end of the skin, skin beyond may touch too
-                if not (there.touching & ~self.here.touching)[[0, -1]].any() and self._on_branch(there):
-                    near[number] = there
+                if not (slide.touching & ~self.state.touching)[[0, -1]].any() and self._on_branch(slide):
+                    near[number] = slide
         if near:
             out[list(near)] = self.finger.ending_and_middle(list(near.values()))
         return out
@@ -175,21 +175,21 @@ class Nearby:
     def _slide(self, scene: Scene) -> EquilibriumState:
         """Return the settled slide of a scene, started from this one. Raises NotConverged."""
         if isinstance(self.finger, LinearFinger):
-            return _small_slide(self.finger, scene, self.here.state)
-        newton, here = self.finger.newton, self.here
-        load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
+            return _small_slide(self.finger, scene, self.state.state)
+        newton, state = self.finger.newton, self.state
+        load = state.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         if scene.normal_force is None:
-            return solve_full_slip(newton, load._replace(depth=scene.loading.depth), here, GOOD)
-        return solve_under_forces(newton, replace(here, load=load), ForceLoad(scene.normal_force, None), GOOD)
+            return solve_full_slip(newton, load._replace(depth=scene.loading.depth), state, GOOD)
+        return solve_under_forces(newton, replace(state, load=load), ForceLoad(scene.normal_force, None), GOOD)
 
-    def _on_branch(self, there: EquilibriumState) -> bool:
+    def _on_branch(self, near: EquilibriumState) -> bool:
         """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves."""
         if not isinstance(self.finger, FiniteFinger):
             return True
-        beyond = there.load.mu > self.here.load.mu or there.load.depth > self.here.load.depth
-        if beyond and not sound(self.finger, there):  # the skin may have folded
+        beyond = near.load.mu > self.state.load.mu or near.load.depth > self.state.load.depth
+        if beyond and not sound(self.finger, near):  # the skin may have folded
             return False
-        return not jumped_branch(self.finger, self.here, there)
+        return not jumped_branch(self.finger, self.state, near)
 
 
 def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
@@ -224,7 +224,7 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
     for slide in nearby(predictions):
         if slide is None or not isinstance(slide.finger, LinearFinger):
             raise ValueError("no press at small strain that slides without friction")
-        prediction.append(by_stiffness(slide.finger, slide.here))
+        prediction.append(by_stiffness(slide.finger, slide.state))
     return np.array(prediction)
 
 

@@ -15,7 +15,7 @@ from solver.accuracy.error_estimate import PARTS, edge_changes, half_width, orde
 from solver.arrays import Array
 from solver.equilibrium import EquilibriumState, ForceLoad
 from solver.equilibrium.finger import KINDS, Finger
-from solver.equilibrium.load_path import PRESSING_TIME, Way, march
+from solver.equilibrium.load_path import PRESSING_TIME, LoadPath, march
 from solver.failures import SolveFailure
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
@@ -77,7 +77,7 @@ _PLACES = [0, 6, 1, 2, 5]  # of those among `Finger.all_numbers`, which quantiti
 class CourseNumbers:
     """The numbers of a load path at three instants and in three parts, or their errors; nan where there are none."""
 
-    at: Array  # (3, 5 + q) of INSTANTS: NUMBERS, then every quantity at the ending, each in its own unit
+    value: Array  # (3, 5 + q) of INSTANTS: NUMBERS, then every quantity at the ending, each in its own unit
     rate: Array  # (3, q) of the parts that end there, per second
 
 
@@ -85,10 +85,10 @@ def course_numbers(course: History) -> CourseNumbers:
     """Return the numbers of a load path."""
     table = np.column_stack([*(getattr(course, name) for name in COURSE_NUMBERS), course.responses])
     ends = instants(course)
-    at = np.array(
+    values = np.array(
         [table[end - 1] if end > begin else table[0] * np.nan for begin, end in zip((0, *ends), ends, strict=False)]
     )
-    return CourseNumbers(at, np.array([rates(course)[name] for name in NAMES]).T)
+    return CourseNumbers(values, np.array([rates(course)[name] for name in NAMES]).T)
 
 
 def course_errors(prediction: Prediction) -> CourseNumbers:
@@ -99,19 +99,19 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     kind = KINDS[scene.solve.kinematics]
     mesh, nested = kind.on(scene, geometry), kind.of(scene, replace(geometry.sizing, halved=True))
 
-    def march_on(finger: Finger[Any], part: float) -> Way:
+    def march_on(finger: Finger[Any], part: float) -> LoadPath:
         return march(scene, finger, part, relaxing=scene.materials.relax)
 
     try:
         fewer = [course_numbers(history(scene, mesh, march_on(mesh, part))) for part in PARTS.tolist()]
-        way = march_on(nested, float(PARTS[0]))
+        path = march_on(nested, float(PARTS[0]))
     except SolveFailure:
-        return CourseNumbers(usual.at * np.nan, usual.rate * np.nan)
-    course = history(scene, nested, way)
+        return CourseNumbers(usual.value * np.nan, usual.rate * np.nan)
+    course = history(scene, nested, path)
     finer = course_numbers(course)
     ends = instants(course)
-    states = [way.instants[end - 1 - len(course.time)].state for end in ends]
-    edges = 0.0 * usual.at
+    states = [path.instants[end - 1 - len(course.time)].state for end in ends]
+    edges = 0.0 * usual.value
     if not scene.materials.relax:
         edges += [_of_edges(scene, nested, state) for state in states]
     times = np.concatenate([[0.0], course.time])[[0, *ends]]
@@ -120,11 +120,13 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         rate_edges = (of_quantities[1:] + of_quantities[:-1]) / np.diff(times)[:, None]
 
     def error(name: str, changed_by_edges: Array) -> Array:
-        value, nested_value, *by_part = (getattr(one, name) for one in (usual, finer, *fewer))
-        by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(by_part, PARTS.tolist(), strict=True))
+        value, nested_value, *by_part = (getattr(numbers, name) for numbers in (usual, finer, *fewer))
+        by_steps = sum(
+            abs(number - value) / (1.0 / part - 1.0) for number, part in zip(by_part, PARTS.tolist(), strict=True)
+        )
         return half_width(nested_value - by_part[0], changed_by_edges[None], order_of(scene)) + by_steps
 
-    return CourseNumbers(error("at", edges), error("rate", rate_edges))
+    return CourseNumbers(error("value", edges), error("rate", rate_edges))
 
 
 def _of_edges(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:

@@ -138,11 +138,11 @@ def _rough_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | Non
     """Return the settled slide, at finite strain sought from `near`. Raises SolveFailure, also where it is unsound."""
     if isinstance(finger, FiniteFinger):
         state = roughly(finger, scene, near)
-        good = sound(finger, state)
+        is_sound = sound(finger, state)
     else:
         assert isinstance(finger, LinearFinger)
         state = direct(scene, finger)
-        good = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
-    if good:
+        is_sound = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
+    if is_sound:
         return state
     raise NotConverged("no sound state was found")

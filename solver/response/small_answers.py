@@ -100,7 +100,9 @@ class SmallMeshing(Meshing):
             if watch is not None:
                 for number in batch:
                     if answers[number] is not BEYOND_THE_SKIN:
-                        watch(number, answers[number], finger, states[number].elastic_way if number in states else None)
+                        watch(
+                            number, answers[number], finger, states[number].elastic_path if number in states else None
+                        )
         return [answers[number] for number in every]
 
     def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
@@ -121,24 +123,24 @@ class SmallMeshing(Meshing):
             steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
         if times > 1 and steps is not None:
             steady = direct(scene, finger, times)
-        way, state, relaxing = None, steady, history and scene.materials.relax
+        path, state, relaxing = None, steady, history and scene.materials.relax
         if history:
             progress = self.progress
 
             def report(_: str, part: float) -> None:
                 report_part(progress, (position + part) / count)
 
-            way = march(scene, finger, times, relaxing=relaxing, report=report)
-            state = way.last
+            path = march(scene, finger, times, relaxing=relaxing, report=report)
+            state = path.last
             if relaxing:
                 state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
         displacement = finger.displacement(state)
         in_tissue(scene, finger, state.load.depth)
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
-        direct_solve = way is None and scene.normal_force is None and not state.load.path_dependent
+        direct_solve = path is None and scene.normal_force is None and not state.load.path_dependent
         (state, displacement), checks = _remove_round_off(scene, finger, (state, displacement), always=direct_solve)
-        solution = SceneSolution(scene, state, displacement, checks, steps, way)
+        solution = SceneSolution(scene, state, displacement, checks, steps, path)
         complete_audits(scene, finger, solution, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audits.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
         return replace(solution, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
@@ -146,8 +148,8 @@ class SmallMeshing(Meshing):
     def _predict(self, solutions: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
         """Return the prediction of each state with its error estimate; the numbers of all are computed together."""
         start = perf_counter()
-        numbers = finger.all_numbers([one.state for one in solutions])
-        displacements = np.stack([one.displacement for one in solutions], axis=2)
+        numbers = finger.all_numbers([solution.state for solution in solutions])
+        displacements = np.stack([solution.displacement for solution in solutions], axis=2)
         numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
@@ -155,8 +157,8 @@ class SmallMeshing(Meshing):
         nested = nested_numbers_of_all(mesh, solutions, numbers)
         estimate_s = (perf_counter() - start) / len(solutions)
         return [
-            prediction(one, finger, numbers[number], rows[:, number], nested[number], estimate_s)
-            for number, one in enumerate(solutions)
+            prediction(solution, finger, numbers[number], rows[:, number], nested[number], estimate_s)
+            for number, solution in enumerate(solutions)
         ]
 
 
@@ -199,6 +201,8 @@ def nested_numbers_of_all(
         values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
             solution = solutions[number]
-            there = nested_state(mesh, state, value, change, solution.steps)
-            out[number] = None if there is None else with_shares(solution.scene, numbers[number], there, solution.steps)
+            on_nested = nested_state(mesh, state, value, change, solution.steps)
+            out[number] = (
+                None if on_nested is None else with_shares(solution.scene, numbers[number], on_nested, solution.steps)
+            )
     return out

@@ -76,9 +76,11 @@ def solve_many(
             by_id[id(answer)] = answer, _with_evidence(answer, progress)
         return by_id[id(answer)][1]
 
-    def watch_with_evidence(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
+    def watch_with_evidence(
+        number: int, answer: Answer, finger: LinearFinger, path: tuple[Instant, ...] | None
+    ) -> None:
         assert watch is not None
-        watch(number, add_evidence(answer), finger, way)
+        watch(number, add_evidence(answer), finger, path)
 
     answers = _answers(tuple(scenes), progress, watch_with_evidence if watch else None, rough)
     return tuple(add_evidence(answer) for answer in answers)
@@ -93,7 +95,7 @@ def _answers(
         answers = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
         out |= dict(zip(group, answers, strict=True))
     answers = (out[i] for i in range(len(scenes)))
-    return tuple(one.in_a_sentence() if isinstance(one, SolveFailure) else one for one in answers)
+    return tuple(answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for answer in answers)
 
 
 def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
@@ -126,8 +128,8 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
     """Return the positions of scenes that share meshes, in the order of their first ones."""
     out: dict[object, list[int]] = {}
     for position, scene in enumerate(scenes):
-        alike = (scene.solve.kinematics, scene.finger, scene.materials, scene.receptor)
-        out.setdefault(alike, []).append(position)
+        key = (scene.solve.kinematics, scene.finger, scene.materials, scene.receptor)
+        out.setdefault(key, []).append(position)
     return list(out.values())
 
 
@@ -135,7 +137,7 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
     """Return `watch` for the scenes of a `group`, called with positions among them."""
     if watch is None:
         return None
-    return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
+    return lambda number, answer, finger, path: watch(group[number], answer, finger, path)
 
 
 def _solve_group(
@@ -147,7 +149,10 @@ def _solve_group(
     if kind == "small" and any(scene.solve.course == "history" for scene in scenes):
         return _march(scenes, meshing, watch)
     refinement = _refine(scenes, meshing, watch, rough)
-    return [_add_warnings(answer, words) for answer, words in zip(refinement.answers, refinement.warnings, strict=True)]
+    return [
+        _add_warnings(answer, warnings)
+        for answer, warnings in zip(refinement.answers, refinement.warnings, strict=True)
+    ]
 
 
 def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
@@ -163,10 +168,10 @@ def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[A
         mesh = max(settled, key=lambda answer: answer.dofs).geometry.sizing.fineness
     answers_of_courses: dict[int, Answer] = {}
 
-    def record(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
+    def record(number: int, answer: Answer, finger: LinearFinger, path: tuple[Instant, ...] | None) -> None:
         answers_of_courses[number] = _add_warnings(answer, refinement.warnings[number])
         if watch is not None:
-            watch(number, answers_of_courses[number], finger, way)
+            watch(number, answers_of_courses[number], finger, path)
 
     answers = meshing.answers(scenes, mesh, record)
     return [answers_of_courses.get(number, answer) for number, answer in enumerate(answers)]
@@ -221,7 +226,7 @@ def _refine(scenes: list[Scene], meshing: Meshing, watch: Watch | None, rough: R
     answers |= {i: best[i] for i, miss in enumerate(errors) if miss > 1.0}
     if scenes[0].solve.kinematics == "finite":  # where a fine mesh may lose its way
         failures |= _fall_back(scenes, answers, meshing)
-    contrast_of = {i: off for together, off in zip(contrast_sets, contrasts, strict=True) for i in together}
+    contrast_of = {i: contrast for together, contrast in zip(contrast_sets, contrasts, strict=True) for i in together}
     errors = _errors(answers, failures, meshes)
     warnings = [_sentences(contrast_of.get(i), errors[i], answers[i], failures.get(i)) for i in range(len(scenes))]
     return _Refinement([answers[i] for i in range(len(scenes))], warnings)
@@ -239,10 +244,10 @@ def _error_reductions(
     `contrast_sets`. Surfaces that are compared are refined together.
     """
     out = {i: miss for i, miss in enumerate(errors) if miss > 1.0}
-    for together, off in zip(contrast_sets, contrasts, strict=True):
+    for together, contrast in zip(contrast_sets, contrasts, strict=True):
         tolerance = min((t for i in together if (t := scenes[i].solve.contrast_tolerance)), default=np.inf)
-        if tolerance < np.inf and (off.share > tolerance or any(i in out for i in together)):
-            out |= {i: max(errors[i], off.share / tolerance) for i in together}
+        if tolerance < np.inf and (contrast.share > tolerance or any(i in out for i in together)):
+            out |= {i: max(errors[i], contrast.share / tolerance) for i in together}
     return out
 
 
@@ -260,8 +265,12 @@ def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> di
         finer: float | Lines | None = LIMIT_FINENESS
         if mesh is not None:
             nested = [(reductions[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
-            parts = [miss * one.shares for miss, one in nested if one is not None and one.shares is not None]
-            unknown = any(one is None for _, one in nested)
+            parts = [
+                miss * nested_numbers.shares
+                for miss, nested_numbers in nested
+                if nested_numbers is not None and nested_numbers.shares is not None
+            ]
+            unknown = any(nested_numbers is None for _, nested_numbers in nested)
             finer = refine_lines(mesh, None if unknown or not parts else np.max(parts, axis=0))
         if finer is not None:
             out.setdefault(finer, []).extend(together)

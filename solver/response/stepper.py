@@ -84,9 +84,9 @@ class Stepper(ABC):
 
     def outline(self) -> Array:
         """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip; the surface is y = 0."""
-        whole = self.finger.geometry.whole
+        skin = self.finger.geometry.all_skin
         displacement = self.finger.displacement(self.state)
-        return self.finger.geometry.mesh.nodes[whole] + displacement[whole] - [0.0, self.depth]
+        return self.finger.geometry.mesh.nodes[skin] + displacement[skin] - [0.0, self.depth]
 
     def under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
         """Return the last state under the present friction; where it `slides`, its contact slips towards `sense`."""
@@ -213,12 +213,12 @@ class FiniteStepper(Stepper):
         """Return the result of `step` by iterations from the last state."""
         newton = self.newton
         state = self._ready(normal, tangential)
-        origin, before = state.place(newton.condensed)[:, 0], state.load.travel
+        origin, travel = state.place(newton.condensed)[:, 0], state.load.travel
         forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
         far, turns = (_CONTROL.near, _CONTROL.arriving) if self._behind else (_CONTROL.far, _CONTROL.further)
         for number in range(1, max(iterations, turns) + 1):
             reuse = goes_far and number == 1
-            correction = correct(newton, state, forces, origin, before, reuse=reuse)
+            correction = correct(newton, state, forces, origin, travel, reuse=reuse)
             if reuse and (correction is None or correction[1] > _CONTROL.furthest):
                 continue
             if correction is None or correction[1] > _CONTROL.furthest or correction[0].reaches_end:

@@ -297,9 +297,9 @@ class Loading(Table):
             _within("loading.normal_force", self.normal_force, 1e-9, 1e6)
         if self.force_unit not in ("N/mm", "N"):
             raise SceneError("loading.force_unit", self.force_unit, 'it must be "N/mm" or "N"')
-        way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
-        single = ("+x", "-x", "none") if len(way) == 1 else ("+x", "-x")
-        if not way or any(leg not in single for leg in way):
+        legs = self.slide if isinstance(self.slide, tuple) else (self.slide,)
+        single = ("+x", "-x", "none") if len(legs) == 1 else ("+x", "-x")
+        if not legs or any(leg not in single for leg in legs):
             allowed = 'it must be "+x", "-x" or "none", or a list of "+x" and "-x"'
             raise SceneError("loading.slide", self.slide, allowed)
         _within("loading.speed", self.speed, 1e-6, 1e4, "mm/s")
@@ -319,8 +319,8 @@ class Loading(Table):
     @property
     def directions(self) -> tuple[int, ...]:
         """+1 for every slide along +x, -1 along -x, in their order; empty without a slide."""
-        way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
-        return tuple({"+x": 1, "-x": -1}[leg] for leg in way if leg != "none")
+        legs = self.slide if isinstance(self.slide, tuple) else (self.slide,)
+        return tuple({"+x": 1, "-x": -1}[leg] for leg in legs if leg != "none")
 
     @property
     def direction(self) -> int:

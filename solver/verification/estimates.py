@@ -138,7 +138,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
     """
     if answer.nested is None:
         return []
-    best, warned = answer.sed_ending_corrected, any(one.startswith(CUT_FOLDS) for one in answer.warnings)
+    best, warned = answer.sed_ending_corrected, any(warning.startswith(CUT_FOLDS) for warning in answer.warnings)
     numbers = (  # place in the truth, value and estimate of each of `GOALS`
         (0, answer.sed_ending, answer.error_estimate),
         (0, best, answer.corrected_error),
@@ -150,8 +150,10 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
         true = float(truth[place])
         if estimate is None or not true > 0.0:
             continue
-        error, off = abs(value) / true - 1.0, best / true - 1.0
-        better = (abs(off), error * (error - off) > 0.0) if name == TRUE_NUMBERS[0] else (None, False)
+        error, corrected_error = abs(value) / true - 1.0, best / true - 1.0
+        better = None, False
+        if name == TRUE_NUMBERS[0]:
+            better = abs(corrected_error), error * (error - corrected_error) > 0.0
         row = Estimate(
             answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
             float(doubt[place]), *better, warned or bool(stiffness_warning(answer.scene)),

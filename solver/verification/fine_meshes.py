@@ -49,7 +49,9 @@ def _solve_refined(scenes: Sequence[Scene]) -> Array:
     tolerance = _REFINED[scenes[0].solve.kinematics]
     tight = {"tolerance": tolerance, "contrast_tolerance": tolerance if len(scenes) > 1 else None, "evidence": "quick"}
     answers = solve_many([replace(scene, solve=replace(scene.solve, **tight)) for scene in scenes])
-    numbers = [one.nested.numbers[:3] for one in answers if isinstance(one, Prediction) and one.nested is not None]
+    numbers = [
+        answer.nested.numbers[:3] for answer in answers if isinstance(answer, Prediction) and answer.nested is not None
+    ]
     if len(numbers) < len(scenes):
         raise NotConverged("No refined mesh has a state.")
     return np.abs(numbers)

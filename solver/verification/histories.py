@@ -60,5 +60,5 @@ def _march(scene: Scene) -> March:
     *_, last = march(mesh.finger.newton, course)
     sed = float(mesh.numbers(last)[0])
     elapsed_s = mesh.prepared_s + clock() - start
-    off = sed / float(mesh.numbers(mesh.solve(scene))[0]) - 1
-    return March(kind, scene.title, mesh.dofs, mesh.prepared_s + span, elapsed_s, off)
+    difference = sed / float(mesh.numbers(mesh.solve(scene))[0]) - 1
+    return March(kind, scene.title, mesh.dofs, mesh.prepared_s + span, elapsed_s, difference)

@@ -103,7 +103,7 @@ def _finger(case: Scene, overkill: float, meshes: Errors) -> Order:
     true = float(np.mean([_sed(case, overkill, shift) for shift in (False, True)]))
     near = [(part, shift) for part in (0.92, 1.0, 1.08) for shift in (False, True)]
     errors, took = _each(meshes, lambda size: _rms([_sed(case, size * part, shift) / true - 1 for part, shift in near]))
-    sizes, took = [meshes[0] / fineness for fineness in meshes], [one / len(near) for one in took]
+    sizes, took = [meshes[0] / fineness for fineness in meshes], [duration / len(near) for duration in took]
     return _row(f"finger, {case.title}", "SED of the ending", case.solve.kinematics, sizes, errors, took, 1.8)
 
 

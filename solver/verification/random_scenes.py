@@ -141,7 +141,9 @@ def _courses(draw: Draw, number: int, _: Kinematics) -> Scene:
         return scene
     prony = (Relaxation(draw.uniform(0.1, 0.5), _by_logarithm(draw, 0.03, 3.0)),)
     materials = scene.materials
-    tissues = Materials(*(replace(one, prony=prony) for one in (materials.epidermis, materials.dermis, materials.fat)))
+    tissues = Materials(
+        *(replace(tissue, prony=prony) for tissue in (materials.epidermis, materials.dermis, materials.fat))
+    )
     return replace(scene, materials=tissues, solve=Solve(course="history"))
 
 
@@ -151,7 +153,7 @@ def _stiff(draw: Draw, number: int, kinematics: Kinematics) -> Scene:
         skin = [Material(usual.fat.E * _by_logarithm(draw, 8.0, 100.0), 0.48) for _ in range(2)]
     else:
         exponent = draw.uniform(3.0, 14.0)
-        skin = [replace(one, law="ogden", stiffening=exponent) for one in (usual.epidermis, usual.dermis)]
+        skin = [replace(tissue, law="ogden", stiffening=exponent) for tissue in (usual.epidermis, usual.dermis)]
     scene = replace(_common(draw, 0.5), solve=Solve(kinematics), materials=Materials(skin[0], skin[1], usual.fat))
     return replace(scene, friction=Friction(scene.friction.mu))
 

@@ -7,7 +7,7 @@ from statistics import median
 import numpy as np
 
 from solver.failures import SolveFailure
-from solver.response.finite_answers import alike
+from solver.response.finite_answers import solution_order
 from solver.scene import Scene
 from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
 from solver.verification.request import LeftOut, Request, clock, median_time, repetitions, rows_within
@@ -80,8 +80,8 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
             failed[scene.title] = str(failure)
             continue
         true = np.array(truths[scene.title].numbers)
-        off = np.abs(mesh.numbers(state) - true) / np.where(true > 0.0, true, 1.0)
-        errors[scene.title] = tuple(off.tolist())
+        relative = np.abs(mesh.numbers(state) - true) / np.where(true > 0.0, true, 1.0)
+        errors[scene.title] = tuple(relative.tolist())
         solvable.append(scene)
         first.append(median_time(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
     together = median_time(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solvable]), 5, 0.5 * patience)
@@ -116,14 +116,14 @@ def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float
     Times are medians over passes through `scenes` in the solver's order, after a first pass that makes the meshes. The
     floor is measured after each: the speed of a machine changes within a second, and both must see the same speed.
     """
-    scenes = sorted(scenes, key=alike)
+    scenes = sorted(scenes, key=solution_order)
     spans: dict[str, list[float]] = {}
     floors: list[float] = []
     began = clock()
     for turn in range(6):
-        before, way = None, None
+        before, loading = None, None
         for scene in scenes:
-            near = way == (scene.loading.depth, scene.loading.slide)
+            near = loading == (scene.loading.depth, scene.loading.slide)
             start = clock()
             before = mesh.solve(scene, before if near else None)
             mesh.numbers(before)
@@ -131,7 +131,7 @@ def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float
                 spans.setdefault(scene.title, []).append(clock() - start)
             if turn:
                 floors.append(mesh.floor())
-            way = scene.loading.depth, scene.loading.slide
+            loading = scene.loading.depth, scene.loading.slide
         if turn and clock() - began > most_s:
             break
     return [median(span) for span in spans.values()], floors or [mesh.floor()]

@@ -97,9 +97,11 @@ def _at_error(
         if best is None:
             return target
         coarse = best.largest_error({}) > error
-        words = "no mesh that was tried is below: the best is at" if coarse else "the truth is too uncertain to tell:"
+        sentence = "no mesh that was tried is below: the best is at"
+        if not coarse:
+            sentence = "the truth is too uncertain to tell:"
         tried = coarse and len(rows) >= len((QUICK if request.quick else MESHES)[kinematics])
-        return replace(target, how=f"{words} {_error(best, doubts)}", tried=tried)
+        return replace(target, how=f"{sentence} {_error(best, doubts)}", tried=tried)
     took, best = min(accurate, key=lambda pair: pair[0])
     how = f"{best.dofs} unknowns, error {_error(best, doubts)}"
     part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
@@ -124,12 +126,12 @@ def _warm(rows: Sequence[Warm], target: Target) -> Target:
 def _march(rows: Sequence[March], target: Target) -> Target:
     if not rows:
         return target
-    off = max(abs(row.difference) for row in rows)
+    difference = max(abs(row.difference) for row in rows)
     small = sum(row.kinematics == "small" for row in rows)
-    how = f"largest difference {off:.0e}; courses: {small} at small strain, {len(rows) - small} at finite strain"
+    how = f"largest difference {difference:.0e}; courses: {small} at small strain, {len(rows) - small} at finite strain"
     times = max(row.marched_s / row.direct_s for row in rows)
     part = _part(len(rows), 2 * len(JUDGED), "courses")
-    return replace(target, measured=times if off <= _AGREED else None, how=how, part=part)
+    return replace(target, measured=times if difference <= _AGREED else None, how=how, part=part)
 
 
 def _cold(rows: Sequence[Cold], target: Target) -> Target:

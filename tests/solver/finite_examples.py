@@ -25,7 +25,7 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     moduli = [tissue.E for tissue in (tissues.epidermis, tissues.dermis, tissues.fat)]
     body = FiniteBody.of(geometry.mesh, [NeoHooke(E, nu) for E in moduli])
     probes = FinitePatches(body, endings(geometry, body.centre, Receptor(), np.zeros(1)))
-    return Newton(body.condensed), probes, geometry.whole
+    return Newton(body.condensed), probes, geometry.all_skin
 
 
 @cache

@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.contact import FrictionLaw
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
-from solver.equilibrium.load_path import Aim, Way
+from solver.equilibrium.load_path import Aim, LoadPath
 from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import (
@@ -95,10 +95,10 @@ def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, surface, 
 
 def test_a_way_under_given_forces_ends_with_them(newton):
     loading = Loading(normal_force=0.1, tangential_force=0.02)
-    way = Way(newton, LoadState(0.0, 0.5, 0.01), loading)
+    path = LoadPath(newton, LoadState(0.0, 0.5, 0.01), loading)
     for n in range(1, 51):
-        way.go(Aim(0.04 * n, 0.1 * min(n / 25, 1.0), -0.02 * max(n / 25 - 1.0, 0.0)))
-    last = way.last
+        path.go(Aim(0.04 * n, 0.1 * min(n / 25, 1.0), -0.02 * max(n / 25 - 1.0, 0.0)))
+    last = path.last
     np.testing.assert_allclose(last.force, [-0.02, 0.1], rtol=1e-9)
     assert (last.state == STICK).any()
 

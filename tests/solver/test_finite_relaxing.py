@@ -121,7 +121,7 @@ def test_the_work_done_on_a_cycle_is_what_is_lost_and_fine_steps_balance_it():
         P = overstress(T, F)
         work += np.sum((P + last_P) / 2.0 * (F - last_F))
         past, last_F = past.after(F[None], 1.0 / steps), F
-        A, B = (_tensor(t) for t in (past.metric[0, 0], past.before[0]))
+        A, B = (_tensor(t) for t in (past.metric[0, 0], past.previous[0]))
         eigen = np.linalg.eigvals(A @ np.linalg.inv(B)).real
         dissipation += 0.3 * G / (2.0 * tau) * np.sum(eigen + 1.0 / eigen - 2.0) / steps
     assert dissipation > 0.0
@@ -244,7 +244,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
         states.append(state)
         metrics = [
             np.array([_tensor(t) for t in tensors])
-            for tensors in (newton.condensed.past.metric[:, 0], newton.condensed.past.before)
+            for tensors in (newton.condensed.past.metric[:, 0], newton.condensed.past.previous)
         ]
         eigen = np.linalg.eigvals(metrics[0] @ np.linalg.inv(metrics[1])).real
         rate = (

@@ -8,7 +8,7 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
-from solver.continuation import continue_branch, existence, finite_states, folds_at
+from solver.continuation import Continuation, existence, finite_states, folds_at
 from solver.equilibrium import BY_FRICTION, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
@@ -78,8 +78,8 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     finger = published(5)
     load = LoadState(1.0, 0.5, 0.03, TOWARDS_TIP)
     start = solve_full_slip(finger.newton, load._replace(mu=0.0))
-    branch = continue_branch(finger, start, BY_FRICTION, load.mu, 0.54)
-    second_branch = continue_branch(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
+    branch = Continuation(finger, BY_FRICTION, 0.54).branch(start, load.mu)
+    second_branch = Continuation(finger, BY_FRICTION, 0.54).branch(branch.last, load.mu)  # nothing is left to follow
     assert second_branch.states == (branch.last,)
     assert not second_branch.limited
     assert not branch.limited

@@ -178,7 +178,7 @@ def test_every_finger_that_a_scene_allows_can_be_meshed_without_a_folded_element
     geometry = finger_mesh(finger, receptor, Sizing(fineness, depth, shift))
     measures = quality(geometry.mesh)
     assert measures["jacobian_ratio"] > 0.02
-    assert np.isin(geometry.mesh.skin, geometry.whole).all()
+    assert np.isin(geometry.mesh.skin, geometry.all_skin).all()
 
 
 def test_a_folded_element_is_refused():

@@ -83,17 +83,17 @@ def test_errors_at_the_ends_of_press_and_break_away_and_of_rates_lie_above_the_t
     fine = KINDS[kinematics].of(scene, sizing)
     truth = course_numbers(history(scene, fine, march(scene, fine, 4.0)))
     numbers, errors = course_numbers(prediction.history), course_errors(prediction)
-    finite = np.isfinite(truth.at)
-    assert np.array_equal(finite, np.isfinite(errors.at))
+    finite = np.isfinite(truth.value)
+    assert np.array_equal(finite, np.isfinite(errors.value))
     assert np.array_equal(finite[:, 0], [True, slide != "none", slide != "none"])
-    assert np.mean((np.abs(numbers.at - truth.at) <= errors.at)[finite]) >= 0.95
-    assert np.all(errors.at[0, :4] < 0.05 * np.abs(numbers.at[0, :4]))
+    assert np.mean((np.abs(numbers.value - truth.value) <= errors.value)[finite]) >= 0.95
+    assert np.all(errors.value[0, :4] < 0.05 * np.abs(numbers.value[0, :4]))
     parts = np.isfinite(truth.rate)
     assert np.mean((np.abs(numbers.rate - truth.rate) <= errors.rate)[parts]) >= 0.95
 
 
 def test_where_tissues_relax_the_errors_of_a_course_are_those_of_its_sed_and_forces():
     errors = course_errors(solve(replace(RELAXING, solve=Solve("small", "history", 0.02, "quick"))))
-    assert np.all(np.isfinite(errors.at[:, :6]))
-    assert np.all(errors.at[:, 0] > 0.0)
-    assert np.isnan(errors.at[:, 6:]).all()
+    assert np.all(np.isfinite(errors.value[:, :6]))
+    assert np.all(errors.value[:, 0] > 0.0)
+    assert np.isnan(errors.value[:, 6:]).all()

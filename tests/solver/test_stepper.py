@@ -188,7 +188,7 @@ def test_the_condensed_finger_gives_the_energies_and_the_outline_of_the_meshed_o
     displacement = finger.displacement(live.state)
     assert sed == pytest.approx(finger.sed_ending(displacement), rel=1e-10)
     np.testing.assert_allclose(live.row(), finger.row.average(displacement), rtol=1e-8)
-    skin_nodes = finger.geometry.whole
+    skin_nodes = finger.geometry.all_skin
     outline = finger.geometry.mesh.nodes[skin_nodes] + displacement[skin_nodes] - [0.0, live.depth]
     np.testing.assert_allclose(live.outline(), outline, atol=1e-12)
 

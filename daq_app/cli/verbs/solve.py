@@ -143,7 +143,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
 def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
     from solver.response.rates import COURSE_NUMBERS, INSTANTS
 
-    parts = zip(INSTANTS, _plain(numbers.at), _plain(errors.at), strict=True)
+    parts = zip(INSTANTS, _plain(numbers.value), _plain(errors.value), strict=True)
     rates = zip(NAMES, _plain(numbers.rate.T), _plain(errors.rate.T), strict=True)
     return {
         "instants": {
@@ -165,7 +165,7 @@ def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Cons
     ends = "At the ends of the press, of the break-away (full slip) and of the slide:"
     paces = "Mean rates in the press, the break-away and the slide:"
     parts = (
-        (ends, numbers.at, errors.at, labels, ""),
+        (ends, numbers.value, errors.value, labels, ""),
         (paces, numbers.rate, errors.rate, labels[len(_COURSE) :], "/s"),
     )
     for title, values, off, names, per in parts:
@@ -177,7 +177,7 @@ def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Cons
         ]
         console.say(f"\n{title}")
         console.say(table(lines, head=["", "press", "break-away", "slide", ""]).lstrip("\n"))
-    if not isfinite(errors.at[0, 0]):
+    if not isfinite(errors.value[0, 0]):
         console.say("Their errors are not known: the nested mesh has no such course.")
 
 

@@ -141,7 +141,7 @@ def edge_at_node(bodies: Bodies) -> Outcome:
 def distorted_finger(bodies: Bodies) -> Outcome:
     """Move every free inner node of the finger's mesh by 0.45 of its distance to the next, at random."""
     geometry = bodies.finger(8.0).geometry
-    meshes = [distort(geometry.mesh, 0.45, seed, geometry.whole) for seed in range(bodies.meshes)]
+    meshes = [distort(geometry.mesh, 0.45, seed, geometry.all_skin) for seed in range(bodies.meshes)]
     forces = [_force(bodies.newton(mesh, _TISSUES), _DEPTH, bodies.sense) for mesh in (geometry.mesh, *meshes)]
     spread = max(abs(f / forces[0] - 1) for f in forces)
     flaw = "" if spread < 0.01 else f"the force changes by {spread:.1g}"
@@ -154,10 +154,10 @@ def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
     whole, alone = two_parts()
     slide = solve_full_slip(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
     force, rigid = float(slide.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
-    drag, off = -float(slide.force[0]) / force, abs(force / rigid - 1)
-    good = off < 2.0 / ratio + bodies.rigid_agreement and abs(drag - 0.3) < 1e-12
-    summary = f"N {force:.5g}, {percent(off)} from the rigid part's; {slide.iterations} systems"
-    return Outcome(True, (force, drag, rigid), "" if good else f"off by {off:.1g}", summary)
+    drag, deviation = -float(slide.force[0]) / force, abs(force / rigid - 1)
+    good = deviation < 2.0 / ratio + bodies.rigid_agreement and abs(drag - 0.3) < 1e-12
+    summary = f"N {force:.5g}, {percent(deviation)} from the rigid part's; {slide.iterations} systems"
+    return Outcome(True, (force, drag, rigid), "" if good else f"off by {deviation:.1g}", summary)
 
 
 def one_node(bodies: Bodies) -> Outcome:
@@ -168,18 +168,18 @@ def one_node(bodies: Bodies) -> Outcome:
     compliance = np.linalg.inv(LinearBody.of(mesh, [Hooke(*layers[0])]).condensed.stiffness)
     up = 2 * (len(mesh.skin) // 2) + 1  # normal displacement of the middle node
     force, exact = float(slide.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])
-    off = abs(force / exact - 1)
-    flaw = "" if slide.touching.sum() == 1 and off < bodies.node_agreement else "not what one node bears"
-    apart = "equal to" if off < 1e-12 else f"{percent(off)} from"
+    deviation = abs(force / exact - 1)
+    flaw = "" if slide.touching.sum() == 1 and deviation < bodies.node_agreement else "not what one node bears"
+    apart = "equal to" if deviation < 1e-12 else f"{percent(deviation)} from"
     return Outcome(True, (force, exact), flaw, f"N {force:.4g}, {apart} the depth by the node's compliance")
 
 
 def aspect(bodies: Bodies) -> Outcome:
     """Press a block of elements fifty times longer than high, and the same block of squarer ones."""
     forces = [_force(bodies.newton(mesh, [(0.08, 0.48)]), 0.1) for mesh in slabs()]
-    off = abs(forces[1] / forces[0] - 1)
-    summary = f"N {forces[1]:.4g}, {percent(off)} from squarer elements'"
-    return Outcome(True, tuple(forces), "" if off < 0.005 else f"off by {off:.1g}", summary)
+    deviation = abs(forces[1] / forces[0] - 1)
+    summary = f"N {forces[1]:.4g}, {percent(deviation)} from squarer elements'"
+    return Outcome(True, tuple(forces), "" if deviation < 0.005 else f"off by {deviation:.1g}", summary)
 
 
 def two_parts() -> tuple[Mesh, Mesh]:

@@ -42,9 +42,10 @@ class HardCase:
 
 def cases(kinematics: Kinematics) -> tuple[Case, ...]:
     """Return the suite in one of the two kinematics."""
-    own = bodies.BODIES[kinematics]
+    on_bodies = bodies.BODIES[kinematics]
     of_bodies = (
-        Case(kinematics, name, ANSWER, partial(run, own), slow=run is bodies.steps) for name, run in OF_BODIES.items()
+        Case(kinematics, name, ANSWER, partial(run, on_bodies), slow=run is bodies.steps)
+        for name, run in OF_BODIES.items()
     )
     return (*hard_scenes(kinematics), *of_bodies)
 
@@ -58,9 +59,9 @@ def judge(case: Case, neighbour: Outcome | None = None) -> HardCase:
     if not all(abs(number) < float("inf") for number in outcome.numbers):
         flaws.append("a number is not finite")
     if neighbour is not None and neighbour.numbers and outcome.numbers:
-        off = abs(outcome.numbers[0] / neighbour.numbers[0] - 1.0)
-        if off > case.within:
-            flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
+        deviation = abs(outcome.numbers[0] / neighbour.numbers[0] - 1.0)
+        if deviation > case.within:
+            flaws.append(f"{deviation:.1g} from {case.same_as}, not {case.within:g}")
     took_s = clock() - start
     return HardCase(case.kinematics, case.name, case.must, outcome.answered, "; ".join(flaws), outcome.summary, took_s)
 

@@ -48,11 +48,11 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     x, y = mesh.nodes.T
     growth = (1 + nu) / YOUNG * ((1 - 2 * nu) * _SHARE + _SHARE * OUTER**2 / (x * x + y * y))
     exact = growth[:, None] * mesh.nodes
-    off = (displacement - exact).ravel()
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    rigid = np.stack([np.stack(m, axis=1).ravel() for m in ((one, zero), (zero, one), (-y, x))], axis=1)
-    motion = np.asarray(np.linalg.lstsq(rigid, off, rcond=None)[0], np.float64)
-    off = np.asarray(off - rigid @ motion, np.float64)
+    error = (displacement - exact).ravel()
+    ones, zeros = np.ones_like(x), np.zeros_like(x)
+    rigid = np.stack([np.stack(m, axis=1).ravel() for m in ((ones, zeros), (zeros, ones), (-y, x))], axis=1)
+    motion = np.asarray(np.linalg.lstsq(rigid, error, rcond=None)[0], np.float64)
+    error = np.asarray(error - rigid @ motion, np.float64)
     element = np.repeat(np.arange(len(mesh.elements)), len(_POINTS))
     local: Array = np.tile(_POINTS, (len(mesh.elements), 1))
     at = (Q2P1.shape(local)[0][:, None] @ mesh.nodes[mesh.elements[element]])[:, 0]
@@ -63,7 +63,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     energy = 0.5 * float(np.sum(loads * displacement))
     true = 0.5 * 2 * np.pi * INNER * widening(nu)
     return (
-        float(np.sqrt(np.mean(off**2))) / widening(nu),
+        float(np.sqrt(np.mean(error**2))) / widening(nu),
         float(np.sqrt(np.mean(misfit**2))),
         abs(energy / true - 1),
     )

@@ -46,12 +46,12 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
     for tolerance in TOLERANCES:
         answers = solve_many([_with_tolerance(scene, tolerance, together=together) for scene in scenes])
         refusals += [str(answer) for answer in answers if isinstance(answer, SolveFailure)]
-        good = [answer for answer in answers if isinstance(answer, Prediction)]
-        refusals += [f"errors unknown at {percent(tolerance)}" for answer in good if answer.nested is None]
-        if together and len(good) == len(scenes):
-            estimates.append(_difference(good, BY_TOLERANCE * tolerance, truth))
-        elif good:
-            estimates += compare(good[0], tolerance, *mean_and_doubt(truth[:, 0]))
+        predictions = [answer for answer in answers if isinstance(answer, Prediction)]
+        refusals += [f"errors unknown at {percent(tolerance)}" for answer in predictions if answer.nested is None]
+        if together and len(predictions) == len(scenes):
+            estimates.append(_difference(predictions, BY_TOLERANCE * tolerance, truth))
+        elif predictions:
+            estimates += compare(predictions[0], tolerance, *mean_and_doubt(truth[:, 0]))
     return Row(family, number, kinematics, tuple(estimates), tuple(dict.fromkeys(refusals)))
 
 
@@ -84,7 +84,7 @@ def apart(numbers: Array, solves: Array) -> tuple[float, float]:
 def report(rows: Sequence[Row]) -> Iterator[str]:
     """Yield the refusals, the misses, and a table with a row for each set and kinematics."""
     yield from (f"{row.family} {row.number}: {sentence}" for row in rows for sentence in row.refusals)
-    yield from misses(one for row in rows for one in row.estimates)
+    yield from misses(estimate for row in rows for estimate in row.estimates)
     yield from table(rows)
 
 
@@ -94,7 +94,7 @@ def table(rows: Sequence[Row]) -> Iterator[str]:
     yield _line(["---"] * len(HEADER))
     for kinematics, family in dict.fromkeys((row.kinematics, row.family) for row in rows):
         selection = [row for row in rows if (row.kinematics, row.family) == (kinematics, family)]
-        yield _line(judgement(family, kinematics, (one for row in selection for one in row.estimates)))
+        yield _line(judgement(family, kinematics, (estimate for row in selection for estimate in row.estimates)))
 
 
 def _line(cells: Sequence[str]) -> str:

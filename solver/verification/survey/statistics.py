@@ -54,5 +54,5 @@ def misses(rows: Iterable[Estimate]) -> Iterator[str]:
     """Yield a line for every number whose error exceeds its estimate."""
     for row in rows:
         if row.above is False and row.error > EXACT:
-            words = f"error of the {row.number} {row.error:.2g}, estimate {row.estimate:.2g}"
-            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {words}"
+            sentence = f"error of the {row.number} {row.error:.2g}, estimate {row.estimate:.2g}"
+            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {sentence}"
