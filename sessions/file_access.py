@@ -31,7 +31,7 @@ _OF_NEW = dict.fromkeys((errno.ENOENT, errno.EISDIR, errno.ENOTDIR, errno.EEXIST
     errno.EFBIG: "raise the limit of the size of files"
 }
 _OTHER = "check its name, its disk and who may use it"
-_REMEDIES: tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...] = (  # for what the system and SQLite tell
+_REMEDIES: tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...] = (  # for what the system and SQLite report
     ("free space on the disk", (errno.ENOSPC, errno.EDQUOT), (sqlite3.SQLITE_FULL,)),
     (
         "permit reading and writing there",
@@ -91,7 +91,7 @@ def remedy(error: Exception, *, new: bool = False) -> str:
         code: int | None = getattr(error, "sqlite_errorcode", None)  # none where Python itself found the fault
         return _RESTORE if code is None else _BY_SQLITE.get(code & 0xFF, _RESTORE)  # the low byte is the kind
     number: int | None = getattr(error, "errno", None)
-    if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
+    if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 reports it
         number = int(match.group(1))
     return (_BY_ERRNO | _OF_NEW if new else _BY_ERRNO).get(number or 0, _OTHER)
 
@@ -109,18 +109,19 @@ def failure_sentence(error: OSError) -> str:
 
 @contextmanager
 def name_failure(
-    kind: type[Exception],
-    what: str,
-    more: str = "",
+    error_type: type[Exception],
+    problem: str,
+    advice: str = "",
     failures: tuple[type[Exception], ...] = (OSError,),
     *,
     new: bool = False,
 ) -> Generator[None]:
-    """Raise `kind` for a file, perhaps a `new` one, that cannot be reached: what, why, what mends it, what else may."""
+    """Raise `error_type` for a file, perhaps `new`, that cannot be reached: `problem`, cause, remedy, `advice`."""
     try:
         yield
     except failures as error:
-        raise kind(f"{what} ({getattr(error, 'strerror', None) or error}); {remedy(error, new=new)}{more}") from error
+        cause = getattr(error, "strerror", None) or error
+        raise error_type(f"{problem} ({cause}); {remedy(error, new=new)}{advice}") from error
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
@@ -164,17 +165,17 @@ def whole_folder(folder: Path) -> Generator[Path]:
 
     Of two at once the first to be whole gets the name, and the other raises FileExistsError.
     """
-    part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
+    temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
     try:
-        part.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
-        yield part
+        temporary.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
+        yield temporary
         if holds_something(folder):
             raise FileExistsError(errno.EEXIST, "another program has written there meanwhile", str(folder))
         if folder.exists():
             folder.rmdir()
-        part.replace(folder)
+        temporary.replace(folder)
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 @contextmanager

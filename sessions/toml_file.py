@@ -224,13 +224,13 @@ def toml_text(value: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbe
 
 def _lines(table: Mapping[str, Any], name: str) -> Iterator[str]:
     """Yield a table's own values, and then the tables inside it."""
-    inside: dict[str, Mapping[str, Any]] = {key: value for key, value in table.items() if isinstance(value, Mapping)}
-    values = {key: value for key, value in table.items() if value is not None and key not in inside}
+    tables: dict[str, Mapping[str, Any]] = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    values = {key: value for key, value in table.items() if value is not None and key not in tables}
     if name and values:
         yield f"\n[{name}]"
     for key, value in values.items():
         yield f"{key} = {_inline(value)}"
-    for key, value in inside.items():
+    for key, value in tables.items():
         yield from _lines(value, f"{name}.{key}" if name else key)
 
 
@@ -257,7 +257,7 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
 
 
 def _escape(character: str) -> str:
-    """Return a character of a text in quotes, or its escape where a terminal would obey it or nobody would see it."""
+    """Return a character of a text in quotes, or its escape where a terminal would obey it or not show it."""
     if character.isprintable():
         return character
     code = ord(character)

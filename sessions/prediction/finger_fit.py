@@ -24,13 +24,13 @@ _POINTS = 16  # of one press, each the mean over as much of its travel: noise of
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
 # Halving and doubling these moved ends of intervals by so much of their width, over twelve simulated fingers.
 _DRAWS = 20_000  # of the posterior: 0.2 % in the median
-_FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer tell hardly the noise
+_FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer hardly estimate the noise
 _GRID = 25  # contrasts along each axis: 0.5 % with 49, 2 % with 13 in the median
 _ROUNDS, SETTLED = 12, 1e-5  # of the search for touches: 0.2 % at most; it ends when sums of squares fall by less
 _FINE = 200.0  # nodes that carry the posterior (inverse Simpson index), else the grid is drawn closer: not at all
 CLOSER = 4  # grids at most
 QUANTILES = (0.025, 0.975)
-NARROW = 0.8  # of the prior's width: a narrower interval says that presses tell something of a layer
+NARROW = 0.8  # of the prior's width: a narrower interval says that presses inform about a layer
 
 
 class LoadingCurve(NamedTuple):
@@ -39,7 +39,7 @@ class LoadingCurve(NamedTuple):
     displacement: Array  # (n,) of the stage or bone, positive into the finger [mm]
     force: Array  # (n,) normal [N]
     touch: float  # displacement at which the force leaves its zero [mm]
-    width: Array  # (n,) length of the contact along the finger [mm]; nan where nobody measured it
+    width: Array  # (n,) length of the contact along the finger [mm]; nan where it was not measured
     readings: int = 0  # that the points are means of
 
     @staticmethod
@@ -119,8 +119,8 @@ class Likelihood:
         )
         self.press = np.repeat(np.arange(len(presses)), [len(press.force) for press in presses])
         self.presses = self.press == np.arange(len(presses))[:, None]
-        self.free = len(self.force) - 1 - len(presses)
-        if self.free < _FEWEST:
+        self.dof = len(self.force) - 1 - len(presses)
+        if self.dof < _FEWEST:
             raise FitError(
                 f"{len(self.force)} points of {len(presses)} presses are too few: press deeper, slower, or more often."
             )
@@ -152,7 +152,7 @@ class Likelihood:
         normal = np.swapaxes(jacobian, 1, 2) @ jacobian
         variance = np.asarray(np.linalg.inv(normal)[:, 0, 0], np.float64)
         prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
-        fits = -(self.free * np.log(misfit + self.floor) + self._width_deviance(contrast, touch)) / 2.0
+        fits = -(self.dof * np.log(misfit + self.floor) + self._width_deviance(contrast, touch)) / 2.0
         log_posterior = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
         return _Grid(contrast, mean, touch, misfit, variance, fits, softmax(log_posterior), softmax(fits), step)
 
@@ -177,7 +177,7 @@ class Likelihood:
     def maximum(self, grid: _Grid) -> tuple[Array, Array, float]:
         """Return contrast (2,), touches and mean of the posterior's maximum."""
         best = int(np.argmax(grid.weight))
-        sigma = float(np.sqrt((grid.misfit[best] + self.floor) / self.free))
+        sigma = float(np.sqrt((grid.misfit[best] + self.floor) / self.dof))
         start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
         width_deviance = float(self._width_deviance(grid.contrast[best][None], grid.touch[best][None])[0])
         width_sigma = float(np.exp(width_deviance / max(len(self.wide), 1) / 2.0)) / max(len(self.wide), 1) ** 0.5
@@ -208,8 +208,8 @@ class Likelihood:
         log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
         # Likelihood-ratio interval: the deviance may exceed its minimum by CHI_SQUARED, at each contrast by the rest.
         margin = CHI_SQUARED - 2.0 * (fits.max() - fits)
-        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(margin, 0.0) / self.free))
-        half = np.where(margin >= 0.0, wide, -np.inf)
+        half_width = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(margin, 0.0) / self.dof))
+        half = np.where(margin >= 0.0, half_width, -np.inf)
         extremes = [int((log - half).argmin()), int((log + half).argmax())]
         rim = np.hypot(*contrast[extremes].T) + 1.5 * step[extremes] > REACH
         low, high = float((log - half)[extremes[0]]), float((log + half)[extremes[1]])
@@ -225,12 +225,12 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
     start = np.array([press.touch for press in presses])
     coarse = likelihood.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
     fine = _closer(likelihood, coarse, "weight")
-    likely = [coarse, fine, _closer(likelihood, coarse, "likelihood")]
+    grids = [coarse, fine, _closer(likelihood, coarse, "likelihood")]
     contrast, touch, mean = likelihood.maximum(fine)
     rng = np.random.default_rng(seed)
     rows = rng.choice(len(fine.weight), _DRAWS, p=fine.weight)
-    scale = np.sqrt((fine.misfit + likelihood.floor) / likelihood.free * fine.variance)
-    means = fine.mean[rows] + scale[rows] * rng.standard_t(likelihood.free, _DRAWS)
+    scale = np.sqrt((fine.misfit + likelihood.floor) / likelihood.dof * fine.variance)
+    means = fine.mean[rows] + scale[rows] * rng.standard_t(likelihood.dof, _DRAWS)
     means += gain_error * rng.standard_normal(_DRAWS)
     best = model.stiffnesses(np.array([mean]), contrast[None])[0]
     draws = model.stiffnesses(means, fine.contrast[rows])
@@ -242,10 +242,10 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
     low, high = np.exp(np.quantile(means + ratio[1:][rows], QUANTILES))
     return FingerFit(
         scene=model.finger(best),
-        layers=tuple(_layer(likelihood, likely, number, best, draws) for number in range(len(LAYERS))),
+        layers=tuple(_layer(likelihood, grids, number, best, draws) for number in range(len(LAYERS))),
         overall=Interval(float(np.exp(mean + ratio[0])), float(low), float(high)),
         touch=tuple(touch.tolist()),
-        noise=float(np.sqrt(fine.misfit.min() / likelihood.free)),
+        noise=float(np.sqrt(fine.misfit.min() / likelihood.dof)),
         points=len(likelihood.force),
         widths=len(likelihood.width),
         deepest=float(depth.max()),
@@ -292,8 +292,8 @@ def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
         centre = np.average(nodes, axis=0, weights=weight[carry])
         spread = (nodes - centre).T @ ((nodes - centre) * weight[carry, None]) / weight[carry].sum()
         axes = np.linalg.eigh(spread)[1].T
-        along = (nodes - centre) @ axes.T
-        low, high = along.min(axis=0) - grid.step, along.max(axis=0) + grid.step
+        coordinates = (nodes - centre) @ axes.T
+        low, high = coordinates.min(axis=0) - grid.step, coordinates.max(axis=0) + grid.step
         middle, half = (low + high) / 2.0 @ axes, (high - low) / 2.0
         grid = likelihood.grid(*_nodes(centre + middle, half[:, None] * axes), grid.touch[int(weight.argmax())])
     return grid

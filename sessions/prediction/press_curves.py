@@ -26,7 +26,7 @@ class DisplacementLog:
     clock: str  # what `instants` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings
     instants: Array  # (n,) growing
     displacement: Array  # (n,) positive into the finger, from anywhere [mm]
-    width: Array  # (n,) of the contact along the finger [mm]; nan where nobody measured it
+    width: Array  # (n,) of the contact along the finger [mm]; nan where it was not measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,8 @@ def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array
     inside = np.flatnonzero((times >= onset) & (times <= peak_time))
     if not len(times) or times[0] > onset or times[-1] < peak_time:
         return "the log does not follow it from its onset to its greatest force"
-    around = times[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else times[:0]
-    if not len(inside) or float(np.diff(around).max(initial=0.0)) > LONGEST_GAP:
+    log_times = times[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else times[:0]
+    if not len(inside) or float(np.diff(log_times).max(initial=0.0)) > LONGEST_GAP:
         return f"the log has a gap of more than {LONGEST_GAP:g} s in it"
     loading = (curve.time >= onset) & (curve.time <= peak_time) & np.isfinite(curve.normal)
     travel = np.interp(curve.time[loading], times, displacement)
@@ -97,12 +97,12 @@ def _loading(curve: StrokeCurve, onset: float, times: Array, displacement: Array
             f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
             "mm is no press: displacement must be positive into the finger, on the session's clock"
         )
-    lengths = np.interp(curve.time[loading][:count], times, width)  # nan beside every row that has none
+    lengths = np.interp(curve.time[loading][:count], times, width)  # nan next to every row that has none
     return LoadingCurve.of(travel, force, lengths)
 
 
 def _hold(curve: StrokeCurve, onset: float, times: Array, displacement: Array) -> HoldCurve | None:
-    """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
+    """Return the readings of a press to the end of its hold; None where the stage stands too briefly."""
     inside = (curve.time >= onset) & (curve.time <= times[-1]) & np.isfinite(curve.normal)
     time, force = curve.time[inside], curve.normal[inside]
     travel = np.interp(time, times, displacement)

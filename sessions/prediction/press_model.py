@@ -4,7 +4,7 @@ At small strain N is linear in all stiffnesses together, so only two contrasts b
 the depth. Over them log N is a polynomial through solved forces and their exact derivatives by each stiffness.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ CONTRASTS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.
 REACH = 3.3  # contrasts reach so many deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
 DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
 RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
-DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives nobody has: 15 numbers
+DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives are not known: 15 numbers
 DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 2 to 13 % over contrasts and depths
 RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
 DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
@@ -74,11 +74,6 @@ class PressModel:
         reference = [self.scene.materials.of(name).E for name in LAYERS]
         return np.array(reference) * np.exp(mean[:, None] + self.spread * contrast @ CONTRASTS)
 
-    def fingers(self, contrast: Array) -> Iterator[Scene]:
-        """Yield the scene with layers of each `contrast` (g, 2)."""
-        for stiffness in self.stiffnesses(np.zeros(len(contrast)), contrast):
-            yield self.finger(stiffness)
-
     def finger(self, stiffness: Array) -> Scene:
         """Return the scene with layers of a `stiffness` (3,) [MPa], that at the speed of the presses: none relaxes."""
         materials, moduli = self.scene.materials, zip(LAYERS, stiffness.tolist(), strict=True)
@@ -99,26 +94,27 @@ def press_model(
     count = len(contrast) + len(sticking)
     force, width, slope = (np.empty((len(contrast), *shape, DEPTHS)) for shape in ((), (), (2,)))
     errors: list[float] = []
-    wide = np.zeros(DEPTHS)
+    width_error = np.zeros(DEPTHS)
     blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
-    for number, finger in enumerate(blank.fingers(contrast)):
+    for number, stiffness in enumerate(blank.stiffnesses(np.zeros(len(contrast)), contrast)):
         report_part(progress, number / count)
-        presses = _solve_presses(finger, depth, 0.0)
+        presses = _solve_presses(blank.finger(stiffness), depth, 0.0)
         force[number] = np.log([press.normal_force for press in presses])
         shares = stiffness_shares(presses)[:, : len(LAYERS)]
         slope[number] = spread * CONTRASTS @ shares.T
         width[number] = np.log([press.contact_width for press in presses])
         errors += [press.normal_force_error or 0.0 for press in presses]
-        wide += np.array([press.contact_width_error or 0.0 for press in presses]) / len(contrast)
+        width_error += np.array([press.contact_width_error or 0.0 for press in presses]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
     targets = np.vstack([force, slope[:, 0], slope[:, 1]])
     coefficients = np.linalg.lstsq(basis, targets, rcond=None)[0]
     residual = basis[: len(contrast)] @ coefficients - force
     if mu:
         shape = np.empty((len(sticking), DEPTHS))
-        for number, finger in enumerate(blank.fingers(sticking)):
+        for number, stiffness in enumerate(blank.stiffnesses(np.zeros(len(sticking)), sticking)):
             report_part(progress, (len(contrast) + number) / count)
-            shape[number] = np.log([press.normal_force for press in _solve_presses(finger, depth, mu)])
+            presses = _solve_presses(blank.finger(stiffness), depth, mu)
+            shape[number] = np.log([press.normal_force for press in presses])
         shape -= _basis(sticking, DEGREE)[0] @ coefficients
         basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
         friction = np.linalg.lstsq(basis, shape, rcond=None)[0]
@@ -127,8 +123,8 @@ def press_model(
     error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(residual**2))))
     basis = _basis(contrast, DEGREE_OF_WIDTH)[0]
     width_coefficients = np.linalg.lstsq(basis, width, rcond=None)[0]
-    wide = np.hypot(wide, np.sqrt(np.mean((basis @ width_coefficients - width) ** 2, axis=0)))
-    return replace(blank, coefficients=coefficients, width=width_coefficients, error=error, width_error=wide)
+    width_error = np.hypot(width_error, np.sqrt(np.mean((basis @ width_coefficients - width) ** 2, axis=0)))
+    return replace(blank, coefficients=coefficients, width=width_coefficients, error=error, width_error=width_error)
 
 
 class Check(NamedTuple):
@@ -145,10 +141,10 @@ def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
     upto = np.flatnonzero(model.depth <= deepest)[-CHECK_DEPTHS:]
     depth = model.depth[upto]
     fitted = model.log_force(contrast[None])[0, upto] + mean
-    free = _solve_presses(finger, depth, 0.0)
-    sticking = _solve_presses(finger, depth, model.mu) if model.mu else free
+    frictionless = _solve_presses(finger, depth, 0.0)
+    sticking = _solve_presses(finger, depth, model.mu) if model.mu else frictionless
     deviation = np.abs(np.exp(fitted) / np.array([press.normal_force for press in sticking]) - 1.0)
-    return Check(float(deviation.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
+    return Check(float(deviation.max()), stiffness_shares(frictionless[-1:])[0, : len(LAYERS)])
 
 
 def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
@@ -170,13 +166,13 @@ def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
 def _solve_presses(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
     """Return presses with friction; without it those of a slide, which are the same states."""
     slide: Slide = "none" if mu else "+x"
-    loads = [Loading(float(one), slide) for one in depth]
+    loads = [Loading(float(loading), slide) for loading in depth]
     solve_settings = Solve(tolerance=_TOLERANCE, evidence="quick")
     try:
-        scenes = [replace(finger, friction=Friction(mu), loading=one, solve=solve_settings) for one in loads]
+        scenes = [replace(finger, friction=Friction(mu), loading=loading, solve=solve_settings) for loading in loads]
     except SceneError as unfit:
         raise FitError(f"The presses do not fit this finger: {unfit}") from unfit
-    states = [one for one in settled_predictions(scenes) if one is not None]
+    states = [loading for loading in settled_predictions(scenes) if loading is not None]
     if len(states) < len(scenes):
         raise FitError(
             f"The model has no press of {depth[-1]:.2f} mm on this finger: leave out presses that are so deep, or give "

@@ -20,7 +20,7 @@ from sessions.prediction.finger_fit import QUANTILES, FingerFit, Interval, Loadi
 from sessions.prediction.press_model import LAYERS, FitError, PressModel
 from solver import Relaxation, Scene
 
-BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they hang together for about that [s]
+BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they are correlated for about that [s]
 GRID_SIZE = 60  # of each number at once, between bounds that are drawn closer ...
 _ROUNDS = 5  # ... so many times at most, until ...
 _FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
@@ -88,7 +88,7 @@ def relaxing_fit(
     """Return the stiffnesses at once of a finger that relaxes, and how it does, from presses that are all held.
 
     A press is too slow to be elastic, and what relaxes on its way bends the force over depth. So both are found in
-    turns: the relaxation for the finger, and the finger for forces out of which the relaxation was taken. Raises
+    turns: the relaxation for the finger, and the finger for forces without the relaxation. Raises
     FitError where no press is held.
     """
     finger_fit = fit(model, presses, gain_error, seed)

@@ -5,6 +5,7 @@ All scenes of a session are solved together on one mesh, so that differences are
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from sessions.plan.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
@@ -27,12 +28,11 @@ from solver.response.nearby import By, Nearby, nearby
 from solver.scene.published import BOUND_SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
-CONTRAST = 0.05  # error of differences between surfaces, by their range: far below what scores tell apart
+CONTRAST = 0.05  # error of differences between surfaces, by their range: far below what scores distinguish
 DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
 
 
-@dataclass(frozen=True, slots=True)
-class ModelInput:
+class ModelInput(NamedTuple):
     """The row and the scene of one trial or stroke, before it is solved."""
 
     row: TrialPrediction  # as far as it is known before solving
@@ -42,8 +42,7 @@ class ModelInput:
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
     """Return the scene of each trial that `predict` would solve, by the trial's number."""
     inputs = model_inputs(analysis, plan, with_own_finger(options, plan))
-    scenes = ((model_input.row.trial, model_input.scene) for model_input in inputs)
-    return {trial: scene for trial, scene in scenes if trial is not None and scene is not None}
+    return {row.trial: scene for row, scene in inputs if row.trial is not None and scene is not None}
 
 
 def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Iterator[ModelInput]:
@@ -119,7 +118,7 @@ def _missing_reason(row: TrialPrediction, stroke: Stroke | None) -> str | None:
 
 
 def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
-    assert row.mu is not None  # `_missing` said so, and the same of the next two
+    assert row.mu is not None  # `_missing_reason` has checked these three
     assert row.indentation is not None
     assert row.direction is not None
     base = template(options)
@@ -189,7 +188,7 @@ def predict_scenes(scenes: Sequence[Scene], progress: Progress | None = None) ->
 
 
 def quick(scene: Scene) -> Scene:
-    """Return a scene whose evidence nobody will read: to march it takes as long as the answer."""
+    """Return a scene without the long estimates of omitted effects, which take as long as the answer."""
     return replace(scene, solve=replace(scene.solve, evidence="quick"))
 
 
@@ -275,16 +274,16 @@ def predict(
     """
     options = with_own_finger(options or PredictionOptions(), plan)
     inputs, width = list(model_inputs(analysis, plan, options)), template(options).finger.width
-    rows = [model_input.row for model_input in inputs]
-    scene_of_row = {n: scene for n, model_input in enumerate(inputs) if (scene := model_input.scene) is not None}
+    rows = [row for row, _ in inputs]
+    scene_of_row = {n: scene for n, (_, scene) in enumerate(inputs) if scene is not None}
     report: Watch = watch or (lambda _number, _row, _path: None)
     for number, row in enumerate(rows):
         if number not in scene_of_row:
             report(number, row, None)
     order = sorted(scene_of_row, key=lambda n: (n != first, n))
     scenes = [scene_of_row[n] for n in order]
-    small = options.kinematics == "small"  # a depth is matched on its finger, which finite strain would put elsewhere
-    forces = [rows[n].measured_normal if small else None for n in order]
+    is_small = options.kinematics == "small"  # a depth is matched on its finger: finite strain would put it elsewhere
+    forces = [rows[n].measured_normal if is_small else None for n in order]
     depths = _depths(scenes, [None if force is None else force / width for force in forces])
     solutions: dict[int, SolutionPath] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
@@ -296,8 +295,8 @@ def predict(
         number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
     ) -> None:
         answers[number] = answer
-        position, back = divmod(number, 2)
-        if not back:
+        position, is_opposite = divmod(number, 2)
+        if not is_opposite:
             solutions[position] = SolutionPath(scenes[position], finger, march)
         elif 2 * position in answers:
             report(order[position], fill_row(position), solutions.get(position))
@@ -306,7 +305,7 @@ def predict(
     answers |= dict(enumerate(solve_many(pairs, progress, take_answer if watch else None)))
     for position, number in enumerate(order):
         rows[number] = fill_row(position)
-        if not small:
+        if not is_small:
             report(number, rows[number], None)
     return SessionPrediction(
         simulated=analysis.simulated,
@@ -329,10 +328,10 @@ def _depths(scenes: Sequence[Scene], forces: Sequence[float | None]) -> list[flo
 
 
 def _fill_row(
-    model_input: ModelInput, answer: Prediction | SolveFailure, back: Prediction | SolveFailure, depth: float | None
+    model_input: ModelInput, answer: Prediction | SolveFailure, mirror: Prediction | SolveFailure, depth: float | None
 ) -> TrialPrediction:
     """Return the row with the solver's numbers, and with the reason for each one that is missing."""
-    row, scene = model_input.row, model_input.scene
+    row, scene = model_input
     assert scene is not None  # the caller solved it
     reasons: dict[str, str] = {}
     if depth is None:
@@ -344,11 +343,11 @@ def _fill_row(
             reason = "The model would have to be pressed nearly to its bone, or has no settled state there."
             reasons["matching_depth"] = reason
     row = replace(row, matching_depth=depth)
-    if isinstance(back, SolveFailure):
-        reasons["opposite_sed"] = str(back)
+    if isinstance(mirror, SolveFailure):
+        reasons["opposite_sed"] = str(mirror)
     else:
-        error = known_error(back, back.error_estimate)
-        row = replace(row, opposite_sed=back.sed_ending, opposite_error=error, opposite=back)
+        error = known_error(mirror, mirror.error_estimate)
+        row = replace(row, opposite_sed=mirror.sed_ending, opposite_error=error, opposite=mirror)
     if isinstance(answer, SolveFailure):
         reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(answer))
         return replace(row, reasons=reasons)

@@ -1,7 +1,7 @@
 """Predictions sealed before anybody may know which score belongs to which stimulus, and what a report says of it.
 
 The seal is a file in the session's folder: what was predicted, its SHA-256 and the time. `daq-app unblind` writes the
-SHA-256 of that file beside the key it opens, so a seal that came later, or was changed, is found.
+SHA-256 of that file with the key it opens, so that a later or changed seal is detected.
 """
 
 import hashlib

@@ -61,10 +61,10 @@ class Variant:
         >>> Variant("finite", "as-printed", "depth").sentence
         'finite strain, tau_max as printed, at the planned depth'
         """
-        return f"{self.kinematics} strain, {self.way}"
+        return f"{self.kinematics} strain, {self.conditions}"
 
     @property
-    def way(self) -> str:
+    def conditions(self) -> str:
         """It, without the strain."""
         reading = "tau_max as printed, " if self.tau_reading == "as-printed" else ""
         return f"{reading}{_DRIVEN[self.driven]}"
@@ -113,7 +113,7 @@ def variants(choice: Literal["none", "small", "both"]) -> Iterator[Variant]:
         yield Variant(kinematics, "computed", "other way")
 
 
-_OPTIONAL = ("interval", "opposite_interval")  # of a row as plain data: absent where nobody asked for them
+_OPTIONAL = ("interval", "opposite_interval")  # of a row as plain data: absent unless asked for
 _PARTS = ("stimulus", *_OPTIONAL)
 
 # Options as they were called until 2026-11-26, and what they are called now. Documents hold both names for one release.
@@ -170,7 +170,7 @@ class TrialNumbers:
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
     interval: SedInterval | None = None  # of `sed`, where it was asked for
     opposite_interval: SedInterval | None = None  # of `opposite_sed`
-    # Estimated by the solver, relative [-]: None where there is no such number, or nobody solved for its error
+    # Estimated by the solver, relative [-]: None where there is no such number, or its error was not solved for
     normal_force_error: float | None = None
     tangential_force_error: float | None = None
     opposite_error: float | None = None
@@ -347,17 +347,14 @@ def _values(table: Mapping[str, Any]) -> str:
     >>> _values({"E": 0.08, "law": None, "prony": ({"g": 0.2, "tau": 0.07},)})
     'E 0.08; prony (g 0.2, tau 0.07)'
     """
-    return "; ".join(f"{name.replace('_', ' ')} {_value(value)}" for name, value in table.items() if _is_set(value))
-
-
-def _is_set(value: object) -> bool:
-    return value is not None and value != ()
+    items = ((name.replace("_", " "), value) for name, value in table.items() if value not in (None, ()))
+    return "; ".join(f"{name} {_value(value)}" for name, value in items)
 
 
 def _value(value: Any) -> str:  # noqa: ANN401  whatever a scene file holds
     if isinstance(value, Mapping):
-        inside = cast("Mapping[str, Any]", value)
-        return ", ".join(f"{name} {_value(item)}" for name, item in inside.items() if _is_set(item))
+        items = cast("Mapping[str, Any]", value).items()
+        return ", ".join(f"{name} {_value(item)}" for name, item in items if item not in (None, ()))
     if isinstance(value, tuple):
         return "(" + ", ".join(_value(item) for item in cast("tuple[Any, ...]", value)) + ")"
     return value if isinstance(value, str) else f"{value:g}"

@@ -31,7 +31,7 @@ class Press:
 
 @dataclass(frozen=True, slots=True)
 class Slopes:
-    """How every quantity at the ending goes with the surfaces of one series. nan where too few have an answer."""
+    """The relation of every quantity at the ending to the surfaces of one series. nan where too few have an answer."""
 
     surfaces: int  # with a settled state
     with_index: Array  # (q,) correlation with the maker's index [-]

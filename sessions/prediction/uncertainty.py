@@ -2,7 +2,7 @@
 
 The draws of the friction's bootstrap go through the solver. Derivatives from its converged tangent carry all of them.
 Whether that suffices is seen from a few draws that are solved: those at both ends of the interval, and those at both
-ends of every direction in which the draws spread, for those of mu and tau_max hang together. Where it does not, the
+ends of every direction in which the draws spread, since those of mu and tau_max are correlated. Where it does not, the
 solver is run at draws themselves. Each interval says which. A trial predicted by the force measured has the uncertainty
 of that force in it too.
 
@@ -66,10 +66,10 @@ def with_intervals(
     if both_ways:
         answers += [row.opposite or _reason(row, "opposite_sed") for row in rows]
     intervals = intervals_of(answers, [*draws, *draws][: len(answers)], tau_scale(prediction.options), progress)
-    back = intervals[len(rows) :] or [None] * len(rows)
+    opposite_intervals = intervals[len(rows) :] or [None] * len(rows)
     trials = tuple(
         replace(row, interval=interval, opposite_interval=opposite)
-        for row, interval, opposite in zip(rows, intervals[: len(rows)], back, strict=True)
+        for row, interval, opposite in zip(rows, intervals[: len(rows)], opposite_intervals, strict=True)
     )
     return replace(prediction, trials=trials)
 
@@ -178,7 +178,7 @@ def _loads(scene: Scene, friction: DrawsOrReason, scale: float) -> tuple[tuple[s
 def _extremes(linear: Array, draws: Array) -> Indices:
     """Return the draws at both ends of the interval carried, and of each direction in which draws (repeats, p) spread.
 
-    The directions are the principal components of the draws, each load by its own spread: where loads hang together,
+    The directions are the principal components of the draws, each load by its own spread: where loads are correlated,
     the corners that the draws do reach.
 
     >>> _extremes(np.arange(5.0), np.array([[0.0, 0.0], [1.0, 1.1], [2.0, 1.9], [3.0, 3.0], [4.0, 4.2]])).tolist()
@@ -206,7 +206,7 @@ def with_alternatives(
     columns: list[tuple[Alternative, ...]] = []
     for n, variant in enumerate(all_variants):
         variant_draws = draws if variant.kinematics == "small" or options.variant_intervals else None
-        columns.append(_along(prediction, variant, variant_draws, part_of(progress, n / count, (n + 1) / count)))
+        columns.append(_alternatives(prediction, variant, variant_draws, part_of(progress, n / count, (n + 1) / count)))
     trials = tuple(
         _with_depth(replace(row, alternatives=tuple(answers[number] for answers in columns)), options)
         for number, row in enumerate(prediction.trials)
@@ -234,7 +234,7 @@ def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPredic
     )
 
 
-def _along(
+def _alternatives(
     prediction: SessionPrediction, variant: Variant, draws: Sequence[DrawsOrReason] | None, progress: Progress | None
 ) -> tuple[Alternative, ...]:
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""

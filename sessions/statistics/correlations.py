@@ -16,13 +16,13 @@ TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the end
 LEAST_CASES = 3  # of a jackknife
 _EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
 
-POWER = 0.8  # with which a study should tell two correlations apart (Cohen 1988, p. 56)
+POWER = 0.8  # with which a study should distinguish two correlations (Cohen 1988, p. 56)
 _PERFECT = 1.0 - 1e-12  # Fisher's z has no value at 1
 
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """How y goes with x over n stimuli. A number is None where `reason` says why."""
+    """The relation of y to x over n stimuli. A number is None where `reason` says why."""
 
     n: int
     pearson: float | None = None
@@ -39,7 +39,7 @@ class Relation:
 
 
 def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> Relation:
-    """Return how y goes with x; `labels` name the points (their stimulus' index).
+    """Return the relation of y to x; `labels` name the points (their stimulus' index).
 
     Pearson's r with its 95 % interval by Fisher's z, which takes four points and |r| < 1; Spearman's rho with its
     exact p up to seven points; the least-squares line of y on x.
@@ -110,7 +110,7 @@ def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
 def fisher_interval(r: float, n: int, inflation: float = 1.0) -> tuple[float | None, float | None]:
     """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
 
-    None for fewer than four points, or where all points agree wholly or are each other's reverse.
+    None for fewer than four points, or for a perfect correlation of either sign.
     """
     if n < 4 or abs(r) > _PERFECT:
         return None, None
@@ -174,7 +174,7 @@ def steiger_z(first: float, second: float, mutual: float, n: int) -> float | Non
 
 
 def required_cases(first: float, second: float, mutual: float) -> int | None:
-    """Return how many cases Steiger's test needs to tell these correlations apart at p < 0.05 with `POWER`.
+    """Return how many cases Steiger's test needs to distinguish these correlations at p < 0.05 with `POWER`.
 
     None where no number of cases would: the correlations are equal, or the test has no value.
     """

@@ -122,7 +122,7 @@ class DescriptorFindings:
 
 
 class EffectRecovery(msgspec.Struct, frozen=True):
-    """The true value of an effect beside the study's estimate of it."""
+    """The true value of an effect and the study's estimate of it."""
 
     descriptor: str
     effect: str
@@ -245,7 +245,7 @@ def check_ground_truth(document: object) -> dict[str, Any]:
 def effect_recoveries(
     descriptors: Sequence[DescriptorFindings], ground_truth: Mapping[str, Any]
 ) -> tuple[EffectRecovery, ...]:
-    """Return the true effects on the score, and spreads, beside their estimates.
+    """Return the true effects on the score, and spreads, with their estimates.
 
     `ground_truth["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
     """
@@ -276,7 +276,7 @@ def _true_values(descriptor: str, ground_truth: Mapping[str, Any]) -> dict[str, 
 def _estimates(findings: DescriptorFindings) -> dict[str, tuple[float, float, float]]:
     """Return the estimate and the ends of its interval of each effect that has a true value, by its name in `UNITS`.
 
-    How scores go with SEDs has the intervals for people at large on these surfaces.
+    Relations of scores to SEDs have the intervals for other people on the same surfaces.
     """
     terms: list[Term] = []
     spreads: dict[str, Spread | None] = {}

@@ -50,7 +50,7 @@ class _Likelihood:
 
     @property
     def dof(self) -> int:
-        """Values that tell the variance of e."""
+        """Degrees of freedom of the variance of e."""
         return self.n - len(self.offset) * self.reml
 
     def reduce(self, theta: Array) -> tuple[Array, Array, float]:
@@ -120,7 +120,7 @@ class Fit:
     within: float  # standard deviation of what is left
     deviance: float  # -2 log restricted likelihood, but for a constant of the design
     singular: bool  # `among` has not full rank
-    exact: bool  # hardly anything is left
+    exact: bool  # the residuals are round-off
 
 
 def reml_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, random_terms: int) -> Fit:
@@ -173,7 +173,7 @@ def crossed_deviance(
     """Return -2 log likelihood of y (n) as intercept + slope x + level of the subject + level of the surface + error.
 
     By maximum likelihood. Models of the same scores with different x have as many parameters: their AICs differ as
-    their deviances do. None where x does not vary, or where the fixed terms leave nothing to tell an error from.
+    their deviances do. None where x does not vary, or where the fixed terms leave no residuals.
     """
     covariate = np.asarray(x, np.float64) - np.mean(x)
     size = float(np.abs(covariate).max())
@@ -343,20 +343,21 @@ def spreads(
     square = float(residuals @ residuals) / dof
     coefficients, errors = inverse @ values / scale, inverse @ inverse.T / np.outer(scale, scale)
 
-    def between(first: int) -> Spread:
+    def spread_of(first: int) -> Spread:
         block = slice(first, first + count)
         error = errors[block, block]
         share = float(np.trace(error) - error.mean(axis=0).sum()) / (count - 1)  # of `square` in the mean square
         return difference_of_squares(float(coefficients[block].var(ddof=1)), count - 1, share * square, dof)
 
     sd = math.sqrt(square)
-    return Spreads(between(0), None if x is None else between(count), Spread(sd, *sd_interval(sd, dof + 1)), count, dof)
+    residual = Spread(sd, *sd_interval(sd, dof + 1))
+    return Spreads(spread_of(0), None if x is None else spread_of(count), residual, count, dof)
 
 
 def difference_of_squares(first: float, first_dof: int, second: float, second_dof: int) -> Spread:
     """Return the root of `first` less `second`, two independent mean squares.
 
-    Its lower end is 0 exactly where an F test does not tell the two apart.
+    Its lower end is 0 exactly where an F test does not distinguish the two.
     """
 
     def margin(tail: float, opposite: float) -> float:

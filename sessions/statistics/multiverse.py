@@ -1,6 +1,6 @@
 """One recording along many paths: every reasonable choice of the analysis crossed with every other (a multiverse).
 
-What a study concludes should not hang on a choice that somebody else would have made differently (Steegen, Tuerlinckx,
+What a study concludes should not depend on a choice that others would have made differently (Steegen, Tuerlinckx,
 Gelman and Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is found along each path, and contact is solved
 at every friction that is met: nothing is interpolated.
 """
@@ -108,12 +108,12 @@ def trial_paths(
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
     steady = replace(prediction.options, course="steady")
     analyses = _analyses(recording)
-    usual = {friction.trial: friction for friction in next(iter(analyses.values())).friction}
-    scenes: dict[Path, Mapping[int, Scene]] = {}  # whichever receptor answers
+    usual_friction = {friction.trial: friction for friction in next(iter(analyses.values())).friction}
+    scenes: dict[Path, Mapping[int, Scene]] = {}  # for either receptor
     for path in paths:
         if path.receptor == RECEPTORS[0]:
             options = replace(steady, kinematics=path.kinematics)
-            scenes[path] = scenes_of(_path_analysis(analyses, path, usual), recording.plan, options)
+            scenes[path] = scenes_of(_path_analysis(analyses, path, usual_friction), recording.plan, options)
     targets = dict.fromkeys(scene for by_trial in scenes.values() for scene in by_trial.values())
     predictions = [row.prediction for row in prediction.trials if row.prediction is not None]
     answers = _solve_scenes(tuple(targets), predictions, quantity, progress)
@@ -224,13 +224,13 @@ class PathTrial:
 def path_findings(
     trials: Sequence[PathTrial], kinematics: str, law: AreaLaw = FIXED, *, within: bool
 ) -> tuple[PathFinding, ...]:
-    """Return how predictions go with scores along each path, also `within` subjects; empty where no trial has paths."""
-    along = [trial for trial in trials if trial.values]
-    if not along:
+    """Return the correlation of predictions with scores along each path, also `within` subjects; () without paths."""
+    path_trials = [trial for trial in trials if trial.values]
+    if not path_trials:
         return ()
-    rule, path_count = along[0].rule, min(len(trial.values) for trial in along)
+    rule, path_count = path_trials[0].rule, min(len(trial.values) for trial in path_trials)
     return tuple(
-        _finding(n, path, along, usual=path.usual(rule, kinematics, law), within=within)
+        _finding(n, path, path_trials, usual=path.usual(rule, kinematics, law), within=within)
         for n, path in enumerate(PATHS[:path_count])
     )
 

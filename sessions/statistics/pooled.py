@@ -1,4 +1,4 @@
-"""What the visits of a study say together: means, agreement, and how predictions go with scores. Plain data."""
+"""The findings of all visits of a study: means, agreement, and how scores correlate with predictions."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -128,7 +128,7 @@ def _descriptor(
     rows = [(visit.subject, row, row.response(quantity.name), row.score) for visit, row in trials]
     score_rows = [(subject, row, score) for subject, row, _, score in rows if score is not None]
     points = [(subject, row, x, score) for subject, row, x, score in rows if x is not None and score is not None]
-    plain = tuple((subject, row.index, x, score) for subject, row, x, score in points)
+    number_points = tuple((subject, row.index, x, score) for subject, row, x, score in points)
     responses = [(subject, x, score) for subject, _, x, score in points]
     pairs = choices(trials)
     scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
@@ -142,14 +142,14 @@ def _descriptor(
         agreement=agreement(matrix),
         surfaces=tuple(_surface(index, quantity.name, by_index[index]) for index in indices),
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
-        points=plain,
-        mean_relation=_relation(plain),
-        repeated=_within(responses),
+        points=number_points,
+        mean_relation=_relation(number_points),
+        repeated=_correlation_within(responses),
         repeated_holm=None,
         rivals=rivals_within(rival_trials, quantity.label),
         rivals_of_means=rivals_of_surfaces(rival_trials, quantity.label),
         without_subject=_without_subject(responses),
-        normalised=_normalise(z_scores(matrix), plain),
+        normalised=_normalise(z_scores(matrix), number_points),
         differences=differences(matrix),
         estimates=estimates(trials, quantity.name),
         exponent=exponent(trials),
@@ -173,7 +173,7 @@ def _descriptor(
 
 
 def rival_values(row: TrialRow) -> dict[str, float]:
-    """Return the quantities of a trial that may go with its score, by their names in `rivals.RIVAL_NAMES`."""
+    """Return the quantities of a trial that its score may follow, by their names in `rivals.RIVAL_NAMES`."""
     numbers = {name: getattr(row, attribute) for name, attribute in STROKE_FIELDS.items()}
     numbers |= {label: row.response(name) for label, name in RESPONSES.items()}
     return {name: value for name, value in numbers.items() if value is not None}
@@ -232,7 +232,7 @@ def _surface(index: int, quantity: str, trials: Trials) -> SurfaceMean:
 
 
 def _relation(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
-    """Return how mean scores go with mean responses, of points that have both: subject, index, response and score."""
+    """Return the relation of mean scores to mean responses, of points of subject, index, response and score."""
     responses = surface_means([(subject, index, x) for subject, index, x, _ in points])
     scores = surface_means([(subject, index, score) for subject, index, _, score in points])
     if responses is None or scores is None:
@@ -240,7 +240,7 @@ def _relation(points: Sequence[tuple[str, int, float, float]]) -> Relation | Non
     return relation(list(responses.values()), list(scores.values()), list(responses))
 
 
-def _within(points: Sequence[tuple[str, float, float]]) -> RepeatedCorrelation | None:
+def _correlation_within(points: Sequence[tuple[str, float, float]]) -> RepeatedCorrelation | None:
     """Return the correlation within subjects of points of subject, x and y."""
     return repeated_correlation(*zip(*points, strict=True)) if points else None
 
@@ -249,7 +249,7 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
     """Return the correlation within subjects when each subject in turn is left out."""
     rows: list[tuple[str, float]] = []
     for subject in dict.fromkeys(point[0] for point in points):
-        repeated = _within([point for point in points if point[0] != subject])
+        repeated = _correlation_within([point for point in points if point[0] != subject])
         rows += [] if repeated is None else [(subject, repeated.r)]
     return tuple(rows)
 
@@ -257,7 +257,7 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
 def _normalise(table: Table, points: Sequence[tuple[str, int, float, float]]) -> NormalisedScores:
     """Return statistics of standardised scores; `points` are subject, index, response to its own stroke, score."""
     pairs = [(subject, i, x, table[subject][i]) for subject, i, x, _ in points if i in table.get(subject, {})]
-    within = _within([(subject, x, score) for subject, _, x, score in pairs])
+    within = _correlation_within([(subject, x, score) for subject, _, x, score in pairs])
     return NormalisedScores(_averages(table), _relation(pairs), within)
 
 
@@ -271,7 +271,7 @@ def _averages(table: Table) -> dict[int, Average]:
 
 
 def estimates(trials: Trials, quantity: str) -> Estimates | None:
-    """Return what magnitude estimates say, beside that quantity of the model; None where nobody gave any."""
+    """Return the means of magnitude estimates and their relation to that quantity; None without estimates."""
     rows = [(visit.subject, row, row.estimate) for visit, row in trials if row.estimate is not None]
     if not rows:
         return None
@@ -284,11 +284,11 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
     }
     responses = [(subject, x, log) for subject, row, log in logs if (x := row.response(quantity)) is not None]
     left_out = tuple(sorted(no_logarithm))
-    return Estimates(_averages(table), _averages(equal_moduli(table)), _within(responses), left_out)
+    return Estimates(_averages(table), _averages(equal_moduli(table)), _correlation_within(responses), left_out)
 
 
 def exponent(trials: Trials) -> Exponent | None:
-    """Return Stevens' exponent of magnitude estimates by the µ of the same strokes; None where nobody gave any."""
+    """Return Stevens' exponent of magnitude estimates by the µ of the same strokes; None without estimates."""
     if all(row.estimate is None for _, row in trials):
         return None
     complete = [
@@ -314,7 +314,7 @@ def choices(trials: Trials) -> list[Choice]:
 
 
 def constant_stimuli(trials: Trials) -> ConstantStimuli | None:
-    """Return the psychometric function of each subject who compared with a standard; None where nobody did."""
+    """Return the psychometric function of each subject who compared with a standard; None without one."""
     by_subject = by_key((visit.subject, (visit, row)) for visit, row in trials if row.standard is not None)
     functions = {
         subject: subject_function(answers)
@@ -356,6 +356,6 @@ def latent_scales(
             by_judgement["choices"] = scale.values
     if jnd is not None and jnd.low is not None and jnd.high is not None:
         log_mu = by_key((row.index, math.log(row.mu)) for _, row in trials if row.standard is not None and row.mu)
-        middle = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(log_mu.items())}
-        by_judgement["comparisons"] = latent_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
+        mean_mu = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(log_mu.items())}
+        by_judgement["comparisons"] = latent_comparisons(mean_mu, (jnd.mean, jnd.low, jnd.high))
     return {judgement: values for judgement, values in by_judgement.items() if values}

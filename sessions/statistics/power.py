@@ -1,9 +1,9 @@
-"""What a study's design can tell: the power of its own test, and how often it names the quantity that scores follow.
+"""What a study's design can show: the power of its test, and how often it names the quantity that scores follow.
 
 Power is the share of simulated studies whose test detects the assumed effect. For the second question scores are a line
 in one quantity with levels of people and noise. The rivals are all quantities of the report that a stroke has, and the
-one of the greatest Akaike weight is preferred. Twins of the true quantity go with it over all strokes with r of at
-least 0.99 in size. T is left out: with one area it is the bound itself.
+one of the greatest Akaike weight is preferred. Twins of the true quantity correlate with it over all strokes with
+|r| of at least 0.99. T is left out: with one area it is the bound itself.
 """
 
 import math
@@ -177,7 +177,7 @@ def preferred_rivals(weights: Sequence[Mapping[str, float]]) -> list[str]:
 
 
 def twins(strokes: Mapping[str, Array], quantity: str) -> set[str]:
-    """Return the quantity and those that go with it over all strokes."""
+    """Return the quantity and those that correlate with it over all strokes with |r| of at least `TWIN`."""
     finite = np.isfinite(np.stack(list(strokes.values()))).all(axis=0)
     y = strokes[quantity][finite]
     return {name for name, x in strokes.items() if abs(np.corrcoef(x[finite], y)[0, 1]) >= TWIN} | {quantity}

@@ -28,7 +28,7 @@ from sessions.statistics.correlations import CONFIDENCE
 from sessions.statistics.scores import IntervalEstimate, by_key
 
 QUARTILE = float(special.ndtri(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
-LEAST_LEVELS = 3  # of x: two fit any PSE and JND, and tell nothing of lapses
+LEAST_LEVELS = 3  # of x: two fit any PSE and JND, whatever the lapses
 MOST_LAPSES = 0.5  # beyond it an observer mostly guesses, and a lapse cannot be distinguished from a flat slope
 MOST_SCATTER = 1.0  # of the beta law's theta; its correlation is then 1/2, and most cells are answered all one way
 STEEPEST = 100.0  # slope by the spread of levels, beyond which any function is a step for all levels that there are
@@ -63,7 +63,7 @@ class Psychometric:
     # Of answers to one pair in one order; 0: binomial scatter; None where no scatter makes them likelier [-]
     correlation: IntervalEstimate | None = None
     order: IntervalEstimate | None = None  # log ratio that coming second adds; None where orders are not known [-]
-    rises: bool = True  # choices go with the magnitude; False: against it
+    rises: bool = True  # the comparison is chosen more often as its magnitude grows
     log_likelihood: float | None = None
     deviance: float | None = None  # of the binomial law, against a chance of its own for every level and order
     freedom: int | None = None  # degrees of freedom of that deviance
@@ -126,9 +126,9 @@ class _ProfileLikelihood:
         )
         self.scale = np.array([self.spread, 1.0 / self.spread, self.spread, 0.1, 0.1])
         self.parameters = sum(low < high for low, high in self.bounds[:_SCATTER])
-        free = max(len(levels) - self.parameters, 1)
+        dof = max(len(levels) - self.parameters, 1)
         # Root of what the adjusted log likelihood falls by at an end.
-        self.drop = math.sqrt(free / 2.0 * math.log1p(float(special.fdtri(1, free, CONFIDENCE)) / free))
+        self.drop = math.sqrt(dof / 2.0 * math.log1p(float(special.fdtri(1, dof, CONFIDENCE)) / dof))
         self.best, self.likelihood = self._search()
         with_scatter = np.append(self.best[:_SCATTER], _SOME_SCATTER)
         optima = [self._fit({}, start, _PRECISE, adjusted=True) for start in (self.best, with_scatter)]
@@ -175,9 +175,9 @@ class _ProfileLikelihood:
         """Return the bound of an interval towards `sense`: its edge where the likelihood drops too little, or None."""
         edge = self.bounds[parameter][1 if sense > 0.0 else 0]
         value, start = float(self.top[parameter]), self.top
-        beyond = None if parameter in (_PSE, _ORDER) else edge
+        fallback = None if parameter in (_PSE, _ORDER) else edge
         if value == edge:
-            return beyond
+            return fallback
         drops = {value: -self.drop}
 
         def drop(trial: float) -> float:
@@ -196,7 +196,7 @@ class _ProfileLikelihood:
             if outer == edge:
                 break
             inner, step = outer, 2.0 * step
-        return beyond
+        return fallback
 
     def _fit(
         self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False

@@ -1,4 +1,4 @@
-"""What else follows the scores beside a model's quantity: its others, and friction, forces and speed of the strokes."""
+"""How scores correlate with other quantities of the model, and with friction, forces and speed of the strokes."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +28,7 @@ from sessions.statistics.within_subjects import repeated_correlation
 MODEL_SED = SED.label  # the published quantity, to which the others are compared where no other is named
 MODEL_MU = "µ of the model"
 # Name for people, and that of the model's quantities at the receptor.
-RESPONSES: Mapping[str, str] = {one.label: one.name for one in BY_NAME.values()}
+RESPONSES: Mapping[str, str] = {quantity.label: quantity.name for quantity in BY_NAME.values()}
 # Name for people, and the field of a stroke or trial that holds it.
 STROKE_FIELDS: Mapping[str, str] = {
     MODEL_MU: "mu",
@@ -45,7 +45,7 @@ _NO_LINE = "without one of the surfaces the others do not determine a line"
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """How one quantity goes with the scores, beside the model's. None where `reasons` says why under the field."""
+    """The correlation of one quantity with the scores. A number is None where `reasons` says why under its name."""
 
     name: str
     n: int  # surfaces, or within subjects trials, that have it and a score
@@ -59,8 +59,8 @@ class Rival:
     # Of a surface's scores by the line through the others, root mean square [points]
     left_out_error: float | None = None
     weight: float | None = None  # Akaike's, of the mixed model with subjects and surfaces crossed
-    same_order: bool | None = None  # orders the surfaces as the model's quantity does, or wholly the other way round
-    needed: int | None = None  # surfaces with which Steiger's test would tell the two correlations of means apart
+    same_order: bool | None = None  # orders the surfaces as the model's quantity does, or in exactly the reverse order
+    needed: int | None = None  # surfaces with which Steiger's test would distinguish the two correlations of means
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
 
@@ -77,7 +77,7 @@ class RivalTrial:
 def rivals_of_means(
     scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]], model: str = MODEL_SED
 ) -> tuple[Rival, ...]:
-    """Return how each quantity of the surfaces goes with their mean scores; () where there is no `model`.
+    """Return how each quantity of the surfaces correlates with their mean scores; () where there is no `model`.
 
     `scores` and each of `series`, named as in `RIVAL_NAMES`, go by index. All are compared to `model`, which is first.
     """
@@ -100,10 +100,10 @@ def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> 
 
 
 def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL_SED) -> tuple[Rival, ...]:
-    """Return how each quantity goes with the scores within subjects; () where no trial has `model`.
+    """Return how each quantity correlates with the scores within subjects; () where no trial has `model`.
 
     Differences and partial correlations have the jackknife's intervals over subjects: those of other people on these
-    very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
+    surfaces. How many surfaces a test needs is given for the means over subjects.
     """
     model_trials = [trial for trial in trials if model in trial.values]
     names = [name for name in _model_first(model) if any(name in trial.values for trial in model_trials)]
@@ -201,7 +201,7 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
 def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | None:
     """Return covariances within subjects of score and quantities (1 + k, c, c): of all k, then without each of them.
 
-    One with a single trial tells nothing of what goes on within subjects. None of too few others.
+    A subject with a single trial does not vary and is left out. None where too few subjects are left.
     """
     rows = by_key((trial.subject, [trial.score, *(trial.values[name] for name in names)]) for trial in trials)
     columns = [np.array(table) for table in rows.values() if len(table) > 1]

@@ -139,8 +139,8 @@ def _no_scale(counts: Array, indices: Sequence[int]) -> str:
     beaten = wins + (meetings - wins).T  # [a, b]: how often a was chosen and b was not
     groups, label = csgraph.connected_components(beaten > 0, directed=True, connection="strong")
     if groups > 1:
-        above = next(group for group in range(groups) if not (beaten[label != group][:, label == group] > 0).any())
-        names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == above)
+        unbeaten = next(group for group in range(groups) if not (beaten[label != group][:, label == group] > 0).any())
+        names = ", ".join(str(index) for index, group in zip(indices, label, strict=True) if group == unbeaten)
         return f"no other surface was ever preferred to {names}, so their distance has no bound"
     if np.linalg.matrix_rank(_design(len(indices))[meetings > 0]) < len(indices):
         return "preference and order cannot be told apart: some pairs must be met in both orders"
@@ -300,7 +300,7 @@ def latent_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, 
     """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
 
     Intervals are the jackknife's over subjects. Subjects who missed a surface that another judged do not count. Nothing
-    of fewer than three others, of fewer than two surfaces, and where nothing is left to tell a unit from.
+    for fewer than three others, fewer than two surfaces, or without residuals, which give the unit.
     """
     by_subject = by_key((subject, (index, value)) for subject, index, value in points)
     indices = sorted({index for _, index, _ in points})

@@ -1,4 +1,4 @@
-"""Scores of several subjects: means with their intervals, and how they go with a prediction."""
+"""Scores of several subjects: means with their intervals, and means per surface."""
 
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ from sessions.statistics.correlations import TAILS, pearson, t_quantile
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
-SCORE_SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
+SCORE_SCALE = (0.0, 100.0)  # ends of the scale, beyond which there is no answer
 _ALIKE = 1e-12  # of the greatest value: a spread so small is round-off
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
@@ -78,7 +78,7 @@ class Score:
 class ScoreTable:
     """The answers of one session."""
 
-    session: str  # what tells this session from every other, e.g. its folder's name
+    session: str  # identifies this session, e.g. its folder's name
     subject: str
     simulated: bool
     scores: tuple[Score, ...]  # answered trials only
@@ -266,5 +266,5 @@ def _sentence(answers: dict[int, float]) -> str:
     if len(answers) < 2:
         return f"too few answers to see a grading ({answer_list})"
     pairs = pairwise(sorted(answers))
-    wrong = [f"{high} was judged no higher than {low}" for low, high in pairs if answers[high] <= answers[low]]
-    return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({answer_list})"
+    faults = [f"{high} was judged no higher than {low}" for low, high in pairs if answers[high] <= answers[low]]
+    return f"{'the grading does not hold: ' + ', '.join(faults) if faults else 'the grading holds'} ({answer_list})"

@@ -1,6 +1,6 @@
 """One session's contribution to a study: a row a trial with scores, friction and prediction, and who is left out.
 
-Decisions to leave a subject out stand in a file that people keep beside the sessions.
+People keep decisions to leave a subject out in a file in the folder of the sessions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ class Exclusion:
     descriptor: str = ""  # "" for all
 
     def __post_init__(self) -> None:
-        """Refuse a decision that nobody made or nobody can follow."""
+        """Refuse a decision without a subject, a reason or an author."""
         for key, content in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
             if not getattr(self, key).strip():
                 raise NotAllowed(key, getattr(self, key), f"{content}, not empty")
@@ -175,39 +175,39 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     prediction = None
     if recording.plan.forces:
         prediction = with_intervals(analysis, predict(analysis, recording.plan, options.prediction), both_ways=False)
-    along: Mapping[int, Values] = {}
+    paths: Mapping[int, Values] = {}
     if options.paths != "none" and prediction is not None:
-        along = trial_paths(recording, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])
-    return visit_from(recording, analysis, prediction, along, made_by)
+        paths = trial_paths(recording, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])
+    return visit_from(recording, analysis, prediction, paths, made_by)
 
 
 def visit_from(
     recording: Recording,
     analysis: Analysis,
     prediction: SessionPrediction | None,
-    along: Mapping[int, Values],
+    paths: Mapping[int, Values],
     made_by: Mapping[str, str],
 ) -> Visit:
-    """Return what an analysed session says of its trials; `along` holds a quantity of each along many paths.
+    """Return what an analysed session says of its trials; `paths` holds a quantity of each along many paths.
 
     Raises Blinded while the stimuli's key is sealed.
     """
     records = {record.trial.number: record for record in recording.trials}
     rows = tuple(
-        replace(_row(block, place, records[trial.number], analysis, prediction), paths=along.get(trial.number, ()))
+        replace(_row(block, position, records[trial.number], analysis, prediction), paths=paths.get(trial.number, ()))
         for block in recording.plan.blocks
         if block.phase == "main"
-        for place, trial in enumerate(block.trials)
+        for position, trial in enumerate(block.trials)
     )
     numbers = [{name: getattr(row, name) for name in SEAL_NUMBERS} for row in (prediction.trials if prediction else ())]
-    end = recording.end
+    end_record = recording.end
     return Visit(
         session=recording.folder.name,
         subject=recording.plan.subject,
         protocol=recording.plan.protocol,
         simulated=recording.simulated_sentence or "",
         forces=recording.plan.forces,
-        complete=end is not None and bool(end.get("complete")),
+        complete=end_record is not None and bool(end_record.get("complete")),
         rows=rows,
         losses=(*recording.losses, *recording.flaws),
         made_by=dict(made_by),
@@ -226,7 +226,7 @@ def scores_of(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
 
 
 def _row(
-    block: Block, place: int, record: TrialRecord, analysis: Analysis, prediction: SessionPrediction | None
+    block: Block, position: int, record: TrialRecord, analysis: Analysis, prediction: SessionPrediction | None
 ) -> TrialRow:
     trial = record.trial
     row = TrialRow(
@@ -237,8 +237,8 @@ def _row(
         code=trial.stimulus.code,
         direction=trial.direction,
         repetition=trial.repetition,
-        place=place,
-        before=block.trials[place - 1].stimulus.known_index if place else None,
+        place=position,
+        before=block.trials[position - 1].stimulus.known_index if position else None,
         outcome=record.outcome,
         score=record.score,
         estimate=record.number,
@@ -251,9 +251,9 @@ def _row(
     predictions = () if prediction is None else prediction.trials
     answer = next((answer for answer in predictions if answer.trial == trial.number), None)
     if friction is None:
-        why = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
-        why = "The trial was not done." if record.outcome == "open" else why
-        return replace(row, flaws=flaws, why=why)
+        reason = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
+        reason = "The trial was not done." if record.outcome == "open" else reason
+        return replace(row, flaws=flaws, why=reason)
     row = replace(_with_friction(row, friction, analysis), flaws=flaws)
     return row if answer is None else _with_prediction(row, answer)
 

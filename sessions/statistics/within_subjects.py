@@ -1,4 +1,4 @@
-"""What subjects tell beside their own level: intervals within subjects, correlation within subjects, agreement."""
+"""Statistics within subjects, without their levels: intervals, correlations, agreement and differences."""
 
 import itertools
 import math
@@ -28,7 +28,7 @@ class WithinMean:
 
 @dataclass(frozen=True, slots=True)
 class RepeatedCorrelation:
-    """How y goes with x within subjects, the same slope for all (Bakdash & Marusich 2017)."""
+    """The relation of y to x within subjects, the same slope for all (Bakdash & Marusich 2017)."""
 
     r: float
     low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for pairs that are all drawn anew
@@ -79,7 +79,7 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
 
 
 def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequence[float]) -> RepeatedCorrelation | None:
-    """Return the repeated-measures correlation of pairs (N), each with its subject; None where nothing can be said.
+    """Return the repeated-measures correlation of pairs (N), each with its subject; None where it has no value.
 
     It is the correlation of what is left of x and y when each subject's own means are taken away, tested with
     N - k - 1 degrees of freedom (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456). Their interval
@@ -98,14 +98,14 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     if size <= 1e-12 * float(np.abs(x).max()) * float(np.abs(y).max()):
         return None
     r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
-    several = np.bincount(codes) > 1
-    count = int(several.sum())
+    has_pairs = np.bincount(codes) > 1
+    count = int(has_pairs.sum())
     if 1.0 - abs(r) < 1e-12:
         return RepeatedCorrelation(r, r, r, 0.0, dof, count, None, None)
     t = r * math.sqrt(dof / (1.0 - r * r))
     p = 2.0 * float(special.stdtr(dof, -abs(t)))
     products = np.array([left_x * left_y, left_x**2, left_y**2])
-    xy, xx, yy = (np.bincount(codes, product).astype(np.float64)[several] for product in products)
+    xy, xx, yy = (np.bincount(codes, product).astype(np.float64)[has_pairs] for product in products)
     people, people_p = _jackknife(xy, xx, yy) or (None, None)
     half = t_quantile(math.inf) / math.sqrt(dof - 1)
     low, high = (math.tanh(math.atanh(r) + step) for step in (-half, half))
@@ -178,7 +178,7 @@ def holm(ps: Sequence[float]) -> tuple[float, ...]:
 def z_scores(table: Table) -> dict[str, dict[int, float]]:
     """Return scores as each subject's own z-scores, which takes away the part of the scale a subject uses.
 
-    A subject whose scores do not vary is left out: nothing can be said of the order it gave. So is one who did not
+    A subject whose scores do not vary is left out: it gave no order. So is one who did not
     score every stimulus: its mean and spread are those of a part of the scale.
     """
     rows: dict[str, dict[int, float]] = {}

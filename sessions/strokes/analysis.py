@@ -33,7 +33,7 @@ class Analysis:
     filtered: str  # what was done to the forces, for people
     settings: AnalysisSettings
     decisions: tuple[Decision, ...] = ()  # of people, in force
-    presses: tuple[Press, ...] = ()  # that tell how the face leans
+    presses: tuple[Press, ...] = ()  # that measure how the face leans
     intervals: tuple[StrokeIntervals, ...] = ()  # of each stroke's numbers
 
     @property
@@ -51,7 +51,7 @@ class Analysis:
 
     @property
     def flawed(self) -> bool:
-        """Say whether anything was lost or is doubtful; that no press tells the lean is only noted."""
+        """Say whether anything was lost or is doubtful; a lean that no press measures is only noted."""
         return any(flaw.name is not FlawName.TILT_ASSUMED for flaw in self.flaws)
 
     def to_dict(self) -> dict[str, Any]:
@@ -192,7 +192,7 @@ def preview(recording: "Recording", decision: Decision, decisions: Decisions, pr
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    settings = replace(present.settings, tilt=(0.0, 0.0))  # the decisions tell it
+    settings = replace(present.settings, tilt=(0.0, 0.0))  # the decisions set it
     changed = analyse(recording, settings, decisions.with_line(decision))
     present_sentences = {flaw.sentence for flaw in present.flaws}
     for flaw in changed.flaws:
@@ -239,9 +239,9 @@ def check_analysis(document: Mapping[str, Any]) -> None:
     analysis = complete(document, _Analysis)
     if len(analysis.bootstrap.strokes) != len(analysis.strokes):
         raise SettingsError("it has intervals of another number of strokes")
-    beyond = [row.stroke for row in analysis.friction if not 0 <= row.stroke < len(analysis.strokes)]
-    if beyond:
-        raise SettingsError(f"it gives the friction of stroke {beyond[0]}, which it does not hold")
+    unknown = [row.stroke for row in analysis.friction if not 0 <= row.stroke < len(analysis.strokes)]
+    if unknown:
+        raise SettingsError(f"it gives the friction of stroke {unknown[0]}, which it does not hold")
     complete({"settings": {**_DEFAULTS, **analysis.bootstrap.settings}}, _Settings)
     bootstrap_settings(analysis.bootstrap.settings)
 

@@ -41,13 +41,13 @@ class SystematicDraws:
         self._normal_shares: Array = into_drag + lean
         self._drag_shares: Array = into_normal - lean
 
-    def shares(self, along: Array) -> tuple[Array, Array]:
+    def shares(self, direction: Array) -> tuple[Array, Array]:
         """Return a and b (repeats,) [-] for a drag that points along a unit vector (2,)."""
-        return self._normal_shares @ along, self._drag_shares @ along
+        return self._normal_shares @ direction, self._drag_shares @ direction
 
-    def ratio(self, value: float | Array, along: Array) -> Array:
+    def ratio(self, value: float | Array, direction: Array) -> Array:
         """Return what T/N (repeats,) [-] truly was where it was measured as `value`."""
-        normal_share, drag_share = self.shares(along)
+        normal_share, drag_share = self.shares(direction)
         return (value * self.gain_t + normal_share) / (self.gain_n + drag_share * value)
 
 
@@ -99,8 +99,8 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         low, high = np.quantile(repeats[name], tails).tolist()
         # An instant found at the end of the stretch in which it may lie, as by the first reading after it, is one too.
         # A lean that is known and was not levelled moves the truth off the reported number: it lies within as well.
-        within = name in ("onset", "slide_onset") or settings.tilt != (0.0, 0.0)
-        return (min(low, value), max(high, value)) if within else (low, high)
+        contains_value = name in ("onset", "slide_onset") or settings.tilt != (0.0, 0.0)
+        return (min(low, value), max(high, value)) if contains_value else (low, high)
 
     agrees = None
     if stroke.direction is not None and "heading" in repeats:  # where it lies within 60 degrees of that reported
@@ -187,11 +187,11 @@ class _Repeats:
         if stroke.tau_max is not None and stroke.peak_tangential:
             area = stroke.contact_area or stroke.peak_tangential / stroke.tau_max
             if curve.crests is None:
-                crest, top = int(np.nanargmax(curve.tangential)), self._top(curve.tangential, self._noise_t)
+                crest, top = int(np.nanargmax(curve.tangential)), self._peak_error(curve.tangential, self._noise_t)
             else:
                 above_crest = curve.crest_gap * self._draw.uniform(size=self._settings.repeats)
                 crest = int(np.nanargmax(curve.crests))
-                top = self._top(curve.crests, curve.crest_noise, filtered=False) + above_crest
+                top = self._peak_error(curve.crests, curve.crest_noise, filtered=False) + above_crest
             normal_share, _ = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
             offset = self._zero_t + top + normal_share * curve.normal[crest]
             peak = stroke.tau_max * area * self._gain_t + offset
@@ -200,28 +200,28 @@ class _Repeats:
         for name in ("mu_static", "mu_max"):
             value = getattr(stroke, name)
             if value is not None:
-                numbers[name] = self._single(value)
+                numbers[name] = self._single_ratio(value)
         numbers |= self._window()
         if stroke.peak_normal is not None:
-            top, crest = self._top(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
+            top, crest = self._peak_error(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
             _, drag_share = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
             offset = self._zero_n + drag_share * curve.tangential[crest]
             numbers["peak_normal"] = stroke.peak_normal * self._gain_n + offset + top
         return numbers | self._instants(numbers.get("speed")) | self._onset()
 
-    def _top(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
+    def _peak_error(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
         """Return how far the true greatest force may lie from the reported one (repeats,) [N].
 
         Noise has raised the reported one about as far as noise drawn once more raises that on average.
         """
-        high = force[force >= self._settings.top_share * np.nanmax(force)]
-        alike = self._settings.top_alike * self._settings.block if filtered else 0.0
-        every = max(1, round(alike / self._step))
-        high = high[::every]
-        tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
-        return tops - 2.0 * tops.mean() + high.max()
+        candidates = force[force >= self._settings.top_share * np.nanmax(force)]
+        correlation_time = self._settings.top_alike * self._settings.block if filtered else 0.0
+        every = max(1, round(correlation_time / self._step))
+        candidates = candidates[::every]
+        tops = (candidates + noise * self._draw.standard_normal((self._settings.repeats, len(candidates)))).max(axis=1)
+        return tops - 2.0 * tops.mean() + candidates.max()
 
-    def _single(self, value: float) -> Array:
+    def _single_ratio(self, value: float) -> Array:
         """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
         ratio = self._curve.ratio
         nearest = int(np.nanargmin(np.abs(ratio - value)))
@@ -284,7 +284,7 @@ class _Repeats:
         return heading + (angle - heading + 180.0) % 360.0 - 180.0
 
     def _instants(self, speed: Array | None) -> dict[str, Array]:
-        """Return the instants (repeats,) that the analysis found and nobody decided."""
+        """Return the instants (repeats,) that the analysis found and no person decided."""
         stroke, curve, instants = self._stroke, self._curve, dict[str, Array]()
         if stroke.steady is None:
             return instants
@@ -306,7 +306,7 @@ class _Repeats:
         return instants
 
     def _onset(self) -> dict[str, Array]:
-        """Return the onset (repeats,), where the contact began there and nobody decided it."""
+        """Return the onset (repeats,), where the contact began there and no person decided it."""
         onset, curve = self._stroke.onset, self._curve
         if onset is None or "onset" in self._stroke.decided:
             return {}

@@ -19,8 +19,7 @@ from sessions.strokes.settings import AnalysisSettings, DetectorSettings
 NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over the median absolute step between neighbours
 
 
-@dataclass(frozen=True, slots=True)
-class Baseline:
+class Baseline(NamedTuple):
     """The normal force with nothing touching."""
 
     level: float  # mean [N]
@@ -69,7 +68,7 @@ class ContactDetector:
             self._take(baseline)
 
     def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
-        """Take readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return what they tell."""
+        """Take readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return the events."""
         events = map(self._take_reading, time.tolist(), normal_force.tolist())
         return tuple(event for event in events if event is not None)
 
@@ -77,13 +76,13 @@ class ContactDetector:
         if self._touching:
             return self._still_touching(t, force)
         if self._has_zero:
-            above = force - self._level
-            self._noise_exit = _since(self._noise_exit, t, holds=above > self._noise_band)
-            self._above = _since(self._above, t, holds=above > self._threshold)
+            excess = force - self._level
+            self._noise_exit = _since(self._noise_exit, t, holds=excess > self._noise_band)
+            self._above = _since(self._above, t, holds=excess > self._threshold)
             if self._above is not None:
                 return self._touch(self._above, t)
             if self._follows:
-                self._notice_pull(t, above)
+                self._notice_pull(t, excess)
         if self._follows:
             self._gather(t, force)
         return None
@@ -107,9 +106,9 @@ class ContactDetector:
         self._start_gathering()
         return lift
 
-    def _notice_pull(self, t: float, above: float) -> None:
+    def _notice_pull(self, t: float, excess: float) -> None:
         """Forget a zero that was taken in contact."""
-        self._pull_start = _since(self._pull_start, t, holds=above < -self._threshold)
+        self._pull_start = _since(self._pull_start, t, holds=excess < -self._threshold)
         if self._pull_start is not None and t - self._pull_start >= self._settings.baseline / 2:
             self._pull_start, self._has_zero = None, False
             self._start_gathering()
@@ -159,7 +158,7 @@ def onset_threshold(noise: float, settings: DetectorSettings) -> float:
 def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
     """Say whether a stretch of forces [N] spreads no more than noise does.
 
-    Noise is estimated from the median step between neighbours, which a slow movement hardly changes.
+    Noise is estimated from the median step between neighbours, which a slow movement barely changes.
     """
     if len(stretch) < settings.baseline_readings:
         return False
@@ -181,7 +180,7 @@ class Contact:
     stop: int  # position past the last
     onset: float | None  # [s, device time]; None where the recording begins in contact
     lift: float | None  # [s, device time]; None where it ends in contact
-    valleys: tuple[int, ...] = ()  # readings of least force that tell it from neighbours it was not lifted from
+    valleys: tuple[int, ...] = ()  # readings of least force between it and neighbours without a lift
     reversals: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
     uncut: tuple[int, int] | None = None  # first reading and past the last of the contact that turns cut it out of
 
@@ -205,7 +204,7 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     """Return the strokes of a contact: two are separated where the zeroed N between them falls far below both peaks.
 
     `normal` (n,) [N] is zeroed and filtered, of all readings. nan is
-    no force beside a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
+    no force next to a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
     """
     inside = slice(contact.start, contact.stop)
     force = np.maximum(_bridge_gaps(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
@@ -242,13 +241,13 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
     """Return the stroke between two borders; where a border is a valley it is cut back to a share of its peak."""
     valleys = tuple(border for border in (start, stop) if border not in (contact.start, contact.stop))
     force = np.nan_to_num(normal[start:stop])
-    high = np.flatnonzero(force >= settings.contact.valley * force.max())
+    pressed = np.flatnonzero(force >= settings.contact.valley * force.max())
     onset, lift = contact.onset, contact.lift
     if start != contact.start:
-        start += int(high[0])
+        start += int(pressed[0])
         onset = float(time[start])
     if stop != contact.stop:
-        stop -= len(force) - 1 - int(high[-1])
+        stop -= len(force) - 1 - int(pressed[-1])
         lift = float(time[stop])
     return Contact(start, stop, onset, lift, valleys)
 
@@ -275,8 +274,8 @@ def split_at_reversals(
     `wrench` (n, 6) [N, N mm] of all readings at `time` (n,) [s] is zeroed, in the face frame and filtered; its zero may
     be `unsure` [N] sideways. The drag has turned where it points more than a right angle off the way it had just before
     (hysteresis: with T/N beyond a share of its median, T beyond twice what the zero leaves open, for about as long as
-    the shortest stroke and a share of the longest way, and no light touch beside the others). A drag that turns slowly,
-    as in circles, is not cut.
+    the shortest stroke and a share of the longest run, and no light touch). A drag that turns slowly, as in circles, is
+    not cut.
     """
     stretch = wrench[contact.start : contact.stop]
     runs = _drag_runs(stretch, time[contact.start : contact.stop], unsure, settings)
@@ -291,7 +290,7 @@ def split_at_reversals(
             stop=stop,
             onset=contact.onset if start == contact.start else float(time[start]),
             lift=contact.lift if stop == contact.stop else float(time[stop]),
-            reversals=tuple(turn for turn in reversals if turn in (start, stop)),
+            reversals=tuple(reversal for reversal in reversals if reversal in (start, stop)),
             uncut=(contact.start, contact.stop),
         )
         for start, stop in pairwise(bounds)
@@ -312,8 +311,8 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
     drag = np.hypot(*force)
     if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag gives no number
         return []
-    least = rule.turn_share * float(np.median(drag / load)) * load
-    strong = np.flatnonzero((drag >= least) & (drag > rule.turn_unsure * unsure))
+    least_drag = rule.turn_share * float(np.median(drag / load)) * load
+    strong = np.flatnonzero((drag >= least_drag) & (drag > rule.turn_unsure * unsure))
     lasts = pressed[np.append(firsts[1:], len(pressed)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
@@ -329,19 +328,19 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
     long_runs: list[_DragRun] = []
     dropped = False  # since the last kept run
     for run in every_run:
-        short = bool(time[run.last] - time[run.first] < shortest or run.drag < rule.light_share * greatest)
-        if not short and long_runs and dropped and float(long_runs[-1].push @ run.push) >= 0.0:
+        is_short = bool(time[run.last] - time[run.first] < shortest or run.drag < rule.light_share * greatest)
+        if not is_short and long_runs and dropped and float(long_runs[-1].push @ run.push) >= 0.0:
             first, _, push, blocks = long_runs.pop()
             long_runs.append(_DragRun(first, run.last, push + run.push, blocks + run.blocks))
-        elif not short:
+        elif not is_short:
             long_runs.append(run)
-        dropped = short
+        dropped = is_short
     return long_runs
 
 
 def _reversal(wrench: Array, run: _DragRun, following: _DragRun) -> int:
     """Return the reading of a wrench (n, 6) from which on the drag points the `following` way."""
-    turn = following.push / np.hypot(*following.push) - run.push / np.hypot(*run.push)
-    components = wrench[run.first : following.last + 1, :2] @ turn
+    change = following.push / np.hypot(*following.push) - run.push / np.hypot(*run.push)
+    components = wrench[run.first : following.last + 1, :2] @ change
     before_next = components[: following.first - run.first + 1]
     return run.first + int(np.flatnonzero(before_next < 0.0)[-1]) + 1

@@ -1,4 +1,4 @@
-"""What people decided about a session's strokes: a file beside the recording that only grows.
+"""What people decided about a session's strokes: a file in the session's folder that only grows.
 
 Readings stay as they are. A decision sets one thing of one stroke (or of a trial, or of the session), says who decided
 it, when and why, and what stood there before; undoing it is a line of its own. What is in force follows from all lines.
@@ -178,7 +178,7 @@ class Decisions:
         """Return the lines that are not undone, in order."""
         undone: set[int] = set()
         standing: list[Decision] = []
-        for decision in reversed(self.lines):  # whatever undoes a line comes after it
+        for decision in reversed(self.lines):  # a line that undoes another comes after it
             if decision.number not in undone:
                 standing.append(decision)
                 if decision.undoes is not None:
@@ -191,7 +191,7 @@ class Decisions:
         return StrokeDecisions({decision.what: decision for decision in about})
 
     def choice(self, trial: int | None) -> Decision | None:
-        """Return the decision which stroke of a trial the model gets, None where nobody decided."""
+        """Return the decision on the stroke of a trial that the model gets, None where there is none."""
         choices = (decision for decision in self.in_force if decision.what == "choice")
         return next((decision for decision in choices if decision.trial == trial), None)
 

@@ -61,7 +61,7 @@ def break_away_draws(
     *,
     peaked: bool,
 ) -> Array | None:
-    """Return where T/N may have stopped climbing (repeats,) [s]; None where too few readings tell.
+    """Return where T/N may have stopped climbing (repeats,) [s]; None where there are too few readings.
 
     `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
     of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
@@ -88,7 +88,7 @@ def break_away_draws(
             return None
         edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / settings.block), prepend=-1.0))
         blocks = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
-        # Two or three numbers were fitted to the climb's few blocks: what is left is less, and tells little of itself.
+        # Two or three numbers were fitted to the climb's few blocks: residuals are small, and their size is uncertain.
         dof = max(blocks - 2.0 - bends, 1.0)
         scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(dof, len(repeats)))[:, None]
         factors = scale * draw.standard_normal((len(repeats), len(edges)))

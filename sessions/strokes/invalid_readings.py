@@ -1,6 +1,6 @@
 """Readings that cannot be used: spikes, frozen or clipped axes, repeats of a frozen sensor, saturation."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
 
 
 def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> Indices:
-    """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
+    """Return where `width` readings begin that steps of more than `floor` enter and leave, away from both ends."""
     jump, return_jump = steps[:-width], steps[width:]
     starts = np.flatnonzero((np.minimum(np.abs(jump), np.abs(return_jump)) > floor) & (jump * return_jump < 0.0)) + 1
     return starts[(starts >= settings.wild_neighbours) & (starts + width + settings.wild_neighbours <= len(steps) + 1)]
@@ -57,9 +57,8 @@ def _stands_out(column: Array, suspect: Mask, start: int, width: int, settings: 
     return height > settings.wild_steps * float(usual.max())
 
 
-@dataclass(frozen=True, slots=True)
-class ConstantRun:
-    """One axis at one value; the other axes move meanwhile."""
+class ConstantRun(NamedTuple):
+    """A run of one axis at one value while the other axes move."""
 
     axis: int
     clipped: bool  # at its own least or greatest value; else frozen
@@ -81,11 +80,9 @@ def constant_readings(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: boo
     """Mark the readings (n,) of frozen runs; or, `clipped`, all those at a value at which an axis was clipped."""
     marks = np.zeros(len(raw), np.bool_)
     for run in runs:
-        if run.clipped != clipped:
-            continue
-        if clipped:
+        if clipped and run.clipped:
             marks |= raw[:, run.axis] == run.value
-        else:
+        elif not clipped and not run.clipped:
             marks[run.first + 1 : run.last + 1] = True
     return marks
 
@@ -106,20 +103,21 @@ def _axis_runs(axis: int, time: Array, raw: Array, skip: Mask, settings: SignalS
     for value in np.unique(column[firsts[candidates]]).tolist():
         runs = candidates[column[firsts[candidates]] == value]
         spans = [(int(firsts[run]), int(lasts[run])) for run in runs]
-        live = np.array([_others_move(axis, time, raw, span, settings) for span in spans])
-        if durations[runs[live]].sum() <= durations[runs].sum() / 2.0:  # what the axis reads where nothing presses
+        others_live = np.array([_others_move(axis, time, raw, span, settings) for span in spans])
+        live_runs = runs[others_live]
+        if durations[live_runs].sum() <= durations[runs].sum() / 2.0:  # what the axis reads where nothing presses
             continue
-        for run in runs[live].tolist():
+        for run in live_runs.tolist():
             clipped = value in extremes
             frozen = lengths[run] > settings.frozen_readings and durations[run] >= settings.frozen_shortest
             elsewhere = lengths[~np.isin(column[firsts], extremes)] if clipped else lengths[2 * lengths < lengths[run]]
-            long = lengths[run] > settings.long_run * (_usual(elsewhere) - 1.0)
-            if (clipped or frozen) and long and _jumps(column, int(firsts[run]), int(lasts[run]), settings):
+            is_long = lengths[run] > settings.long_run * (_usual_length(elsewhere) - 1.0)
+            if (clipped or frozen) and is_long and _jumps(column, int(firsts[run]), int(lasts[run]), settings):
                 results.append(ConstantRun(axis, clipped, int(firsts[run]), int(lasts[run]), value))
     return results
 
 
-def _usual(lengths: Indices) -> float:
+def _usual_length(lengths: Indices) -> float:
     """Return the length of run that nine tenths of all readings do not exceed; without readings none is unusual."""
     if not len(lengths):
         return np.inf
@@ -127,12 +125,12 @@ def _usual(lengths: Indices) -> float:
     return float(ascending[np.searchsorted(np.cumsum(ascending), 0.9 * ascending.sum())])
 
 
-def _jumps(column: Array, first: int, last: int, settings: SignalSettings) -> bool:
+def _jumps(column: Array, start: int, stop: int, settings: SignalSettings) -> bool:
     """Say whether a run begins or ends by more than a few of its axis' least steps: a slow turn does neither."""
     steps = np.abs(np.diff(column))
-    least = float(steps[steps > 0.0].min())
-    edges = [float(steps[step]) for step in (first - 1, last) if 0 <= step < len(steps)]
-    return max(edges, default=0.0) > settings.flat_jump * least
+    least_step = float(steps[steps > 0.0].min())
+    edges = [float(steps[step]) for step in (start - 1, stop) if 0 <= step < len(steps)]
+    return max(edges, default=0.0) > settings.flat_jump * least_step
 
 
 def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], settings: SignalSettings) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
 
-@dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(NamedTuple):
     """Where readings are missing or cannot be used."""
 
     start: float  # last sound reading before it [s, device time]
@@ -45,8 +44,8 @@ class SignalQuality:
 def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> SignalQuality:
     """Judge a block of at least two readings."""
     steps = np.diff(block.time)
-    forward = steps[steps > 0.0]
-    step = float(np.median(forward)) if len(forward) else np.nan
+    forward_steps = steps[steps > 0.0]
+    step = float(np.median(forward_steps)) if len(forward_steps) else np.nan
     out_of_range = invalid.saturated_readings(block, info)
     wild_axes = invalid.spikes(block.raw, settings.signal) & ~out_of_range[:, None]
     wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
@@ -56,10 +55,10 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     saturated = out_of_range | invalid.constant_readings(block.raw, constant, clipped=True)
     stalls = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalls)
-    long = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
+    long_steps = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
     # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
-    other_rate = bool(long.mean() > settings.signal.uneven)
-    widest = float(np.percentile(forward, 98)) if other_rate else step
+    other_rate = bool(long_steps.mean() > settings.signal.uneven)
+    widest = float(np.percentile(forward_steps, 98)) if other_rate else step
     breaks = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
     neighbours = steps[~breaks]
     spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf

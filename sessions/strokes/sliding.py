@@ -1,6 +1,6 @@
 """The steady slide of a stroke: its window, mean and interval, speed and direction, and what forbids them."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,16 +31,16 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
     if rule.steady_rule in ("middle half", "whole slide"):
         longest = int(np.argmax(length))
         sliding = starts[longest] + np.flatnonzero(np.isfinite(ratio[starts[longest] : stops[longest]]))
-        aside = len(sliding) // 4 if rule.steady_rule == "middle half" else 0
-        return slice(int(sliding[aside]), int(sliding[-1 - aside]) + 1)
+        margin = len(sliding) // 4 if rule.steady_rule == "middle half" else 0
+        return slice(int(sliding[margin]), int(sliding[-1 - margin]) + 1)
     if not steady.any():
         return None
     seed = max(rule.steady_seed * np.isfinite(ratio).sum(), shortest)
-    best = _least(length, variance, steady, seed, len(ratio) / (rule.steady_edges - 1))
+    best = _least_varying(length, variance, steady, seed, len(ratio) / (rule.steady_edges - 1))
     if rule.steady_rule == "least variance":
         return slice(int(starts[best]), int(stops[best]))
-    around = np.flatnonzero(steady & (starts <= starts[best]) & (stops >= stops[best]))
-    best = around[np.lexsort((variance[around], -length[around]))[0]]
+    wider = np.flatnonzero(steady & (starts <= starts[best]) & (stops >= stops[best]))
+    best = wider[np.lexsort((variance[wider], -length[wider]))[0]]
     return _trim(ratio, slice(int(starts[best]), int(stops[best])), settings)
 
 
@@ -69,14 +69,14 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Ind
     return starts, stops, variance, steady
 
 
-def _least(length: Indices, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
+def _least_varying(length: Indices, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
     """Return which steady stretch of about the `shortest` length varies least; of the longest, where none is as long.
 
     Lengths within a step of the `grid` are alike.
     """
     long_enough = length[steady & (length >= shortest)]
-    least = int(long_enough.min()) if len(long_enough) else int(length[steady].max())
-    candidates = np.flatnonzero(steady & (length >= least) & (length <= least + grid))
+    least_length = int(long_enough.min()) if len(long_enough) else int(length[steady].max())
+    candidates = np.flatnonzero(steady & (length >= least_length) & (length <= least_length + grid))
     return int(candidates[np.argmin(variance[candidates])])
 
 
@@ -89,8 +89,7 @@ def _trim(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
 
 
-@dataclass(frozen=True, slots=True)
-class Movement:
+class Movement(NamedTuple):
     """Straight movement over a window."""
 
     along: tuple[float, float]  # velocity along x and y [mm/s]
@@ -151,7 +150,7 @@ def slide(
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
     motion, trouble = _speed(span, track, window)
-    if trouble is not None and interval is None:  # the centre of pressure does not tell when the finger slides
+    if trouble is not None and interval is None:  # the centre of pressure does not show when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         motion, trouble = _speed(span, track, window)
     refusal = _refusal(span, track, track if uncut is None else uncut, window)
@@ -184,8 +183,8 @@ def _decided_window(track: Track, instants: tuple[float, float]) -> slice | None
     """Return the readings between two instants; None where too few of them have a ratio."""
     start = int(np.searchsorted(track.time, instants[0] - _ROUNDING))
     stop = int(np.searchsorted(track.time, instants[1] + _ROUNDING, "right"))
-    enough = np.isfinite(track.ratio[start:stop]).sum() >= track.settings.steady.steady_readings
-    return slice(start, stop) if enough else None
+    has_ratios = np.isfinite(track.ratio[start:stop]).sum() >= track.settings.steady.steady_readings
+    return slice(start, stop) if has_ratios else None
 
 
 def _refusal(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple[FlawName, str] | None:
@@ -251,12 +250,12 @@ def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | N
     if span.frame.height_origin == "default":
         arm = -track.wrench[window, :2] / track.normal[window, None]
         lever = movement(time, arm, track.rate, settings)
-        wrong = limits.height_doubt * (lever.speed if lever else 0.0)
-        if wrong > limits.speed_error * motion.speed:
+        height_error = limits.height_doubt * (lever.speed if lever else 0.0)
+        if height_error > limits.speed_error * motion.speed:
             return motion, (
                 FlawName.HEIGHT_UNKNOWN,
                 f"Nobody stated the face's height: were it wrong by {limits.height_doubt:g} mm the speed of "
-                f"{motion.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given.",
+                f"{motion.speed:.3g} mm/s would change by {height_error:.2g} mm/s, so none is given.",
             )
     return motion, None
 

@@ -74,9 +74,9 @@ def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSet
     floor = max(settings.detector.quiet_floor, settings.zero.quiet_share * float(high - low))
     quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
     # A finger that slides with a steady force moves the centre of pressure, and with it the torques alone.
-    turn, shake = _spread(wrench[:, 3:5], starts, length)
-    still = settings.zero.quiet_moves * float(high - low)
-    quiet &= (turn <= np.maximum(settings.detector.quiet_noise * shake, still)).all(axis=1)
+    torque_spread, torque_noise = _spread(wrench[:, 3:5], starts, length)
+    torque_limit = settings.zero.quiet_moves * float(high - low)
+    quiet &= (torque_spread <= np.maximum(settings.detector.quiet_noise * torque_noise, torque_limit)).all(axis=1)
     level = np.lib.stride_tricks.sliding_window_view(-wrench[:, 2], length)[starts].mean(axis=1)
     threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
     unloaded = level - low <= max(settings.zero.unloaded_share * (high - low), threshold)
@@ -88,7 +88,7 @@ def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSet
 def _spread(axes: Array, starts: Indices, length: int) -> tuple[Array, Array]:
     """Return the standard deviations (k, m) of axes (n, m) in windows from `starts` (k,), and their noise (k, m).
 
-    Noise is estimated from the median step, which slow movement hardly changes.
+    Noise is estimated from the median step, which slow movement barely changes.
     """
     windows = np.lib.stride_tricks.sliding_window_view(axes, length, axis=0)[starts]  # (k, m, length)
     noise = NORMAL_STEP * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
@@ -169,22 +169,22 @@ class StrokeZero:
 def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
     """Return a stroke's zero from unloaded stretches around it, if any; nothing presses where `idle` (n,) is set."""
     onset, lift, longest = contact.onset, contact.lift, span.settings.zero.zero_stretch
-    before = None if onset is None else span.windows.zero_before(onset, longest)
-    after = None if lift is None else span.windows.zero_after(lift, longest)
-    zero = before or after
+    earlier = None if onset is None else span.windows.zero_before(onset, longest)
+    following = None if lift is None else span.windows.zero_after(lift, longest)
+    zero = earlier or following
     if zero is None:
         return None
     level, error, drift, flaw = zero.level, zero.error, None, None
-    if before is not None and after is not None:
+    if earlier is not None and following is not None:
         # Taken to be half-way; it may lie anywhere between the two, hence a rectangular distribution's deviation. What
         # noise alone makes of the difference is no drift.
-        drift = after.level - before.level
-        level = before.level + drift / 2.0
-        noise = before.error**2 + after.error**2
+        drift = following.level - earlier.level
+        level = earlier.level + drift / 2.0
+        noise = earlier.error**2 + following.error**2
         error = np.sqrt(noise / 4.0 + np.maximum(drift**2 - noise, 0.0) / 12.0)
-        origin = f"half-way from unloaded before contact, {before.period}, to after it, {after.period}"
-    elif before is not None:
-        origin = f"unloaded before contact, {before.period}"
+        origin = f"half-way from unloaded before contact, {earlier.period}, to after it, {following.period}"
+    elif earlier is not None:
+        origin = f"unloaded before contact, {earlier.period}"
     else:
         origin, flaw = f"unloaded after contact, {zero.period}", FlawName.ZERO_AFTER_CONTACT
     unsure = _unsure(span, contact, idle, level, drift)
@@ -195,9 +195,9 @@ def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
 
 
 def _unsure(span: Span, contact: Contact, idle: Mask, level: Array, drift: Array | None) -> tuple[float, float]:
-    """Return how far from a zero the forces lie near a contact where nothing presses, and in the valleys beside it."""
-    first, last, around = span.time[contact.start], span.time[contact.stop - 1], span.settings.zero.near
-    nearby = idle & (span.time >= first - around) & (span.time <= last + around)
+    """Return how far from a zero the forces lie near a contact where nothing presses, and in valleys at its ends."""
+    first, last, margin = span.time[contact.start], span.time[contact.stop - 1], span.settings.zero.near
+    nearby = idle & (span.time >= first - margin) & (span.time <= last + margin)
     nearby[list(contact.valleys)] = True
     forces = span.smooth[nearby, :3] - level[:3]
     forces = forces[np.isfinite(forces).all(axis=1)]

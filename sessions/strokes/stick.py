@@ -40,16 +40,16 @@ class Climb(NamedTuple):
         remaining_slope, bend_slope = np.zeros_like(time), np.zeros_like(time)
         remaining_slope[inside] = -self.bend * remaining[inside] ** (self.bend - 1.0) / duration
         bend_slope[inside] = -(remaining[inside] ** self.bend) * np.log(remaining[inside])
-        progress, above = _progress_and_peak(self, time).T
+        progress, peak_left = _progress_and_peak(self, time).T
         share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _peak_decay(self, time)
         columns = np.zeros((len(time), 7))
         columns[:, 0], columns[:, 1] = share * remaining_slope * remaining, share * remaining_slope * (1.0 - remaining)
         columns[:, 2] = share * bend_slope
         if self.fall > 0.0:
             late = np.maximum(time - self.meets, 0.0)
-            columns[:, 1] += self.peak * above / self.fall * (late > 0.0)
-            columns[:, 3] = self.peak * above * late / self.fall**2
-        columns[:, 4], columns[:, 5], columns[:, 6] = 1.0, progress, above
+            columns[:, 1] += self.peak * peak_left / self.fall * (late > 0.0)
+            columns[:, 3] = self.peak * peak_left * late / self.fall**2
+        columns[:, 4], columns[:, 5], columns[:, 6] = 1.0, progress, peak_left
         return columns
 
 
@@ -140,8 +140,8 @@ class ClimbReadings:
         fewest, count, t, y = self.settings.climb_fewest, self.settings.climb_candidates, self.time, self.ratio
         grid = np.linspace(float(t[0]), float(t[-fewest - 1]), count)
         begins, meets = (grid[index] for index in np.triu_indices(count, 1))
-        late = meets >= t[fewest]
-        begins, meets = begins[late], meets[late]
+        is_late = meets >= t[fewest]
+        begins, meets = begins[is_late], meets[is_late]
         progress = 1.0 - np.clip((meets[:, None] - t) / (meets - begins)[:, None], 0.0, 1.0)
         progress -= progress.mean(axis=1)[:, None]
         explained = np.maximum(progress @ (y - y.mean()), 0.0) ** 2 / (progress**2).sum(axis=1)
@@ -180,8 +180,7 @@ def _peak_decay(fit: Climb, t: Array) -> Array:
     return np.exp(-np.maximum(t - fit.meets, 0.0) / fit.fall) if fit.fall > 0.0 else np.zeros_like(t)
 
 
-@dataclass(frozen=True, slots=True)
-class StickSlip:
+class StickSlip(NamedTuple):
     """A contact that sticks and slips."""
 
     frequency: float  # of the slips [Hz]
@@ -199,11 +198,11 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
     if len(time) <= lag + 1:
         return None
     change = ratio[lag:] - ratio[:-lag]
-    sudden = max(limits.slip_share * float(np.nanmedian(ratio)), limits.slip_noise * np.sqrt(2.0) * noise)
-    drops = _beginnings(change < -sudden)
+    threshold = max(limits.slip_share * float(np.nanmedian(ratio)), limits.slip_noise * np.sqrt(2.0) * noise)
+    drops = _beginnings(change < -threshold)
     # A slow climb grows by up to a third of a drop in the same time, so half of one is sudden.
     depth = -float(np.median(np.fmin.reduceat(change, drops))) if len(drops) else 0.0
-    climbs = _beginnings(change > max(sudden, 0.5 * depth))
+    climbs = _beginnings(change > max(threshold, 0.5 * depth))
     if len(drops) < limits.slips_fewest or len(climbs) > limits.slips_upwards * len(drops):
         return None
     steps = np.diff(ratio)

@@ -139,7 +139,7 @@ class FlawName(StrEnum):
 
     LOST_READINGS = "lost_readings"
     SATURATED = "saturated"
-    DEVICE_FAULT = "device_fault"  # the device tells of a fault of its own
+    DEVICE_FAULT = "device_fault"  # the device reports a fault of its own
     FROZEN = "frozen_sensor"
     DEAD = "dead_sensor"
     WILD = "wild_reading"
@@ -149,7 +149,7 @@ class FlawName(StrEnum):
     NO_UNLOADED_STRETCH = "no_unloaded_stretch"
     ZERO_AFTER_CONTACT = "zero_after_contact"
     DRIFT = "drift"
-    TILT_ASSUMED = "tilt_assumed"  # no press tells how the face leans
+    TILT_ASSUMED = "tilt_assumed"  # no press measures how the face leans
     NORMAL_IMPLAUSIBLE = "normal_axis_implausible"
     UNITS_IMPLAUSIBLE = "units_implausible"
     NO_STROKE = "no_stroke"
@@ -211,7 +211,7 @@ class Findings:
 
 
 HERTZ_EXPONENT = 2.0 / 3.0
-PLANNED_AT = 2.0  # normal force at which an area that grows is the planned one, where nobody said another [N]
+PLANNED_AT = 2.0  # normal force at which an area that grows is the planned one, unless another is set [N]
 
 
 @dataclass(frozen=True, slots=True)

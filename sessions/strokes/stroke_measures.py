@@ -48,7 +48,7 @@ def measure_stroke(
     number: int = 1,
     decisions: StrokeDecisions | None = None,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
-    """Return a contact's stroke and its flaws; `plan` tells the face's frame and the area that tau_max is of.
+    """Return a contact's stroke and its flaws; `plan` gives the face's frame and the area for tau_max.
 
     `number` is that of the stroke within its trial; a person's `decisions` about it go before what is found.
     """
@@ -177,9 +177,9 @@ def _judge_loads(findings: Findings, track: Track, planned_area: float) -> None:
         sentence = f"{reached}, more than a finger presses: check the units of the forces."
         findings.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
     half = settings.ratio.light_half * peak
-    light = (track.ratio > 1.0) & (track.normal < half)
+    is_light = (track.ratio > 1.0) & (track.normal < half)
     ratios = track.ratio[track.normal >= half]
-    if light.any() and np.isfinite(ratios).any() and np.nanmedian(ratios) < 1.0:
+    if is_light.any() and np.isfinite(ratios).any() and np.nanmedian(ratios) < 1.0:
         sentence = (
             f"T/N exceeds 1 while N is below half its peak ({significant(peak, 3)} N), and not above: drift or a side "
             "load makes the ratio there; its maximum is that above half the peak."
@@ -252,10 +252,10 @@ def _stick_slip(
     filtered, unfiltered = findings.numbers["peak_tangential"], float(np.nanmax(drag))
     traction, area = _greatest_traction(track, drag, planned_area)
     findings.numbers |= {"tau_max": traction, "contact_area": area, "peak_tangential": unfiltered}
-    above = 100 * (unfiltered / filtered - 1.0)
+    percent_above = 100 * (unfiltered / filtered - 1.0)
     sentence = (
         f"The contact sticks and slips at {slips.frequency:.2g} Hz: the greatest tangential force and tau_max are "
-        f"those of unfiltered forces, {above:.2g} % above the filtered ones; readings may miss "
+        f"those of unfiltered forces, {percent_above:.2g} % above the filtered ones; readings may miss "
         f"the crest by {100 * crest_gap / unfiltered:.1g} %, and noise raises it."
     )
     findings.flaw(FlawName.STICK_SLIP, sentence, "note")
@@ -322,10 +322,10 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
 def _break_away(findings: Findings, track: Track, window: slice) -> None:
     """Give the end of the stick phase, unless the contact slides before it."""
     peaked = "mu_static" in findings.numbers
-    away = break_away(track.time[: window.stop], track.ratio[: window.stop], track.settings, peaked=peaked)
-    findings.numbers["break_away"] = away
-    early = 0.5 / track.settings.filter.speed_cut_off  # its filter may tell the onset of a slide by half of its period
-    if away is not None and away > findings.numbers.get("slide_onset", np.inf) + early:
+    instant = break_away(track.time[: window.stop], track.ratio[: window.stop], track.settings, peaked=peaked)
+    findings.numbers["break_away"] = instant
+    tolerance = 0.5 / track.settings.filter.speed_cut_off  # half a period, by which its filter may move a slide's onset
+    if instant is not None and instant > findings.numbers.get("slide_onset", np.inf) + tolerance:
         findings.reasons["break_away"] = _SLIDES_BEFORE
 
 
@@ -351,7 +351,7 @@ def _apply_decisions(findings: Findings, track: Track, decisions: StrokeDecision
 def _judge_direction(findings: Findings, track: Track, window: slice) -> None:
     """Say where the tangential force turns: then there is no one direction, or this is not one stroke.
 
-    A finger that rests has hardly a drag, and its noise points anywhere.
+    A finger at rest has almost no drag, and its noise points anywhere.
     """
     limits, greatest = track.settings.slide, np.nanmax(track.tangential, initial=0.0)
     in_drag = np.isfinite(track.ratio) & (track.tangential >= limits.drag_share * greatest)

@@ -2,7 +2,7 @@
 
 Whoever presses along the face's normal n with the force N exerts -N n: what stands sideways over N is how far n leans.
 A press that pushes sideways by itself looks the same. Presses of one hand lean alike, so only several presses, or a
-weight in place of a finger, tell the face from the hand.
+weight in place of a finger, distinguish the face from the hand.
 """
 
 from collections.abc import Iterable, Sequence
@@ -104,9 +104,8 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
     zero = _common_zero(span, context)
     if zero is None:
         sentence = "No stretch is unloaded: without a zero the readings of this transducer show no contact."
-        return TrialAnalysis(
-            flaws=(*flaws, Flaw(FlawName.NO_UNLOADED_STRETCH, sentence, "refused")), filtered=span.filtered
-        )
+        flaws.append(Flaw(FlawName.NO_UNLOADED_STRETCH, sentence, "refused"))
+        return TrialAnalysis(flaws=tuple(flaws), filtered=span.filtered)
     pull = _pull(span, zero)
     if pull is not None:
         return TrialAnalysis(flaws=(*flaws, pull), filtered=span.filtered)
@@ -117,7 +116,7 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
 
 
 def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
-    """Return the zero by which contacts are found; None where nothing tells one."""
+    """Return the zero by which contacts are found; None where it is not known."""
     if context.zero_is_stated:
         return recorded_zero(span, is_stated=True)
     first = span.windows.zero_after(-np.inf, context.settings.zero.zero_stretch)
@@ -286,7 +285,7 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
 
 
 def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None:
-    """Return the tilt that presses tell, with intervals; None without any."""
+    """Return the tilt that presses measure, with intervals; None without any."""
     if not presses:
         return None
     from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
