@@ -187,13 +187,16 @@ class _Repeats:
         if stroke.tau_max is not None and stroke.peak_tangential:
             area = stroke.contact_area or stroke.peak_tangential / stroke.tau_max
             if curve.crests is None:
-                crest, top = int(np.nanargmax(curve.tangential)), self._peak_error(curve.tangential, self._noise_t)
+                crest, peak_error = (
+                    int(np.nanargmax(curve.tangential)),
+                    self._peak_error(curve.tangential, self._noise_t),
+                )
             else:
                 above_crest = curve.crest_gap * self._draw.uniform(size=self._settings.repeats)
                 crest = int(np.nanargmax(curve.crests))
-                top = self._peak_error(curve.crests, curve.crest_noise, filtered=False) + above_crest
+                peak_error = self._peak_error(curve.crests, curve.crest_noise, filtered=False) + above_crest
             normal_share, _ = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
-            offset = self._zero_t + top + normal_share * curve.normal[crest]
+            offset = self._zero_t + peak_error + normal_share * curve.normal[crest]
             peak = stroke.tau_max * area * self._gain_t + offset
             numbers["tau_max"] = peak / (area * self._gain_n**stroke.area_exponent)
             numbers["peak_tangential"] = stroke.peak_tangential * self._gain_t + offset
@@ -203,10 +206,10 @@ class _Repeats:
                 numbers[name] = self._single_ratio(value)
         numbers |= self._window()
         if stroke.peak_normal is not None:
-            top, crest = self._peak_error(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
+            peak_error, crest = self._peak_error(curve.normal, self._noise_n), int(np.nanargmax(curve.normal))
             _, drag_share = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
             offset = self._zero_n + drag_share * curve.tangential[crest]
-            numbers["peak_normal"] = stroke.peak_normal * self._gain_n + offset + top
+            numbers["peak_normal"] = stroke.peak_normal * self._gain_n + offset + peak_error
         return numbers | self._instants(numbers.get("speed")) | self._onset()
 
     def _peak_error(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
@@ -218,8 +221,8 @@ class _Repeats:
         correlation_time = self._settings.top_alike * self._settings.block if filtered else 0.0
         every = max(1, round(correlation_time / self._step))
         candidates = candidates[::every]
-        tops = (candidates + noise * self._draw.standard_normal((self._settings.repeats, len(candidates)))).max(axis=1)
-        return tops - 2.0 * tops.mean() + candidates.max()
+        peaks = (candidates + noise * self._draw.standard_normal((self._settings.repeats, len(candidates)))).max(axis=1)
+        return peaks - 2.0 * peaks.mean() + candidates.max()
 
     def _single_ratio(self, value: float) -> Array:
         """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
@@ -325,14 +328,14 @@ class _Repeats:
         """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""
         repeats = self._settings.repeats
         trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))
-        first, stop = np.floor(trim[0]), count - np.floor(trim[1])
-        stop = np.maximum(stop, first + min(count, 3))
-        first = np.minimum(first, stop - 3)
-        length = stop - first
-        positions = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * length[:, None])
+        starts, stops = np.floor(trim[0]), count - np.floor(trim[1])
+        stops = np.maximum(stops, starts + min(count, 3))
+        starts = np.minimum(starts, stops - 3)
+        length = stops - starts
+        positions = starts[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * length[:, None])
         weight = (np.arange(count) < length[:, None]).astype(np.float64)
         blocks = np.arange(count)
-        in_window = (blocks >= first[:, None]) & (blocks < stop[:, None])
+        in_window = (blocks >= starts[:, None]) & (blocks < stops[:, None])
         return np.clip(positions, 0, count - 1).astype(np.int64), weight, in_window.astype(np.float64)
 
     def _slopes(self, sample: Array, weight: Array) -> Array:

@@ -156,9 +156,8 @@ def repeated_readings(block: ReadingBlock, settings: SignalSettings) -> Mask:
     frozen = np.zeros(len(block), np.bool_)
     rests: list[int] = []
     for start, stop in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
-        if stop - start >= settings.frozen_readings and (
-            block.time[stop] - block.time[start] >= settings.frozen_shortest
-        ):
+        duration = block.time[stop] - block.time[start]
+        if stop - start >= settings.frozen_readings and duration >= settings.frozen_shortest:
             jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[stop : stop + 1].any())
             at_end = stop == len(block) - 1
             displaced = np.abs(block.raw[rests] - block.raw[start]) > settings.frozen_off * np.ptp(block.raw, axis=0)

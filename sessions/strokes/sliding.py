@@ -51,21 +51,16 @@ def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Ind
     value = np.where(finite, ratio, 0.0)
     count, total, squares = (np.concatenate([[0.0], np.cumsum(terms)]) for terms in (finite, value, value**2))
     starts, stops = (edges[index] for index in np.triu_indices(len(edges), 1))
-    long_enough = stops - starts >= shortest
-    starts, stops = starts[long_enough], stops[long_enough]
     valid = count[stops] - count[starts]
-    full = valid >= rule.steady_held * (stops - starts)
-    starts, stops, valid = starts[full], stops[full], valid[full]
+    usable = (stops - starts >= shortest) & (valid >= rule.steady_held * (stops - starts))
+    starts, stops, valid = starts[usable], stops[usable], valid[usable]
     mean = (total[stops] - total[starts]) / valid
     variance = np.maximum((squares[stops] - squares[starts]) / valid - mean**2, 0.0)
     scatter = np.where(valid < _QUARTERS * rule.steady_readings, np.sqrt(_QUARTERS * variance / valid), 0.0)
     tolerance = rule.steady_trend * mean + 2.0 * scatter
-    steady = np.sqrt(variance) < rule.steady_spread * mean
-    for quarter in range(_QUARTERS):
-        quarter_start = starts + (stops - starts) * quarter // _QUARTERS
-        quarter_stop = starts + (stops - starts) * (quarter + 1) // _QUARTERS
-        readings = np.maximum(count[quarter_stop] - count[quarter_start], 1.0)
-        steady &= np.abs((total[quarter_stop] - total[quarter_start]) / readings - mean) <= tolerance
+    quarters = starts + (stops - starts) * np.arange(_QUARTERS + 1)[:, None] // _QUARTERS
+    means = np.diff(total[quarters], axis=0) / np.maximum(np.diff(count[quarters], axis=0), 1.0)
+    steady = (np.sqrt(variance) < rule.steady_spread * mean) & (np.abs(means - mean) <= tolerance).all(axis=0)
     return starts, stops, variance, steady
 
 

@@ -302,19 +302,19 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
     findings.reasons.setdefault("mu_static", _NO_PEAK)
     if not np.isfinite(ratios).any():
         return
-    top = int(np.nanargmax(ratios))
-    settled = int(np.searchsorted(track.time, float(track.time[top] + settings.ratio.static_after)))
+    peak = int(np.nanargmax(ratios))
+    settled = int(np.searchsorted(track.time, float(track.time[peak] + settings.ratio.static_after)))
     length = max(1, round(settings.filter.block * track.rate))
     power = power_of_normal_force(track.normal[settled:], track.ratio[settled:], length, settings)
     with np.errstate(invalid="ignore"):
-        comparable = track.ratio * (track.normal[top] / track.normal) ** power  # as T/N would be under the peak's N
-    level = float(np.nanmedian(comparable[top : settled + 1]))
-    later = comparable[max(settled, window.start) : window.stop]
-    crest = float(np.nanmax(later)) if np.isfinite(later).any() else level
-    sd = noise_of_ratio(zero, level, float(track.normal[top]))
+        comparable = track.ratio * (track.normal[peak] / track.normal) ** power  # as T/N would be under the peak's N
+    level = float(np.nanmedian(comparable[peak : settled + 1]))
+    slide_ratios = comparable[max(settled, window.start) : window.stop]
+    crest = float(np.nanmax(slide_ratios)) if np.isfinite(slide_ratios).any() else level
+    sd = noise_of_ratio(zero, level, float(track.normal[peak]))
     share = settings.ratio.static_share * (2.0 if turns else 1.0)
-    if ratios[top] - max(level, crest) > max(settings.ratio.static_noise * sd, share * level):
-        findings.numbers["mu_static"] = float(ratios[top])
+    if ratios[peak] - max(level, crest) > max(settings.ratio.static_noise * sd, share * level):
+        findings.numbers["mu_static"] = float(ratios[peak])
         if findings.reasons["mu_static"] == _NO_PEAK:
             del findings.reasons["mu_static"]
 
