@@ -138,7 +138,7 @@ def variants_table(report: Report) -> Table | None:
     def cell(variant: Alternative) -> Cell:
         return _sed(variant.sed, variant.error_estimate, variant.reason, variant.interval, variant.doubt)
 
-    labels = dict.fromkeys(variant.way for variant in _variants(report))
+    labels = dict.fromkeys(variant.conditions for variant in _variants(report))
     legend = "; ".join(f"({n}) {label}" for n, label in enumerate(labels, 1))
     columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(labels) + 1))
     return _table(report, "table-beside", "variants", columns, _by_strain(report, cell), legend=legend)
@@ -157,7 +157,7 @@ def variant_forces_table(report: Report) -> Table | None:
         without = intervals and intervals.reason
         return _cell(value, error, alternative.reason, interval, without, alternative.doubt, places(2), 2)
 
-    units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
+    units = {variant.conditions: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
     columns = " | ".join(f"({n}) [{unit}]" for n, unit in enumerate(units.values(), 1))
     return _table(report, "table-beside-forces", "variant-forces", columns, _by_strain(report, cell))
 
