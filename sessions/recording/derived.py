@@ -225,7 +225,7 @@ def _may_hold_session(path: Path) -> bool:
         return path.is_symlink() and not path.exists() and not path.name.startswith(".")  # to a disk that is not there
     if not os.access(path, os.R_OK | os.X_OK):
         return True
-    return any(os.path.lexists(path / name) for name in (LIVE_FILE, SEALED_FILE, MANIFEST_FILE))
+    return any(os.path.lexists(path / name) for name in (LIVE_FILE, MANIFEST_FILE))  # an export has neither
 
 
 def sessions_of(folder: Path) -> tuple[tuple[Recording, ...], tuple[str, ...]]:

@@ -324,9 +324,11 @@ def test_after_a_study_was_unblinded_its_later_sessions_are_open(blind):
 
 
 def test_a_session_that_lost_its_recording_or_whose_disk_is_not_there_is_named_and_other_folders_are_not(tmp_path):
-    for name, file in (("S01", "session.h5"), ("S02", "MANIFEST.json"), ("an-export", "session.json")):
+    for name, file in (("S02", "MANIFEST.json"), ("to-csv", "session.json"), ("to-hdf5", "session.h5")):
         (tmp_path / name).mkdir()
         (tmp_path / name / file).touch()
+    (tmp_path / "S01").mkdir()
+    (tmp_path / "S01" / "session.sqlite").symlink_to("session.sqlite")
     (tmp_path / "S03" / "session.sqlite").mkdir(parents=True)
     (tmp_path / "S04").symlink_to(tmp_path / "disk" / "S04")
     (tmp_path / ".#notes").symlink_to("somebody@elsewhere")
