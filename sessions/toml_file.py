@@ -35,6 +35,12 @@ class NotAllowed(ValueError):
         self.allowed = allowed
 
 
+def check(condition: bool, key: str, value: object, allowed: str) -> None:
+    """Raise NotAllowed for a value that does not meet a condition; `allowed` says what does."""
+    if not condition:
+        raise NotAllowed(key, value, allowed)
+
+
 def check_range(key: str, value: float | None, low: float, high: float, unit: str = "") -> None:
     """Raise NotAllowed for a value outside of [low, high]; None was left out."""
     if value is not None and not low <= value <= high:

@@ -203,11 +203,12 @@ def _without(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
 
 def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
     """Return the table of every quantity at the ending, where the prediction holds them: older ones do not."""
-    rows: list[dict[str, Any]] = []
-    for row in prediction["trials"]:
-        solver_row: Mapping[str, Any] = row.get("solver") or {"responses": {}}
-        responses: Mapping[str, Mapping[str, Any]] = solver_row.get("responses", {})
-        rows += [{"trial": row["trial"], "quantity": name, **response} for name, response in responses.items()]
+    rows: list[dict[str, Any]] = [
+        {"trial": row["trial"], "quantity": name, **response}
+        for row in prediction["trials"]
+        if row.get("solver")
+        for name, response in row["solver"].get("responses", {}).items()
+    ]
     meaning = "every quantity at the ending for each predicted trial"
     return (_table("responses", meaning, rows, RESPONSE),) if rows else ()
 

@@ -242,8 +242,6 @@ def sessions_of(folder: Path) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
 
 def force_visit(recordings: Sequence[Recording], subject: str) -> Recording | None:
     """Return the visit in which a subject stroked on the transducer: the latest that came to its end, if any."""
-    visits = [recording for recording in recordings if recording.plan.subject == subject and recording.plan.forces]
-    latest = sorted(
-        visits, key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", "")))
-    )
-    return latest[-1] if latest else None
+    visits = [visit for visit in recordings if visit.plan.subject == subject and visit.plan.forces]
+    visits.sort(key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", ""))))
+    return visits[-1] if visits else None

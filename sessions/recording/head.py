@@ -46,7 +46,7 @@ def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]
         "software": software_versions(),
         "machine": machine(),
         "clock": {
-            "kind": _kind(clock),
+            "kind": _clock_kind(clock),
             "factor": clock.factor,
             "now_ns": clock.now_ns(),  # the session clock when created_utc was read
         },
@@ -70,7 +70,7 @@ def without_home(address: str) -> str:
     return address
 
 
-def _kind(clock: Clock) -> str:
+def _clock_kind(clock: Clock) -> str:
     if clock.factor == 1.0:
         return "the machine's monotonic clock"
     return "told: faster than the machine's clock" if clock.factor else "told: moves when it is waited on"

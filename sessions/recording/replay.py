@@ -1,7 +1,8 @@
-"""A transducer that speaks from a recording: sequence, device counter, status and raw numbers as they were recorded."""
+"""A transducer that plays a recording: sequence, device counter, status and raw numbers as they were recorded."""
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -16,7 +17,7 @@ class RecordedReadings:
     """Recorded readings in their order, handed over a part at a time and read as they go."""
 
     def __init__(self, blocks: Iterator[ReadingBlock]) -> None:
-        self._blocks = blocks
+        self._blocks = filter(len, blocks)
         self._queue: list[ReadingBlock] = []
         self.position = 0  # how many were handed over
 
@@ -48,13 +49,9 @@ class RecordedReadings:
 
     def _look(self) -> bool:
         """Have the next readings at hand, and say whether there are any."""
-        while not self._queue:
-            block = next(self._blocks, None)
-            if block is None:
-                return False
-            if len(block):
-                self._queue.append(block)
-        return True
+        if not self._queue:
+            self._queue += islice(self._blocks, 1)
+        return bool(self._queue)
 
     def _take(self, count: int) -> ReadingBlock:
         block = self._queue.pop()
@@ -65,10 +62,10 @@ class RecordedReadings:
 
 
 class ReplayTransducer:
-    """The transducer of a recording, as it spoke then: each reading comes as long after the start as it did."""
+    """The transducer of a recording: each reading comes as long after the start as it did then."""
 
     def __init__(self, recording: Recording, clock: Clock, uri: str) -> None:
-        """Speak on `clock`, under the address `uri`. Raises SetupError for a recording without readings."""
+        """Run on `clock`, under the address `uri`. Raises SetupError for a recording without readings."""
         self._blocks = recording.blocks()
         self._readings = RecordedReadings(self._blocks)
         first_ns = self._readings.next_received_ns()
@@ -96,7 +93,7 @@ class ReplayTransducer:
         )
 
     def start(self) -> None:
-        """Begin to speak."""
+        """Begin: the first reading is due now."""
         self._shift_ns = self._clock.now_ns() - self._first_ns
 
     def read(self, timeout: float) -> ReadingBlock:
@@ -115,7 +112,7 @@ class ReplayTransducer:
         return self._shift(self._readings.take_until(self._clock.now_ns() - shift), shift)
 
     def stop(self) -> None:
-        """Speak no further than to this instant."""
+        """Hand over no reading later than this instant."""
         if self._stopped_ns is None and self._shift_ns is not None:
             self._stopped_ns = self._clock.now_ns() - self._shift_ns
 

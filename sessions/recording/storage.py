@@ -133,7 +133,9 @@ def unsafe(folder: Path) -> str | None:
     location = folder.resolve()
     if (network := _on_a_network(location)) is not None:
         return network
-    program = sync_folder_above(location) or _program_by_mark(location) or _sync_service(location)
+    roots = [root for variable in SYNC_VARIABLES if (root := os.environ.get(variable))]
+    onedrive = any(location.is_relative_to(root) for root in roots)
+    program = sync_folder_above(location) or _program_by_mark(location) or ("OneDrive" if onedrive else None)
     return None if program is None else f"{location} is kept in step with a cloud by {program}; {MOVE}"
 
 
@@ -223,8 +225,3 @@ def _program_by_mark(location: Path) -> str | None:
         if any(SYNC_DATABASE.fullmatch(name) for name in names):
             return "ownCloud or Nextcloud"
     return None
-
-
-def _sync_service(folder: Path) -> str | None:
-    roots = [root for variable in SYNC_VARIABLES if (root := os.environ.get(variable))]
-    return "OneDrive" if any(folder.is_relative_to(root) for root in roots) else None

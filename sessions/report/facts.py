@@ -51,14 +51,8 @@ def session_commands(
         scene = [] if file is None else ["--scene", shlex.quote(file.name)]
         variants = prediction.options.variants
         variant_option = ["--variants", "both"] if variants == "both" else []
-        arguments = [
-            *model_arguments(prediction.options),
-            *scene,
-            *variant_option,
-            *_afferent_arguments(afferent),
-            *settings,
-        ]
-        lines.append(["predict", name, *arguments])
+        model, firing = model_arguments(prediction.options), _afferent_arguments(afferent)
+        lines.append(["predict", name, *model, *scene, *variant_option, *firing, *settings])
     if paths is not None:
         small = sum(path.kinematics == "small" for path in PATHS)
         finite = any(len(values) > small for values in paths.values())

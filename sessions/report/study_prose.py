@@ -99,9 +99,8 @@ def _otherwise(findings: DescriptorFindings, other_strain: str) -> str:
         return f"at {other_strain} strain, which was not tried here, the sign may differ"
     trials = plural(alternative.trials, "trial")
     if alternative.within is None or alternative.low is None or alternative.high is None:
-        return (
-            f"at {other_strain} strain {trials} of {len(findings.points)} had a prediction, too few for a correlation"
-        )
+        count = f"{trials} of {len(findings.points)}"
+        return f"at {other_strain} strain {count} had a prediction, too few for a correlation"
     interval = f"{correlation(alternative.low)} to {correlation(alternative.high)}"
     r = correlation(alternative.within)
     return f"at {other_strain} strain r = {r} ({interval}) of the {trials} that have one there"
@@ -137,11 +136,7 @@ def exclusion_sentences(study: StudyFindings) -> list[str]:
 def _decision_sentences(study: StudyFindings, *, leaving_out: bool) -> list[str]:
     """Return the decisions about strokes that leave one out, or all others."""
     decisions = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
-    return [
-        f"Session {name}: {full_stop(decision)}"
-        for name, decision in decisions
-        if (" is left out: " in decision) == leaving_out
-    ]
+    return [f"Session {name}: {full_stop(s)}" for name, s in decisions if (" is left out: " in s) == leaving_out]
 
 
 NO_TRIAL = "has no trial of an experiment, as an imported table has none, and counts nothing"
@@ -242,9 +237,8 @@ def _trials_without_sed(study: StudyFindings) -> list[str]:
 
 
 def _first_few(names: Sequence[str]) -> str:
-    return ", ".join(names[:_MOST_NAMED]) + (
-        f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    )
+    omitted = len(names) - _MOST_NAMED
+    return ", ".join(names[:_MOST_NAMED]) + (f" and {omitted} more" if omitted > 0 else "")
 
 
 def seal_sentence(study: StudyFindings) -> str:

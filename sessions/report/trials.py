@@ -62,11 +62,9 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
 def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
     """Return what the subject answered to each trial, in their order."""
     return tuple(
-        AnswerFinding(
-            trial.number, trial.block, trial.stimulus.index, trial.stimulus.code, record.outcome, record.answer
-        )
+        AnswerFinding(t.number, t.block, t.stimulus.index, t.stimulus.code, record.outcome, record.answer)
         for record in recording.trials
-        for trial in (record.trial,)
+        for t in [record.trial]
         if record.answer is not None
     )
 
@@ -74,14 +72,12 @@ def answers(recording: Recording) -> tuple[AnswerFinding, ...]:
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:
     """Return every flaw with its sentence, its grade and where it lies."""
 
-    def where(flaw: Flaw) -> str:
+    def location(flaw: Flaw) -> str:
         if flaw.stroke is not None:
             return f"stroke {flaw.stroke + 1}"
         return "whole recording" if flaw.trial is None else f"trial {flaw.trial}"
 
-    return tuple(
-        Fact(flaw.name.replace("_", " "), flaw.sentence, f"{where(flaw)}: {flaw.grade}") for flaw in analysis.flaws
-    )
+    return tuple(Fact(f.name.replace("_", " "), f.sentence, f"{location(f)}: {f.grade}") for f in analysis.flaws)
 
 
 def course(recording: Recording) -> Course | None:

@@ -117,7 +117,9 @@ def _follow_contact(state: State, event: steps.ContactOnset | steps.FingerLifted
         case Stroking(position), steps.FingerLifted():
             return _stroke_over(position)
         case Scoring(position, touching=False, strokes=strokes), steps.ContactOnset() if position.plan.forces:
-            return Scoring(position, touching=True, strokes=strokes + 1), _further_stroke(position, strokes + 1)
+            number, limit = strokes + 1, position.block.strokes_allowed
+            sentence = f"stroke {number} where {limit} may be made: it is recorded and will be flagged"
+            return Scoring(position, touching=True, strokes=number), (steps.Tell(sentence),) if number > limit else ()
         case Scoring(position, touching=True, strokes=strokes), steps.FingerLifted():
             return Scoring(position, strokes=strokes), ()
         case Scoring(position, touching=False, strokes=strokes, settled=False), steps.Settled() if position.plan.forces:
@@ -262,13 +264,6 @@ def _stroke_over(position: Position) -> Step:
     return (Settling(position), ()) if position.plan.forces else _keep_take(position)
 
 
-def _further_stroke(position: Position, strokes: int) -> tuple[steps.Command, ...]:
-    limit = position.block.strokes_allowed
-    if strokes <= limit:
-        return ()
-    return (steps.Tell(f"stroke {strokes} where {limit} may be made: it is recorded and will be flagged"),)
-
-
 def _keep_take(position: Position) -> Step:
     keep = steps.KeepTake(position.trial.number, position.take)
     next_state, commands = _next(position.with_progress(replace(position.progress[position.index], kept=True)))
@@ -284,19 +279,15 @@ def _return_to(position: Position, reason: str) -> Step:
 def _undo_pair(position: Position, reason: str) -> tuple[Position, tuple[steps.Command, ...]]:
     """Return to the first of two that are compared, its take discarded; any other position stays as it is, not kept."""
     if position.trial.compared_with is None:
-        return _without_kept_take(position), ()
-    first = _without_kept_take(position).at(position.index - 1)
-    return _without_kept_take(first), _undo_commands(first, reason)
+        return position.with_take(position.take), ()
+    first = position.with_take(position.take).at(position.index - 1)
+    return first.with_take(first.take), _undo_commands(first, reason)
 
 
 def _undo_commands(position: Position, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that was kept of the trial in hand, where one was."""
     has_kept_take = position.progress[position.index].kept
     return (steps.DiscardTake(position.trial.number, position.take, reason),) if has_kept_take else ()
-
-
-def _without_kept_take(position: Position) -> Position:
-    return position.with_take(position.take)
 
 
 def _next(position: Position) -> Step:

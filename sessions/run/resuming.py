@@ -198,5 +198,4 @@ def resumed_data(gap: Gap, info: TransducerInfo | None, software: Mapping[str, s
 
 
 def _of_takes(commands: Sequence[Command]) -> list[Line]:
-    lines = [line_of(command) for command in commands]
-    return [line for line in lines if line is not None and line[0] in OF_TAKES]
+    return [line for line in filter(None, map(line_of, commands)) if line[0] in OF_TAKES]

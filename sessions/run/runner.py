@@ -229,15 +229,17 @@ class _Run:
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
         """Write commands down, make that safe, and only then let anybody see them."""
-        for command in commands:
-            if (line := line_of(command)) is not None:
-                self.writer.event(*line, commit=False)
+        self._write(commands)
         self.writer.commit()
         for command in commands:
             if isinstance(command, MeasureZero):
                 self._begin_watch()
             self.operator.show(command)
         self._due_ns["status"] = self.clock.now_ns()
+
+    def _write(self, commands: Sequence[Command]) -> None:
+        for line in filter(None, map(line_of, commands)):
+            self.writer.event(*line, commit=False)
 
     def _begin_watch(self) -> None:
         assert self.transducer is not None, "a zero is measured only where there is a transducer"
@@ -293,9 +295,7 @@ class _Run:
             health = self._last_readings()
             if not isinstance(self._state, Ended):
                 self._state, commands = advance(self._state, Abort(reason))
-                for command in commands:
-                    if (line := line_of(command)) is not None:
-                        self.writer.event(*line, commit=False)
+                self._write(commands)
             complete = isinstance(self._state, Ended) and self._state.complete
             self._report_losses(immediately=True)
             end = SessionEnd(reason, cause, complete, self.writer.reading_count, health)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from sessions.toml_file import NotAllowed, check_scale_ends, check_text
+from sessions.toml_file import NotAllowed, check, check_scale_ends, check_text
 
 PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
 ENGLISH = "en"
@@ -47,12 +47,12 @@ def check_translations(
     names = [*blocks, *([PRE_EVALUATION] if pre_evaluation else [])]
     for number, translation in enumerate(translations):
         key, block, ends = f"translations[{number}]", translation.block, translation.scale_ends
-        if translation.language == original:
-            raise NotAllowed(f"{key}.language", original, "it is the protocol's own: its texts stand in the blocks")
-        if block not in names:
-            raise NotAllowed(f"{key}.block", block, f"it must be one of {', '.join(names)}")
-        if (translation.language, block) in {(earlier.language, earlier.block) for earlier in translations[:number]}:
-            raise NotAllowed(f"{key}.block", block, f'"{translation.language}" has its texts already')
+        is_other = translation.language != original
+        check(is_other, f"{key}.language", original, "it is the protocol's own: its texts stand in the blocks")
+        check(block in names, f"{key}.block", block, f"it must be one of {', '.join(names)}")
+        earlier = {(translation.language, translation.block) for translation in translations[:number]}
+        is_new = (translation.language, block) not in earlier
+        check(is_new, f"{key}.block", block, f'"{translation.language}" has its texts already')
         if (ends is None) != (blocks.get(block) is None):
             remedy = "name both ends of its line" if ends is None else "it has no line: leave its ends out"
             raise NotAllowed(f"{key}.scale_ends", ends and list(ends), remedy)

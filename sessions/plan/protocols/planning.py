@@ -20,7 +20,7 @@ from sessions.plan.plan import (
     Trial,
 )
 from sessions.plan.protocols.protocol import LARGEST_SEED, BlockOutline, Labels, Protocol, check_phases
-from sessions.toml_file import NotAllowed, SettingsError, check_range
+from sessions.toml_file import NotAllowed, SettingsError, check, check_range
 
 DIRECTIONS = {"proximal to distal": PROXIMAL_TO_DISTAL, "distal to proximal": DISTAL_TO_PROXIMAL}
 
@@ -77,8 +77,7 @@ def plan(
     planned_phases = protocol.phases if phases is None else phases
     try:
         protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
-        if not is_code(subject):
-            raise NotAllowed("subject", subject, "a code of letters, digits, - and _, never a name")
+        check(is_code(subject), "subject", subject, "a code of letters, digits, - and _, never a name")
         check_range("seed", seed, 0, LARGEST_SEED)
         check_phases(protocol, planned_phases)
         check_body(subject_body, protocol)
@@ -158,10 +157,8 @@ def check_body(body: Body, protocol: Protocol) -> None:
     check_range("width", body.finger.width, 5, 40, "mm")
     names = [block.name for block in protocol.blocks]
     for name, depth in body.indentations.items():
-        if name not in names:
-            raise NotAllowed("depth", name, f"there is no such block; {protocol.name} has {', '.join(names)}")
-        if not 0 < depth <= 10:
-            raise NotAllowed(f"depth of {name}", depth, "it must lie above 0 and up to 10 mm")
+        check(name in names, "depth", name, f"there is no such block; {protocol.name} has {', '.join(names)}")
+        check(0 < depth <= 10, f"depth of {name}", depth, "it must lie above 0 and up to 10 mm")
 
 
 @dataclass(eq=False)
@@ -196,8 +193,11 @@ class _Blocks:
 
     def _orders(self, outline: BlockOutline) -> list[tuple[int, ...]]:
         orders: list[tuple[int, ...]] = []
-        if outline.adaptive is not None and outline.standard is not None:
-            return self._adaptive_orders(outline, outline.standard, outline.adaptive)
+        comparisons, standard = outline.adaptive, outline.standard
+        if comparisons is not None and standard is not None:  # each answer then chooses the next comparison
+            comparison = next_comparison(self._candidates(outline), ()).known_index
+            leaders = shuffle(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
+            return [(comparison, standard) if n in leaders else (standard, comparison) for n in range(comparisons)]
         for repetition in range(1, outline.repetitions + 1):
             name = outline.name if repetition == 1 else f"{outline.name}#{repetition}"
             if self.protocol.scale.answer == "choice":
@@ -209,12 +209,6 @@ class _Blocks:
             else:
                 orders.append(self._random_order(outline, name, [order[0] for order in orders]))
         return orders
-
-    def _adaptive_orders(self, outline: BlockOutline, standard: int, comparisons: int) -> list[tuple[int, ...]]:
-        """Return each comparison as the answers that there are not yet ask for it; half begin with the standard."""
-        comparison = next_comparison(self._candidates(outline), ()).known_index
-        leaders = shuffle(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
-        return [(comparison, standard) if n in leaders else (standard, comparison) for n in range(comparisons)]
 
     def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
         """Return what is compared with the standard of an adaptive block, by index; nothing in any other block."""

@@ -20,7 +20,7 @@ from sessions.plan.protocols.languages import (
     check_translations,
     languages_of,
 )
-from sessions.toml_file import NotAllowed, SettingsError, check_range, check_scale_ends, check_text, load_toml
+from sessions.toml_file import NotAllowed, SettingsError, check, check_range, check_scale_ends, check_text, load_toml
 
 FOLDER = Path(__file__).parent
 LARGEST_SEED = 2**31 - 1  # a whole number that every language can hold
@@ -50,47 +50,37 @@ class BlockOutline(msgspec.Struct, frozen=True):
         """Check ranges."""
         for name in ("name", "descriptor", "instruction"):
             check_text(name, getattr(self, name))
-        if not 0 < self.indentation <= 10:
-            raise NotAllowed("indentation", self.indentation, "it must lie above 0 and up to 10 mm")
-        if not self.indices or len(set(self.indices)) < len(self.indices):
-            raise NotAllowed("indices", list(self.indices), "there must be at least one, and none may come twice")
-        if not all(0 <= index <= 100 for index in self.indices):
-            raise NotAllowed("indices", list(self.indices), "each must lie between 0 and 100")
+        check(0 < self.indentation <= 10, "indentation", self.indentation, "it must lie above 0 and up to 10 mm")
+        indices, distinct = list(self.indices), 0 < len(self.indices) == len(set(self.indices))
+        check(distinct, "indices", indices, "there must be at least one, and none may come twice")
+        check(all(0 <= index <= 100 for index in indices), "indices", indices, "each must lie between 0 and 100")
         check_scale_ends(self.scale_ends)
         check_range("strokes_allowed", self.strokes_allowed, 1, 20)
         check_range("repetitions", self.repetitions, 1, 20)
-        if not set(self.practice) <= set(self.indices):
-            raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
-        self._check_simulated_friction()
+        practice, friction = list(self.practice), list(self.simulated_friction)
+        check(set(practice) <= set(indices), "practice", practice, f"each must be one of indices {indices}")
+        allowed = f"one number for each of the {len(indices)} indices, or none at all"
+        check(len(friction) in (0, len(indices)), "planted_friction", friction, allowed)
+        in_range = all(0.01 <= mu <= 5.0 for mu in friction)
+        check(in_range, "planted_friction", friction, "each must lie between 0.01 and 5")
         self._check_standard()
 
-    def _check_simulated_friction(self) -> None:
-        if len(self.simulated_friction) not in (0, len(self.indices)):
-            count = f"one number for each of the {len(self.indices)} indices, or none at all"
-            raise NotAllowed("planted_friction", list(self.simulated_friction), count)
-        if not all(0.01 <= mu <= 5.0 for mu in self.simulated_friction):
-            raise NotAllowed("planted_friction", list(self.simulated_friction), "each must lie between 0.01 and 5")
-
     def _check_standard(self) -> None:
-        if self.adaptive is not None:
-            self._check_adaptive()
+        adaptive = self.adaptive is not None
+        if adaptive:
+            allowed = "it takes a standard, with which all are compared"
+            check(self.standard is not None, "adaptive", self.adaptive, allowed)
+            check_range("adaptive", self.adaptive, 10, 200, "comparisons")
+            allowed = "an adaptive block repeats what its answers ask for"
+            check(self.repetitions == 1, "repetitions", self.repetitions, allowed)
         if self.standard is None:
             return
-        if self.standard not in self.indices:
-            raise NotAllowed("standard", self.standard, f"it must be one of indices {list(self.indices)}")
-        if len(self.indices) < 1 + LEAST_COMPARISONS:
-            reason = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
-            raise NotAllowed("indices", list(self.indices), reason)
-        if self.adaptive is None and self.repetitions % 2:
-            reason = "with a standard it must be even, so that each comparison comes first as often as second"
-            raise NotAllowed("repetitions", self.repetitions, reason)
-
-    def _check_adaptive(self) -> None:
-        if self.standard is None:
-            raise NotAllowed("adaptive", self.adaptive, "it takes a standard, with which all are compared")
-        check_range("adaptive", self.adaptive, 10, 200, "comparisons")
-        if self.repetitions != 1:
-            raise NotAllowed("repetitions", self.repetitions, "an adaptive block repeats what its answers ask for")
+        indices = list(self.indices)
+        check(self.standard in indices, "standard", self.standard, f"it must be one of indices {indices}")
+        allowed = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
+        check(len(indices) > LEAST_COMPARISONS, "indices", indices, allowed)
+        allowed = "with a standard it must be even, so that each comparison comes first as often as second"
+        check(adaptive or self.repetitions % 2 == 0, "repetitions", self.repetitions, allowed)
 
 
 HEIGHTS = (-500, 500)  # of a face above the transducer's origin [mm]
@@ -157,8 +147,7 @@ class Scale:
     def __post_init__(self) -> None:
         """Check ranges."""
         check_range("ticks", self.ticks, 0, 99)
-        if self.ticks and self.answer != "line":
-            raise NotAllowed("ticks", self.ticks, "only a line has marks")
+        check(not self.ticks or self.answer == "line", "ticks", self.ticks, "only a line has marks")
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,20 +183,18 @@ class Protocol:
 
     def __post_init__(self) -> None:
         """Check ranges, that blocks and stimuli are distinct, and that answers and orders can be had."""
-        if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
-            raise NotAllowed("name", self.name, "it must be of small letters, digits and single hyphens")
+        is_code = re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name) is not None
+        check(is_code, "name", self.name, "it must be of small letters, digits and single hyphens")
         check_range("label_seed", self.label_seed, 0, LARGEST_SEED)
         check_range("contact_angle", self.contact_angle, 10, 90, "degrees")
-        if not self.blocks:
-            raise NotAllowed("blocks", [], "there must be at least one")
+        check(bool(self.blocks), "blocks", [], "there must be at least one")
         check_phases(self, self.phases)
         if self.order.blocks == "counterbalanced" and len(self.blocks) < 2:
             raise NotAllowed("order.blocks", self.order.blocks, "counterbalancing takes at least two blocks")
         check_language("language", self.language)
         names = [block.name for block in self.blocks]
         for i, (name, block) in enumerate(zip(names, self.blocks, strict=True)):
-            if name in names[:i]:
-                raise NotAllowed(f"blocks[{i}].name", name, "no two blocks may have the same name")
+            check(name not in names[:i], f"blocks[{i}].name", name, "no two blocks may have the same name")
             self._check_answers(f"blocks[{i}]", block)
             self._check_order(f"blocks[{i}]", block)
         scale_ends = {block.name: block.scale_ends for block in self.blocks}
@@ -251,21 +238,18 @@ class Protocol:
 
     def _check_answers(self, key: str, block: BlockOutline) -> None:
         """Check that a block says what its answers need, and nothing that they do not have."""
-        answer = self.scale.answer
-        if answer == "line" and block.scale_ends is None:
-            raise NotAllowed(f"{key}.scale_ends", None, "both ends of the line must be named")
-        if answer != "line" and block.scale_ends is not None:
-            raise NotAllowed(
-                f"{key}.scale_ends", list(block.scale_ends), f"a {answer} is given on no line: leave it out"
-            )
-        if answer != "line" and not block.question.strip():
-            raise NotAllowed(f"{key}.question", block.question, f"say what the subject is asked for a {answer}")
-        if answer == "choice" and len(block.indices) < 2:
-            raise NotAllowed(f"{key}.indices", list(block.indices), "a choice takes at least two")
-        if answer != "choice" and block.standard is not None:
+        answer, ends, question = self.scale.answer, block.scale_ends, block.question
+        if answer == "line":
+            check(ends is not None, f"{key}.scale_ends", None, "both ends of the line must be named")
+        else:
+            allowed = f"a {answer} is given on no line: leave it out"
+            check(ends is None, f"{key}.scale_ends", ends and list(ends), allowed)
+            check(bool(question.strip()), f"{key}.question", question, f"say what the subject is asked for a {answer}")
+        if answer == "choice":
+            check(len(block.indices) > 1, f"{key}.indices", list(block.indices), "a choice takes at least two")
+            check(len(block.practice) != 1, f"{key}.practice", list(block.practice), "a choice takes at least two")
+        elif block.standard is not None:
             raise NotAllowed(f"{key}.standard", block.standard, "only a choice of two compares with a standard")
-        if answer == "choice" and block.practice and len(block.practice) < 2:
-            raise NotAllowed(f"{key}.practice", list(block.practice), "a choice takes at least two")
 
     def _check_order(self, key: str, block: BlockOutline) -> None:
         if self.order.constrained and (self.order.rule == "williams" or self.scale.answer == "choice"):

@@ -164,18 +164,11 @@ def _states(axes: Axes, field: Field) -> None:
     for state, run in itertools.groupby(range(len(states)), key=lambda i: states[i]):
         if state == "open":
             continue
-        positions = field.skin.x[list(run)].tolist()
+        x, label = field.skin.x[list(run)].tolist(), _STATE_LABELS[state]
         level = -LONGEST_ARROW - 0.35
-        axes.plot([positions[0], positions[-1]], [level, level], color=GREY, linewidth=1.6, linestyle=_STYLE[state])
-        if positions[-1] - positions[0] > 0.16 * len(_STATE_LABELS[state]):
-            axes.text(
-                (positions[0] + positions[-1]) / 2,
-                level - 0.12,
-                _STATE_LABELS[state],
-                ha="center",
-                va="top",
-                fontsize=7.5,
-            )
+        axes.plot([x[0], x[-1]], [level, level], color=GREY, linewidth=1.6, linestyle=_STYLE[state])
+        if x[-1] - x[0] > 0.16 * len(label):
+            axes.text((x[0] + x[-1]) / 2, level - 0.12, label, ha="center", va="top", fontsize=7.5)
 
 
 def _nice(value: float) -> float:

@@ -32,9 +32,8 @@ def models_table(study: StudyFindings) -> Table | None:
         for predictor, model in _models(findings, study)
         if not isinstance(model, str)
     ]
-    return table(
-        "table-models", "study-models", "term | unit | estimate | 95 % interval | p", groups, label=quantity.label
-    )
+    columns = "term | unit | estimate | 95 % interval | p"
+    return table("table-models", "study-models", columns, groups, label=quantity.label)
 
 
 def _models(findings: DescriptorFindings, study: StudyFindings) -> tuple[tuple[str, MixedModel | str], ...]:
@@ -79,10 +78,8 @@ def missing_scores(study: StudyFindings) -> list[str]:
         sentences += [] if findings.agreement else [f"No agreement on the order: {of_order}; {counts}."]
         sentences += [] if findings.within else [f"No intervals within subjects: {of_intervals}; {counts}."]
         if without:
-            names = f" {', '.join(without)}" if findings.differences else ""
-            sentences.append(
-                f"No difference{'' if names else 's'} of surfaces{names} of {findings.descriptor}: {of_pairs}."
-            )
+            names = f" of surfaces {', '.join(without)}" if findings.differences else "s of surfaces"
+            sentences.append(f"No difference{names} of {findings.descriptor}: {of_pairs}.")
     return sentences
 
 
@@ -157,9 +154,8 @@ def trials_table(study: StudyFindings) -> Table | None:
 def _exclusion_note(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     if visit.session in dict(study.copies):
         return " (a copy: counts nothing)"
-    return (
-        "" if exclusion_of(study.excluded, visit.subject, descriptor) is None else " (left out of every number above)"
-    )
+    exclusion = exclusion_of(study.excluded, visit.subject, descriptor)
+    return "" if exclusion is None else " (left out of every number above)"
 
 
 def _row(row: TrialRow) -> Row:
