@@ -57,7 +57,7 @@ def _of_strokes(*quantities: StrokeQuantity) -> Callable[[Report], Panels]:
         names = [experiment.name for experiment in report.experiments]
         groups = [(name, [s for s in report.strokes if s.experiment == name]) for name in names]
         groups.append(("", [s for s in report.strokes if s.experiment not in names]))
-        return (stroke_panel(one, strokes, name) for name, strokes in groups if strokes for one in quantities)
+        return (stroke_panel(quantity, strokes, name) for name, strokes in groups if strokes for quantity in quantities)
 
     return panels
 
@@ -79,7 +79,7 @@ _PANELS: Mapping[str, Callable[[Report], Panels]] = {
     "speed": _of_strokes(SPEED_COURSE),
     "forces": _of_strokes(NORMAL, TANGENTIAL),
     "finger": _fingers,
-    "response": lambda report: (response_panel(own, name) for name, own in _predictions_of(report).items()),
+    "response": lambda report: (response_panel(group, name) for name, group in _predictions_of(report).items()),
     "relation": lambda report: (relation_panel(e, _predictions_of(report).get(e.name, ())) for e in report.experiments),
     "paths": lambda report: (
         paths_panel(e.name, e.paths, shown_response(report.response).label) for e in report.experiments

@@ -53,7 +53,7 @@ def prediction_table(report: Report) -> Table | None:
     return _table(report, "table-predictions", "predictions", columns, _rows(report, row))
 
 
-_HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
+_INTERVAL_METHOD = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
 _UNDER_RATES = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
 _SED_ALONE = "the uncertainty of friction goes through to the SED alone"
 
@@ -260,7 +260,7 @@ def _table(
     """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
     columns = f"{'trial | index' if planned else 'stroke'} | {columns}"
-    return table(name, caption, columns, groups, how=_HOW, model=report.model, **values)
+    return table(name, caption, columns, groups, how=_INTERVAL_METHOD, model=report.model, **values)
 
 
 def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]:
