@@ -13,8 +13,10 @@ from sessions.exchange import FORMATS
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PRESENT = [page for page in PAGES if page.parent.name != "decisions" and page.name != "changed-names.md"]
 PLACES = ("daq_app", "drivers", "sessions", "simulators", "solver", "tests", "benchmarks", "docs")
 CODE = [path.as_posix() for place in PLACES for path in (ROOT / place).rglob("*.py")]
+SOURCES = [Path(path).read_text(encoding="utf-8") for path in CODE]
 
 
 def anchors(page):
@@ -39,6 +41,13 @@ def test_every_link_of_a_page_leads_to_a_file_and_heading_that_is_there(page):
 def test_every_file_of_code_that_a_page_names_is_there(page):
     for name in re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8")):
         assert "NAME" in name or any(path.endswith(f"/{name}") for path in CODE), name
+
+
+@pytest.mark.parametrize("page", PRESENT, ids=lambda page: page.name)
+def test_every_member_of_a_class_that_a_page_names_is_there(page):
+    for name, member in re.findall(r"`([A-Z]\w+)\.([a-z]\w*)[`(]", page.read_text(encoding="utf-8")):
+        files = [text for text in SOURCES if re.search(rf"^class {name}\b", text, re.MULTILINE)]
+        assert not files or any(re.search(rf"\b{member}\b", text) for text in files), f"{name}.{member}"
 
 
 def test_readme_names_every_verb():
