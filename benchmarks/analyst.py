@@ -40,21 +40,21 @@ def _work(folder: Path) -> None:
     delays: dict[str, float] = {}
     messages: list[m.Reply] = []
 
-    def say(message: m.Reply) -> None:
+    def send(message: m.Reply) -> None:
         delays.setdefault(type(message).__name__, time.process_time() - start)
         messages.append(message)
 
-    work = Work(folder, say)
+    work = Work(folder, send)
     work.go_on()
     print(
         f"trials and strokes are known after {delays['ReportReady']:4.2f} s, "
         f"the first finger after {delays['TrialAnswer']:.2f} s"
     )
-    answers = sum(isinstance(one, m.TrialAnswer) for one in messages)
+    answers = sum(isinstance(message_, m.TrialAnswer) for message_ in messages)
     print(f"all {answers} trials are answered after {time.process_time() - start:4.2f} s")
-    report = next(one.report for one in messages if isinstance(one, m.ReportReady))
-    stroke = next(s for s in report.strokes if s.steady is not None)
-    for words, request in (
+    report = next(message_.report for message_ in messages if isinstance(message_, m.ReportReady))
+    stroke = next(finding for finding in report.strokes if finding.steady is not None)
+    for name, request in (
         (
             "a moved edge, until numbers follow",
             m.Move(stroke.number, "steady begin", stroke.steady[0] + 0.05, "B", "b"),
@@ -67,8 +67,8 @@ def _work(folder: Path) -> None:
     ):
         start = time.process_time()
         work.do(request)
-        print(f"{words:36s} {time.process_time() - start:4.2f} s")
-    _painting(next(one.film for one in messages if isinstance(one, m.FingerHistory)))
+        print(f"{name:36s} {time.process_time() - start:4.2f} s")
+    _painting(next(message_.film for message_ in messages if isinstance(message_, m.FingerHistory)))
 
 
 def _painting(film) -> None:  # noqa: ANN001
@@ -86,7 +86,7 @@ def _painting(film) -> None:  # noqa: ANN001
     for near in (False, True):
         times: list[float] = []
         for frame in film.frames[::4]:
-            canvas.show_frame(frame, film.parts, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
+            canvas.show_frame(frame, film.mesh, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
             start = time.process_time()
             canvas.grab()
             times.append(time.process_time() - start)
@@ -115,8 +115,8 @@ def _stops(folder: Path) -> None:
     print(f"a stop is answered after {median:.0f} ms by the wall, the longest {longest:.0f} ms")
 
 
-def _until(analyst, kind: type) -> None:  # noqa: ANN001
-    while not any(isinstance(one, kind) for one in analyst.poll()):
+def _until(analyst, reply_type: type) -> None:  # noqa: ANN001
+    while not any(isinstance(reply, reply_type) for reply in analyst.poll()):
         time.sleep(0.001)
 
 

@@ -99,7 +99,7 @@ class Visit:
 
     def strokes(self) -> tuple[Analysis, list[Truth], list[Array]]:
         """Return the analysis of the ten strokes, the truth of each, and its true force (3,) half-way [N]."""
-        parts: list[tuple[Trial, ReadingBlock]] = []
+        recordings: list[tuple[Trial, ReadingBlock]] = []
         truths: list[Truth] = []
         forces: list[Array] = []
         surfaces = paper_surfaces()
@@ -107,20 +107,20 @@ class Visit:
             surface = next(iter(surfaces.values()))
             time = np.arange(np.ceil(2.5 * number * RATE), 2.5 * (number + 1) * RATE) / RATE
             trial = Trial(len(surfaces) + 1 + number, "b", Stimulus("slipperiness", surface.index, "P"), 1, 1)
-            parts.append((trial, _block(time, self._measured_wrench(time, self._press(time - time[0])))))
+            recordings.append((trial, _block(time, self._measured_wrench(time, self._press(time - time[0])))))
         begin = 2.5 * self._trouble.presses + 0.5
         for number, surface in enumerate(surfaces.values(), 1):
             self._bench.mount(surface)
             stroke = self._bench.begin_stroke(self._subject.stroke(surface), begin)
             time = np.arange(np.ceil((begin - 0.2) * RATE), (stroke.end + 0.6) * RATE) / RATE
             trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
-            parts.append((trial, _block(time, self._measured_wrench(time, self._true_wrench(time, stroke)))))
+            recordings.append((trial, _block(time, self._measured_wrench(time, self._true_wrench(time, stroke)))))
             truths.append(self._truth(stroke))
             forces.append(self._true_wrench(np.array([np.mean(stroke.steady)]), stroke)[0, :3])
             begin = stroke.end + 1.0
-        blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
+        blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in recordings)),)
         plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=Frame("-z", "set", HEIGHT, "set"))
-        return analyse_blocks(parts, TrialContext(plan, INFO, AnalysisSettings())), truths, forces
+        return analyse_blocks(recordings, TrialContext(plan, INFO, AnalysisSettings())), truths, forces
 
     def errors_alone(self, force: Array, settings: BootstrapSettings) -> dict[str, bool]:
         """Say whether intervals of nothing but gains, cross-talk and lean hold mu and T of a true force (3,) [N]."""
@@ -135,20 +135,20 @@ class Visit:
             "mu_dynamic": (systematic.ratio(drag / normal, along), drag / normal, true / -float(force[2])),
             "tau_max": (drag * systematic.gain_t + systematic.shares(along)[0] * normal, drag, true),
         }
-        ends = {
+        intervals = {
             name: (*np.quantile(draw, (0.025, 0.975)), estimate, truth)
             for name, (draw, estimate, truth) in draws.items()
         }
         levelled = settings.tilt == (0.0, 0.0)
         return {
             name: low <= truth <= high or (not levelled and min(low, estimate) <= truth <= max(high, estimate))
-            for name, (low, high, estimate, truth) in ends.items()
+            for name, (low, high, estimate, truth) in intervals.items()
         }
 
     def _truth(self, stroke: StrokeGroundTruth) -> Truth:
         steady = np.linspace(*stroke.steady, FINE)
-        whole = np.linspace(stroke.touch, stroke.end, FINE)
-        tangential = np.hypot(*self._true_wrench(whole, stroke)[:, :2].T)
+        contact = np.linspace(stroke.touch, stroke.end, FINE)
+        tangential = np.hypot(*self._true_wrench(contact, stroke)[:, :2].T)
         mu = stroke.mu * (1.0 if self._trouble.level else float(self._factor(steady, stroke).mean()))
         return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": stroke.speed}
 
@@ -156,8 +156,8 @@ class Visit:
         """Return friction over the surface's own (n,) [-] at `time` (n,) [s]."""
         factor = np.ones_like(time)
         if self._trouble.wander:
-            waves = [np.sin(2 * np.pi * f * time + p) for f, p in zip((0.4, 0.9, 1.7), self._phases[:3], strict=True)]
-            factor += self._trouble.wander * np.sqrt(2.0 / 3.0) * np.sum(waves, axis=0)
+            waves = np.sin(2 * np.pi * np.outer([0.4, 0.9, 1.7], time) + self._phases[:3, None])
+            factor += self._trouble.wander * np.sqrt(2.0 / 3.0) * waves.sum(axis=0)
         if self._trouble.slips:
             phase = np.maximum(time - stroke.slip, 0.0) * self._slips_each % 1.0
             # A climb over nine tenths of the time, a drop in the last: 7 to 20 ms, as fingers' relaxation allows.
@@ -222,14 +222,14 @@ def row(name: str, seeds: Sequence[int]) -> str:
         for force in forces:
             for number, holds in visit.errors_alone(force, analysis.bootstrap).items():
                 alone[number].append(holds)
-        at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
+        at_trial = {stroke.trial: (index, stroke) for index, stroke in reversed(list(enumerate(analysis.strokes)))}
         for trial, truth in enumerate(truths, 1):
-            at, stroke = at_trial.get(trial, (0, None))
-            intervals = None if stroke is None else analysis.intervals[at]
+            index, stroke = at_trial.get(trial, (0, None))
+            intervals = None if stroke is None else analysis.intervals[index]
             peaks.append(stroke is not None and stroke.mu_static is not None)
             for number in NUMBERS:
-                ends = None if intervals is None else getattr(intervals, number)
-                hits[number].append(None if ends is None else ends[0] <= truth[number] <= ends[1])
+                limits = None if intervals is None else getattr(intervals, number)
+                hits[number].append(None if limits is None else limits[0] <= truth[number] <= limits[1])
     cells = [name]
     for number in NUMBERS:
         decisions = [hit for hit in hits[number] if hit is not None]
@@ -242,8 +242,8 @@ def row(name: str, seeds: Sequence[int]) -> str:
 def main() -> None:
     """Print a row for each set, as the documentation holds them."""
     count, first = (int(sys.argv[1]) if len(sys.argv) > 1 else 100), (int(sys.argv[2]) if len(sys.argv) > 2 else 5000)
-    head = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
-    print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
+    header = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
+    print("| " + " | ".join(header) + " |\n" + "| --- " * len(header) + "|")
     for name in sys.argv[3:] or SETS:
         print(row(name, range(first, first + count)), flush=True)
 

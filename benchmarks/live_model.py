@@ -33,11 +33,11 @@ def main() -> None:
 
 def _forces(seconds: float, rate: int) -> tuple[np.ndarray, np.ndarray]:
     """Return time and wrench of a press that breathes, and slides towards +x from half a second on."""
-    at = np.arange(int(seconds * rate)) / rate
-    normal = NORMAL * np.minimum(at / 0.3, 1.0) * (1.0 + 0.2 * np.sin(7.0 * at))
-    wrench = np.zeros((len(at), 6))
-    wrench[:, 0], wrench[:, 2] = MU * normal * np.clip((at - 0.3) / 0.3, 0.0, 1.0), -normal
-    return at, wrench
+    time_s = np.arange(int(seconds * rate)) / rate
+    normal = NORMAL * np.minimum(time_s / 0.3, 1.0) * (1.0 + 0.2 * np.sin(7.0 * time_s))
+    wrench = np.zeros((len(time_s), 6))
+    wrench[:, 0], wrench[:, 2] = MU * normal * np.clip((time_s - 0.3) / 0.3, 0.0, 1.0), -normal
+    return time_s, wrench
 
 
 def _alone(kinematics: str, repeats: int) -> None:
@@ -45,17 +45,17 @@ def _alone(kinematics: str, repeats: int) -> None:
     from daq_app.window.live_model import Forces, Use
 
     follower = Follower(Use(None, kinematics))
-    at, wrench = _forces(5.0, 200)
+    time_s, wrench = _forces(5.0, 200)
     for size, name in ((1, "one picture a step"), (4, "a picture every four steps")):
         times = []
         for _ in range(repeats):
             start = time.process_time()
-            for i in range(0, len(at), size):
-                part = slice(i, i + size)
-                follower.take(Forces(at[part], -wrench[part, 2], -wrench[part, 0], 0, 1))
+            for i in range(0, len(time_s), size):
+                batch = slice(i, i + size)
+                follower.take(Forces(time_s[batch], -wrench[batch, 2], -wrench[batch, 0], 0, 1))
             times.append(time.process_time() - start)
-        words = f"{len(at) / statistics.median(times):.0f} steps a second of the processor"
-        print(f"alone, {kinematics} strain, {name}: {words}, median of {repeats}")
+        speed = f"{len(time_s) / statistics.median(times):.0f} steps a second of the processor"
+        print(f"alone, {kinematics} strain, {name}: {speed}, median of {repeats}")
 
 
 def _with_readings(seconds: float) -> None:
@@ -69,29 +69,29 @@ def _with_readings(seconds: float) -> None:
         model.add(Live(0, *_block(0, 4), (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
         model.poll()
         time.sleep(0.05)
-    ages, sent, before = [], 0, model.predictions
+    ages, sent, earlier = [], 0, model.predictions
     start = time.monotonic()
     while (now := time.monotonic() - start) < seconds:
         last = int(now * RATE)
         if last > sent:
-            number, at, received, wrench, status = _block(sent, last)
-            at = at.astype(np.float64)
-            received = (1e9 * (start + at)).astype(np.int64)
-            model.add(Live(1, number, at, received, wrench, status, (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
+            number, time_s, received, wrench, status = _block(sent, last)
+            time_s = time_s.astype(np.float64)
+            received = (1e9 * (start + time_s)).astype(np.int64)
+            model.add(Live(1, number, time_s, received, wrench, status, (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
             sent = last
         for prediction in model.poll():
             if prediction.stream == 1:
                 ages.append(time.monotonic() - prediction.received_ns * 1e-9)
         time.sleep(1.0 / FRAMES)
     model.close()
-    words = f"{np.median(ages) * 1e3:.0f} ms at the median, {np.percentile(ages, 99) * 1e3:.0f} ms at 99 %"
-    print(f"beside {RATE} Hz: {(model.predictions - before) / seconds:.0f} predictions a second, their age {words}")
+    delay = f"{np.median(ages) * 1e3:.0f} ms at the median, {np.percentile(ages, 99) * 1e3:.0f} ms at 99 %"
+    print(f"beside {RATE} Hz: {(model.predictions - earlier) / seconds:.0f} predictions a second, their age {delay}")
 
 
 def _block(first: int, last: int) -> tuple[np.ndarray, ...]:
-    at, wrench = _forces((last + 1) / RATE, RATE)
+    time_s, wrench = _forces((last + 1) / RATE, RATE)
     number = np.arange(first, last)
-    return number, at[number], number, wrench[number], np.zeros(last - first, np.int64)
+    return number, time_s[number], number, wrench[number], np.zeros(last - first, np.int64)
 
 
 if __name__ == "__main__":

@@ -59,11 +59,11 @@ def main() -> None:
 
 
 @contextmanager
-def print_time(what: str) -> Iterator[None]:
+def print_time(task: str) -> Iterator[None]:
     """Print how long something took, by the clock and by the processor: others may be using the machine."""
     start, cpu = time.perf_counter(), time.process_time()
     yield
-    print(f"{what}: {time.perf_counter() - start:.2f} s ({time.process_time() - cpu:.2f} s of processor time)")
+    print(f"{task}: {time.perf_counter() - start:.2f} s ({time.process_time() - cpu:.2f} s of processor time)")
 
 
 def memory() -> float:
@@ -111,11 +111,11 @@ def measure_writer(folder: Path, seconds: int) -> None:
     print(f"file: {(folder / 'session.sqlite').stat().st_size / 1e6:.0f} MB")
     with print_time("opening"):
         recording = Recording.open(folder)
-    before = memory()
+    memory_before = memory()
     with print_time("reading it whole"):
         block = recording.readings()
     size = sum(getattr(block, name).nbytes for name in COLUMNS) / 1e6
-    print(f"{len(block)} readings, {size:.0f} MB; memory grew by {memory() - before:.0f} MB")
+    print(f"{len(block)} readings, {size:.0f} MB; memory grew by {memory() - memory_before:.0f} MB")
     del block
     with print_time("sealing"):
         seal(folder)
@@ -168,11 +168,11 @@ def listen(recorder: Recorder, seconds: int) -> None:
     print(f"  processor: {100 * share:.0f} % of one core")
 
 
-def until(recorder: Recorder, kind: type[m.Report]) -> None:
+def until(recorder: Recorder, report_type: type[m.Report]) -> None:
     """Wait for a report of a kind. Raises RuntimeError where what was asked for could not be done."""
     while True:
         for report in recorder.poll(0.01):
-            if isinstance(report, kind):
+            if isinstance(report, report_type):
                 return
             if isinstance(report, m.Failed):
                 raise RuntimeError(report.sentence)

@@ -35,9 +35,9 @@ class Study:
 
 
 PAPER = StudyDesign(
-    tuple(one.mu for one in STICKINESS),
-    tuple(1e-2 * one.printed_bound * AREA / one.mu for one in STICKINESS),
-    tuple(one.speed for one in STICKINESS),
+    tuple(surface.mu for surface in STICKINESS),
+    tuple(1e-2 * surface.printed_bound * AREA / surface.mu for surface in STICKINESS),
+    tuple(surface.speed for surface in STICKINESS),
 )
 WIDE = StudyDesign(tuple(np.linspace(0.2, 0.7, 12).round(3).tolist()), WIDE_FORCES, SPEEDS)
 # Eight surfaces at three depths: depth moves the parts of the strain by other shares than friction does.
@@ -53,7 +53,7 @@ STUDIES = (Study("10 × 5", 10, PAPER), Study("20 × 12", 20, WIDE), Study("24 �
 def row(study: Study, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
     """Return a row of the table: how often the quantity, a twin of it, and a wrong one is preferred or decided."""
     first = preferred_rivals(weights)
-    sure = [name for name, one in zip(first, weights, strict=True) if one[name] >= DECISIVE_WEIGHT]
+    sure = [name for name, study_weight in zip(first, weights, strict=True) if study_weight[name] >= DECISIVE_WEIGHT]
     wrong = [name for name in first if name not in alike]
     most = f"`{max(sorted(set(wrong)), key=wrong.count)}`" if wrong else "–"
     counts = [
@@ -70,9 +70,9 @@ def row(study: Study, quantity: str, alike: set[str], weights: Sequence[Mapping[
 def main() -> None:
     """Print the table."""
     count, seed = (int(sys.argv[1]) if len(sys.argv) > 1 else 200), (int(sys.argv[2]) if len(sys.argv) > 2 else 1)
-    head = "study | true | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
-    print(f"| {head} | wrong most often |")
-    print("| --- " * (head.count("|") + 2) + "|")
+    header = "study | true | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
+    print(f"| {header} | wrong most often |")
+    print("| --- " * (header.count("|") + 2) + "|")
     only = sys.argv[3:]
     for number, study in enumerate(STUDIES):
         if only and str(number) not in only:

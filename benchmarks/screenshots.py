@@ -42,7 +42,6 @@ class PlayedRecorder:
     pid = 0
 
     def __init__(self) -> None:
-        """Start with nothing to say."""
         self.sent: list[object] = []
         self._queue: list[m.Report] = []
         self._bench = Bench(3)
@@ -53,14 +52,14 @@ class PlayedRecorder:
     def play(self, *reports: m.Report) -> None:
         """Say these at the next poll."""
         self._queue += reports
-        self._health = next((one for one in reports if isinstance(one, m.HealthReport)), self._health)
+        self._health = next((report for report in reports if isinstance(report, m.HealthReport)), self._health)
 
-    def stroke(self, trial: int, at: float) -> None:
+    def stroke(self, trial: int, time: float) -> None:
         """Have the finger stroke the surface of a trial at an instant [s, device time]."""
         row = PLAN.trials[trial - 1]
         surface = paper_surfaces()[row.stimulus.descriptor, row.stimulus.index]
         self._bench.mount(surface)
-        self._bench.begin_stroke(Stroke(surface.peak_normal_force, surface.speed, row.direction), at)
+        self._bench.begin_stroke(Stroke(surface.peak_normal_force, surface.speed, row.direction), time)
 
     def readings(self, until: float) -> None:
         """Say every reading up to an instant [s, device time], a tenth of a second a message."""
@@ -158,7 +157,7 @@ def _settings() -> list[str]:
     ]
 
 
-def _take(setting: str, out: Path, session: Path | None) -> None:
+def _take(setting: str, folder: Path, session: Path | None) -> None:
     """Take the pictures of one setting."""
     from PySide6.QtCore import QLocale, QSettings
     from PySide6.QtWidgets import QApplication
@@ -166,19 +165,19 @@ def _take(setting: str, out: Path, session: Path | None) -> None:
     from daq_app.qt.tokens import DARK, LIGHT
 
     size, scale, theme, locale = setting.split("-")
-    width, height = (round(int(part) / float(scale)) for part in size.split("x"))
+    width, height = (round(int(length) / float(scale)) for length in size.split("x"))
     QLocale.setDefault(QLocale(locale))
-    out.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
-    QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(out / "settings"))
+    QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(folder / "settings"))
     application = QApplication([])
     arguments = (
         application,
         (width, height),
         DARK if theme == "dark" else LIGHT,
-        lambda name: out / f"{name}-{setting}.png",
+        lambda name: folder / f"{name}-{setting}.png",
     )
-    _Places(*arguments).all()
+    _Places(*arguments).picture_all()
     if session is not None:
         _Places(*arguments).review(session)
 
@@ -197,9 +196,9 @@ class _Places:
             widget.resize(*size)
         self.window.show()
 
-    def all(self) -> None:
+    def picture_all(self) -> None:
         """Take a picture of each place."""
-        trial, second, other = PLAN.trials[0], PLAN.trials[1], PLAN.trials[5]
+        trial, second, redone = PLAN.trials[0], PLAN.trials[1], PLAN.trials[5]
         self.play(*OPEN, until=3.0)
         self.picture("01-new-session")
         self.window.go_to("review")
@@ -238,7 +237,7 @@ class _Places:
         self.window.course.leave()
         for number in range(2, 6):
             self.play(*score_reports(number, 20.0 * number), until=9.0 + number / 10)
-        self.play(steps.ShowInstruction(PLAN.blocks[1]), steps.AskMount(other), until=9.8)
+        self.play(steps.ShowInstruction(PLAN.blocks[1]), steps.AskMount(redone), until=9.8)
         self.window.live.show_seconds(5)
         self.picture("12-second-block")
         self.play(m.LinkDown("no readings for 1 s"), health(lost=12), until=9.8)
@@ -313,8 +312,8 @@ class _Places:
 
     def wait(self, condition) -> None:  # noqa: ANN001
         """Let the window work until something holds."""
-        end = time.monotonic() + 120.0
-        while not condition() and time.monotonic() < end:
+        deadline = time.monotonic() + 120.0
+        while not condition() and time.monotonic() < deadline:
             self._work()
             time.sleep(0.002)
 

@@ -66,16 +66,18 @@ def _print_analysis(recording: Recording) -> None:
     with_spans = with_intervals(analysis, prediction)
     with_alternatives(with_spans)
     alone = _median_time(lambda: analyse(Recording.open(recording.folder)))
-    bootstrap = _median_time(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
+    bootstrap = _median_time(lambda: [stroke_intervals(stroke, index) for index, stroke in enumerate(strokes)])
     solves = _median_time(lambda: predict(analysis, recording.plan, prediction.options))
     spans = _median_time(lambda: with_intervals(analysis, prediction))
     alternatives = _median_time(lambda: with_alternatives(with_spans))
     print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
     print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
     print(f"bootstrap intervals   {1000 * bootstrap:6.0f} ms   (both together: reach 5000)")
-    ways = [one.method for row in with_spans.trials for one in (row.interval, row.opposite_interval) if one]
+    pairs = ((row.interval, row.opposite_interval) for row in with_spans.trials)
+    intervals = [interval for pair in pairs for interval in pair if interval]
+    samplings = sum(interval.method == "sampling" for interval in intervals)
     print(f"predicted both ways   {1000 * solves:6.0f} ms   at small strain")
-    print(f"intervals of the SEDs {1000 * spans:6.0f} ms   {len(ways)} of them, {ways.count('sampling')} by sampling")
+    print(f"intervals of the SEDs {1000 * spans:6.0f} ms   {len(intervals)} of them, {samplings} by sampling")
     print(f"side by side          {1000 * alternatives:6.0f} ms   at small strain")
 
 

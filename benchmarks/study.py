@@ -24,10 +24,10 @@ REPEATS = 2
 
 def measure(folders: list[Path], shelf: Path, options: VisitOptions, workers: int) -> tuple[float, float]:
     """Return the wall time and the workers' processor time [s] of computing all sessions."""
-    before, start = _children(), time.perf_counter()
+    processor_s, start = _children(), time.perf_counter()
     results, failures = visits(folders, options, Shelf(shelf, options), Console(as_json=True), workers=workers)
     assert len(results) == len(folders), failures
-    return time.perf_counter() - start, _children() - before
+    return time.perf_counter() - start, _children() - processor_s
 
 
 def _children() -> float:
@@ -50,12 +50,13 @@ def main(count: int, options: VisitOptions) -> None:
                 wall_s, work_s = measure(folders, base / f"shelf-{workers}-{repeat}", options, workers)
                 wall[workers].append(wall_s)
                 work[workers].append(work_s / count)
-        one, two = (median(wall[workers]) for workers in (1, 2))
+        one_s, two_s = (median(wall[workers]) for workers in (1, 2))
         processor = [median(work[workers]) for workers in (1, 2)]
         print(f"load average at the end: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-        print(f"{count} sessions: {one:.1f} s with one process, {two:.1f} s with two: {one / two:.2f} times as fast")
+        print(f"{count} sessions: {one_s:.1f} s with one process, {two_s:.1f} s with two, ", end="")
+        print(f"{one_s / two_s:.2f} times as fast")
         print(f"processor time a session: {processor[0]:.2f} s with one process, {processor[1]:.2f} s with two")
-        print(f"1,000 sessions with two: {1000 * two / count / 60:.1f} min here, ", end="")
+        print(f"1,000 sessions with two: {1000 * two_s / count / 60:.1f} min here, ", end="")
         print(f"{1000 * processor[1] / 2 / 60:.1f} min where nothing else runs")
         print(f"once computed: {measure(folders, base / 'shelf-2-0', options, 2)[0]:.2f} s")
 

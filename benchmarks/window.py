@@ -56,8 +56,8 @@ def _first_paint(repeats: int) -> None:
     wall, processor = [], []
     for _ in range(repeats + 1):
         start = time.time()
-        out = subprocess.run([sys.executable, "-c", FIRST_PAINT], capture_output=True, text=True, check=True).stdout
-        paint_time, cpu = map(float, out.split())
+        output = subprocess.run([sys.executable, "-c", FIRST_PAINT], capture_output=True, text=True, check=True).stdout
+        paint_time, cpu = map(float, output.split())
         wall.append(paint_time - start)
         processor.append(cpu)
     print(
@@ -93,9 +93,9 @@ def _session(options: argparse.Namespace) -> None:
         _for(3.0)
         observations.begin(window)
         heart.start()
-        before = _processor()
+        earlier = _processor()
         _for(options.seconds)
-        cpu = {name: total - before.get(name, 0.0) for name, total in _processor().items()}
+        cpu = {name: total - earlier.get(name, 0.0) for name, total in _processor().items()}
         heart.stop()
         print(f"{options.rate} readings a second, {options.shown} s shown, {options.size}, {options.seconds:g} s long:")
         observations.report(options.seconds, cpu)

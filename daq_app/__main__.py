@@ -41,9 +41,9 @@ def _repeat_stop(unraisable: "sys.UnraisableHookArgs") -> None:
 
     from daq_app.child_process import press_ctrl_c
 
-    again = threading.Timer(0.01, press_ctrl_c)  # at once, it would be raised in here, and end here too
-    again.daemon = True
-    again.start()
+    timer = threading.Timer(0.01, press_ctrl_c)  # at once, it would be raised in here, and end here too
+    timer.daemon = True
+    timer.start()
 
 
 def _open_streams() -> None:

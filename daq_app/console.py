@@ -22,22 +22,22 @@ _PATIENCE = 1.0  # of people, before they want to see that something is going on
 
 
 @dataclass(slots=True)
-class Underway:
+class EndlessProgress:
     """Progress of work whose end nobody knows: its present task counts as half of what is left."""
 
     task: str
-    part: float = 0.0  # of the whole, as shown
+    fraction: float = 0.0  # of the whole, as shown
     _start: float = 0.0  # the part of the whole when its task began
 
-    def hear(self, task: str, part: float) -> None:
+    def hear(self, task: str, fraction: float) -> None:
         """Take the name of the present task, and the part of it that is done."""
         if task != self.task:
-            self.task, self._start = task, self.part
-        self.reach(self._start + 0.5 * part * (1.0 - self._start))
+            self.task, self._start = task, self.fraction
+        self.reach(self._start + 0.5 * fraction * (1.0 - self._start))
 
-    def reach(self, part: float) -> None:
+    def reach(self, fraction: float) -> None:
         """Move on to this part of the whole; the end is only there when it is there."""
-        self.part = max(self.part, min(part, 0.99))
+        self.fraction = max(self.fraction, min(fraction, 0.99))
 
 
 class WrongValue(Exception):
@@ -57,7 +57,7 @@ def is_ours(error: Exception) -> bool:
     return type(error).__module__.partition(".")[0] in OUR_OWN
 
 
-def takes_all(*streams: TextIO) -> None:
+def accept_any_text(*streams: TextIO) -> None:
     """Let each stream read and write what its encoding has no letters for as escapes: no answer is lost to a dash."""
     for stream in streams:
         if isinstance(stream, io.TextIOWrapper):
@@ -83,7 +83,7 @@ class Console:
         self._err = err or sys.stderr
         self._last_line = 0.0
         self._start = 0.0  # the job that progress is shown of [s]
-        self._part = 1.0  # of it
+        self._fraction = 1.0  # of it
         self._line_open = False
 
     @property
@@ -104,7 +104,7 @@ class Console:
         self._end_progress()
         for line in lines:
             if line is not None:
-                self._tell(harmless(line))
+                self._print_error(harmless(line))
 
     def result(self, document: Mapping[str, Any]) -> None:
         """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""
@@ -112,37 +112,37 @@ class Console:
             self._end_progress()
             self._answer(json.dumps(document, indent=1, allow_nan=False))
 
-    def progress(self, part: float, text: str, *, end_known: bool = True) -> None:
-        """Show how far a long job is (`part` from 0 to 1): a bar on a terminal, else now and then a new line.
+    def progress(self, fraction: float, text: str, *, end_known: bool = True) -> None:
+        """Show how far a long job is (`fraction` from 0 to 1): a bar on a terminal, else now and then a new line.
 
-        The bar tells rate and time left where the end is known. A `part` below the last one begins another job.
+        The bar tells rate and time left where the end is known. A `fraction` below the last one begins another job.
         """
         now = time.monotonic()
-        if part < self._part:
+        if fraction < self._fraction:
             self._start = now
-        self._part = part
+        self._fraction = fraction
         terminal = self.at_terminal
-        if now - self._last_line < (0.1 if terminal else 2.0) and part < 1:
+        if now - self._last_line < (0.1 if terminal else 2.0) and fraction < 1:
             return
         self._last_line = now
         if terminal:
-            self._tell(f"\r\x1b[K{self._bar(harmless(text), now, end_known)}", end="")
+            self._print_error(f"\r\x1b[K{self._bar(harmless(text), now, end_known)}", end="")
         else:
-            self._tell(f"{100 * part:3.0f} %  {harmless(text)}")
+            self._print_error(f"{100 * fraction:3.0f} %  {harmless(text)}")
         self._line_open = terminal
 
     def reporter(self, text: str, until: float = 1.0) -> Callable[[float], bool]:
         """Return what a long job calls with the part done (0 to 1), shown up to `until`; the answer is to go on."""
 
-        def report(part: float) -> bool:
-            self.progress(until * part, text)
+        def report(fraction: float) -> bool:
+            self.progress(until * fraction, text)
             return True
 
         return report
 
     def counter(self, things: str, count: int) -> Callable[[float], None]:
         """Return what a long job calls with the part done of so many things."""
-        return lambda part: self.progress(part, f"{round(part * count)} of {count} {things}")
+        return lambda fraction: self.progress(fraction, f"{round(fraction * count)} of {count} {things}")
 
     def _bar(self, text: str, now: float, end_known: bool) -> str:
         """Return the line of a terminal: part done, text, bar, and where the end is known rate and time left."""
@@ -153,7 +153,7 @@ class Console:
         except (OSError, ValueError):
             columns = _COLUMNS
         return tqdm.format_meter(
-            100.0 * self._part,
+            100.0 * self._fraction,
             100.0,
             now - self._start,
             ncols=max(columns - 1, 1),  # a full line would be broken by some terminals
@@ -170,28 +170,27 @@ class Console:
         Yields a callback that takes the part done (0 to 1), and always answers to go on. The solver's present task
         counts as half of what is left: the part shown moves on, and never back.
         """
-        start, over = time.monotonic(), threading.Event()
-        at = Underway(text)
+        start, finish = time.monotonic(), threading.Event()
+        underway = EndlessProgress(text)
 
-        def reach(part: float) -> bool:
-            at.reach(part)
+        def reach(fraction: float) -> bool:
+            underway.reach(fraction)
             return True
 
         def show() -> None:
             pause = _PATIENCE
-            while not over.wait(pause):
-                self.progress(
-                    at.part, f"{at.task}, {time.monotonic() - start:.0f} s so far; Ctrl-C stops", end_known=False
-                )
+            while not finish.wait(pause):
+                text = f"{underway.task}, {time.monotonic() - start:.0f} s so far; Ctrl-C stops"
+                self.progress(underway.fraction, text, end_known=False)
                 pause = 0.2
 
         shower = threading.Thread(target=show, name="progress", daemon=True)
         shower.start()
         try:
-            with listening(at.hear):
+            with listening(underway.hear):
                 yield reach
         finally:
-            over.set()
+            finish.set()
             shower.join()
 
     def _answer(self, text: str) -> None:
@@ -200,23 +199,23 @@ class Console:
         except BrokenPipeError:
             raise
         except OSError as error:
-            why = (error.strerror or "refused").lower()
+            reason = (error.strerror or "refused").lower()
             raise NotWritten(
-                f"the answer could not be written to standard output ({why}); free space there, or send it elsewhere"
+                f"the answer could not be written to standard output ({reason}); free space there, or send it elsewhere"
             ) from error
 
-    def _tell(self, text: str, end: str = "\n") -> None:
+    def _print_error(self, text: str, end: str = "\n") -> None:
         """Print on stderr; where that is full, or nobody reads it any more, what is being done goes on."""
         with suppress(OSError):
             print(text, end=end, file=self._err, flush=True)
 
     def _end_progress(self) -> None:
         if self._line_open:
-            self._tell("")
+            self._print_error("")
             self._line_open = False
 
 
-def behind_a_point(text: str) -> str:
+def point_advice(text: str) -> str:
     """Return what to add to what is allowed where somebody typed a comma before a fraction.
 
     >>> behind_a_point("'1,5'"), behind_a_point("1.5"), behind_a_point("1,5,2")
@@ -229,7 +228,6 @@ class Parser(argparse.ArgumentParser):
     """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  argparse's own
-        """Take what argparse takes."""
         super().__init__(*args, **kwargs)
         # argparse's own takes -1e-3 and -inf for options
         self._negative_number_matcher = re.compile(r"-(\.?\d|inf$|nan$)", re.IGNORECASE)
@@ -237,8 +235,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise WrongValue."""
         if wrong := re.fullmatch(r"argument (\S+): invalid (int|float) value: (.*)", message, re.DOTALL):
-            kind = "a whole number" if wrong[2] == "int" else "a number"
-            message = f"{wrong[1]} {wrong[3]} is not allowed: it must be {kind}{behind_a_point(wrong[3])}"
+            number_kind = "a whole number" if wrong[2] == "int" else "a number"
+            message = f"{wrong[1]} {wrong[3]} is not allowed: it must be {number_kind}{point_advice(wrong[3])}"
         raise WrongValue(f"{message}; '{self.prog} --help' explains")
 
     def print_help(self, file: object = None) -> None:  # noqa: ARG002  argparse's own
@@ -246,7 +244,7 @@ class Parser(argparse.ArgumentParser):
         Console(as_json=False).say(self.format_help().rstrip())
 
 
-def table(rows: list[list[str]], *, head: list[str]) -> str:
+def table(rows: list[list[str]], *, header: list[str]) -> str:
     """Return rows as aligned columns; the first column to the left, the others to the right.
 
     >>> print(table([["slip 0", "1.5"], ["slip 100", "12.0"]], head=["surface", "N"]))
@@ -254,10 +252,8 @@ def table(rows: list[list[str]], *, head: list[str]) -> str:
     slip 0     1.5
     slip 100  12.0
     """
-    lines = [head, *rows]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-    texts = [
-        "  ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True)))
-        for line in lines
-    ]
+    lines = [header, *rows]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
+    columns = [f"<{widths[0]}", *(f">{width}" for width in widths[1:])]
+    texts = ("  ".join(map(format, line, columns)) for line in lines)
     return "\n".join(text.rstrip() for text in texts)

@@ -28,14 +28,14 @@ def translations(context: str, language: str) -> Mapping[str, str]:
         units = ElementTree.parse(_FOLDER / f"{context}_{language}.xlf").iterfind(".//{*}trans-unit")
     except (OSError, ElementTree.ParseError):
         return {}
-    return {one.findtext("{*}source", ""): text for one in units if (text := one.findtext("{*}target", ""))}
+    return {unit.findtext("{*}source", ""): text for unit in units if (text := unit.findtext("{*}target", ""))}
 
 
 def languages(context: str) -> tuple[str, ...]:
     """Return the languages that a context is translated into, English first."""
     return (
         SOURCE_LANGUAGE,
-        *sorted(place.stem.removeprefix(f"{context}_") for place in _FOLDER.glob(f"{context}_*.xlf")),
+        *sorted(file.stem.removeprefix(f"{context}_") for file in _FOLDER.glob(f"{context}_*.xlf")),
     )
 
 
@@ -61,7 +61,7 @@ def tr_noop(texts: T) -> T:
     return texts
 
 
-COUNT_WORDS: Mapping[str, str] = tr_noop({  # of a transducer's `Health`, by the names of its counts
+COUNT_LABELS: Mapping[str, str] = tr_noop({  # of a transducer's `Health`, by the names of its counts
     "received": "received", "lost": "lost", "repeated": "repeated", "late": "late", "malformed": "malformed",
     "stalled": "stalled", "restarted": "restarted", "saturated": "saturated", "doubtful": "doubtful", "noted": "noted",
     "off_units": "in other units", "off_rate": "rate changes",
@@ -73,7 +73,7 @@ _ANSWERS: Mapping[str, str] = tr_noop({  # by what became of a trial, or which o
 })  # fmt: skip
 
 
-def answer_words(outcome: str, answer: float | str | None) -> str:
+def answer_text(outcome: str, answer: float | str | None) -> str:
     """Return what a subject answered: a score, a number of its own, or which of two.
 
     >>> answer_words("scored", 37.4), answer_words("numbered", 0.125), answer_words("chosen", "first")
@@ -148,7 +148,7 @@ def span(low: float, high: float, digits: int = 3) -> str:
     return f"{number(low, digits)} to {number(high, digits)}"
 
 
-def errors_words(mesh: float | None, effect: str = "") -> str:
+def errors_text(mesh: float | None, effect: str = "") -> str:
     """Return what stands behind a number of the model: its relative error from the mesh, and from what is left out.
 
     >>> errors_words(0.0036, "viscosity 4 % of the SED"), errors_words(None)

@@ -27,23 +27,24 @@ def page() -> str:
 
 def _rows(series: tuple[Surface, ...]) -> list[dict[str, float]]:
     """Return for each surface its SED [kPa] with error, slid the other way too, and at finite strain."""
-    scenes = [replace(scene(one), solve=Solve(tolerance=0.005, evidence="quick")) for one in series]
-    other = {"+x": "-x", "-x": "+x"}
-    back = [replace(one, loading=replace(one.loading, slide=other[one.loading.slide])) for one in scenes]
-    finite = [replace(one, solve=Solve("finite")) for one in (*scenes, *back)]
+    scenes = [replace(scene(surface), solve=Solve(tolerance=0.005, evidence="quick")) for surface in series]
+    opposite = {"+x": "-x", "-x": "+x"}
+    loadings = (replace(forth.loading, slide=opposite[forth.loading.slide]) for forth in scenes)
+    back = [replace(forth, loading=loading) for forth, loading in zip(scenes, loadings, strict=True)]
+    finite = [replace(either, solve=Solve("finite")) for either in (*scenes, *back)]
     small = solve_many([*scenes, *back])
     large = rough_responses(finite)[:, NAMES.index("sed"), 0]
     rows: list[dict[str, float]] = []
     for number, surface in enumerate(series):
-        here, there = small[number], small[number + len(series)]
-        assert isinstance(here, Prediction)
+        forward, backward = small[number], small[number + len(series)]
+        assert isinstance(forward, Prediction)
         rows.append(
             {
                 "index": float(surface.index),
                 "mu": surface.mu,
-                "sed": 1e3 * here.sed_ending,
-                "error": 1e3 * here.sed_ending * here.error_estimate,
-                "back": 1e3 * there.sed_ending if isinstance(there, Prediction) else np.nan,
+                "sed": 1e3 * forward.sed_ending,
+                "error": 1e3 * forward.sed_ending * forward.error_estimate,
+                "back": 1e3 * backward.sed_ending if isinstance(backward, Prediction) else np.nan,
                 "finite": 1e3 * float(large[number]),
                 "finite back": 1e3 * float(large[number + len(series)]),
             }
@@ -54,12 +55,12 @@ def _rows(series: tuple[Surface, ...]) -> list[dict[str, float]]:
 def _tables(rows_of: Mapping[str, list[dict[str, float]]]) -> str:
     lines = ["## The ten surfaces", ""]
     for name, rows in rows_of.items():
-        way = "proximal to distal, 2 mm deep" if name == "stickiness" else "distal to proximal, 1.5 mm deep"
+        direction = "proximal to distal, 2 mm deep" if name == "stickiness" else "distal to proximal, 1.5 mm deep"
         lines += [
-            f"{name.capitalize()}, {way}. SED in kPa; at finite strain on a coarse mesh, good to a few percent.",
+            f"{name.capitalize()}, {direction}. SED in kPa; at finite strain on a coarse mesh, good to a few percent.",
             "",
         ]
-        head = ("index", "\u00b5", "SED, small strain", "the other way", "SED, finite strain", "the other way")
+        header = ("index", "\u00b5", "SED, small strain", "the other way", "SED, finite strain", "the other way")
         cells = [
             (
                 f"{row['index']:.0f}",
@@ -69,7 +70,7 @@ def _tables(rows_of: Mapping[str, list[dict[str, float]]]) -> str:
             )
             for row in rows
         ]
-        lines += looks.table(head, cells)
+        lines += looks.table(header, cells)
     return "\n".join(lines)
 
 
@@ -82,18 +83,18 @@ def _numbers(rows_of: Mapping[str, list[dict[str, float]]]) -> dict[str, Any]:
     sticky, slippery = rows_of["stickiness"], rows_of["slipperiness"]
     r = {name: pearson([row["index"] for row in rows], [row["sed"] for row in rows]) for name, rows in rows_of.items()}
     bounds = {
-        name: pearson([float(one.index) for one in series], [one.printed_bound for one in series])
+        name: pearson([float(surface.index) for surface in series], [surface.printed_bound for surface in series])
         for name, series in SERIES.items()
     }
-    same = [row["sed"] / row["back"] for row in slippery if np.isfinite(row["back"])]
+    small_ratios = [row["sed"] / row["back"] for row in slippery if np.isfinite(row["back"])]
     large = [row["finite"] / row["finite back"] for row in slippery if np.isfinite(row["finite"] / row["finite back"])]
     assert r["stickiness"] > 0.0 > r["slipperiness"]
     assert bounds["stickiness"] > 0.0 > bounds["slipperiness"]
-    assert max(*same, *large) < 1.0
+    assert max(*small_ratios, *large) < 1.0
     return {
         "r": r,
         "bounds": bounds,
-        "same": (min(same), max(same)),
+        "same": (min(small_ratios), max(small_ratios)),
         "large": (min(large), max(large)),
         "highest": {name: max(row["sed"] for row in rows) for name, rows in rows_of.items()},
         "least": min(row["sed"] for row in slippery),

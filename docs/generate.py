@@ -37,11 +37,11 @@ def command_line() -> str:
     """Return the help of every verb, as argparse prints it."""
     lines = ["# Command line", "", "`daq-app VERB --help` prints the same.", ""]
     parsers = [("window", "open the window, which `daq-app` alone does too", start.command_line())]
-    for name, does in main.VERBS.items():
-        parsers.append((name, does, main.parser_of(name, main.verb_module(name))))
-    for name, does, parser in parsers:
+    for name, summary in main.VERBS.items():
+        parsers.append((name, summary, main.parser_of(name, main.verb_module(name))))
+    for name, summary, parser in parsers:
         text = parser.format_help().rstrip()
-        lines += [f"## {name}", "", f"{does[0].upper()}{does[1:]}.", "", "```text", text, "```", ""]
+        lines += [f"## {name}", "", f"{summary[0].upper()}{summary[1:]}.", "", "```text", text, "```", ""]
     return "\n".join(lines)
 
 
@@ -54,8 +54,8 @@ def scene_keys() -> str:
 def protocol_keys() -> str:
     """Return the keys of a protocol file, table by table."""
     module = importlib.import_module(PROTOCOL)
-    kinds = [kind for kind in vars(module).values() if inspect.isclass(kind) and dataclasses.is_dataclass(kind)]
-    tables = [kind.__name__ for kind in kinds if kind.__module__ == PROTOCOL]
+    classes = [cls for cls in vars(module).values() if inspect.isclass(cls) and dataclasses.is_dataclass(cls)]
+    tables = [cls.__name__ for cls in classes if cls.__module__ == PROTOCOL]
     return _keys("Keys of a protocol file", PROTOCOL, tables)
 
 
@@ -65,15 +65,16 @@ def _keys(title: str, module: str, tables: list[str]) -> str:
         table = getattr(importlib.import_module(module), name)
         meaning = _comments(table)
         lines += [f"## {name}", "", inspect.getdoc(table).split("\n")[0], ""]
-        rows = [(f"`{one.name}`", _default(one), _cell(meaning.get(one.name, ""))) for one in dataclasses.fields(table)]
+        fields = dataclasses.fields(table)
+        rows = [(f"`{field.name}`", _default(field), _cell(meaning.get(field.name, ""))) for field in fields]
         lines += looks.table(("key", "default", "meaning"), rows)
     return "\n".join(lines)
 
 
-def _default(one: "dataclasses.Field[object]") -> str:
-    if one.default is not dataclasses.MISSING:
-        return f"`{_cell(repr(one.default))}`"
-    return "its own defaults" if one.default_factory is not dataclasses.MISSING else "required"
+def _default(field: "dataclasses.Field[object]") -> str:
+    if field.default is not dataclasses.MISSING:
+        return f"`{_cell(repr(field.default))}`"
+    return "its own defaults" if field.default_factory is not dataclasses.MISSING else "required"
 
 
 def _cell(text: str) -> str:

@@ -25,7 +25,7 @@ def page() -> str:
     sizes = {"small": tokens.SMALL, "text": tokens.TEXT, "title": tokens.TITLE, "headline": tokens.HEADLINE}
     about = "Made from `daq_app/qt/tokens.py`. Sizes are in device-independent pixels."
     lines = ["# Looks of the window", "", about, ""]
-    lines += table(("type", "size at 100 %", "at 200 %"), [(n, f"{s}", f"{2 * s}") for n, s in sizes.items()])
+    lines += table(("type", "size at 100 %", "at 200 %"), [(n, f"{size}", f"{2 * size}") for n, size in sizes.items()])
     lines += [f"Everything keeps to a grid of {tokens.GRID}. What is pressed is at least {tokens.TARGET} high.", ""]
     fields = [field.name for field in dataclasses.fields(tokens.Tokens) if field.name != "dark"]
     rows = [(name, *(f"`{getattr(theme, name)}`" for theme in THEMES.values())) for name in fields]
@@ -33,7 +33,8 @@ def page() -> str:
     about = "Ratios as WCAG 2.1 has them. Text needs 4.5. A selected row is `on_act` on `act`."
     lines += ["## Contrast", "", about, ""]
     contrasts = [
-        (f"{a} on {b}", *(f"{contrast(getattr(t, a), getattr(t, b)):.1f}" for t in THEMES.values())) for a, b in PAIRS
+        (f"{ink} on {ground}", *(f"{contrast(getattr(t, ink), getattr(t, ground)):.1f}" for t in THEMES.values()))
+        for ink, ground in PAIRS
     ]
     lines += table(("written on", *THEMES), contrasts)
     lines += ["## Pictures", "", *(f"![{name} theme](looks-{name}.png)\n" for name in THEMES)]
@@ -54,7 +55,7 @@ def write_pictures(folder: Path) -> None:
     """Write a picture of the window's parts in each theme, made by the program's own style."""
     application = QApplication.instance() or QApplication([])
     for name, theme in THEMES.items():
-        widget = _parts()
+        widget = _sample_widget()
         widget.setStyle(QStyleFactory.create("Fusion"))
         widget.setPalette(tokens.palette(theme))
         widget.setStyleSheet(tokens.style_sheet(theme))
@@ -63,12 +64,12 @@ def write_pictures(folder: Path) -> None:
     del application
 
 
-def _parts() -> QWidget:
+def _sample_widget() -> QWidget:
     widget = QWidget()
     widget.setObjectName("window")
     grid = QGridLayout(widget)
-    for at, role in enumerate(("headline", "title", "value", "quiet")):
-        grid.addWidget(label(f"{role.capitalize()} 0123", role), at, 0)
+    for index, role in enumerate(("headline", "title", "value", "quiet")):
+        grid.addWidget(label(f"{role.capitalize()} 0123", role), index, 0)
     grid.addWidget(button("Primary", "primary", lambda: None, "primary"), 0, 1)
     grid.addWidget(button("Secondary", "secondary", lambda: None), 1, 1)
     grid.addWidget(QLineEdit("typed"), 2, 1)
@@ -76,18 +77,19 @@ def _parts() -> QWidget:
     rows.addItems(["a row", "a selected row"])
     rows.setCurrentRow(1)
     grid.addWidget(rows, 3, 1)
-    for at, grade in enumerate(("wrong", "look")):
+    for index, grade in enumerate(("wrong", "look")):
         sample = label(f"This is {grade}.", "value")
         sample.setProperty("grade", grade)
-        grid.addWidget(sample, at + 1, 2)
+        grid.addWidget(sample, index + 1, 2)
     return widget
 
 
 def _luminance(name: str) -> float:
-    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in QColor(name).getRgbF()[:3]]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    channels = QColor(name).getRgbF()[:3]
+    red, green, blue = (share / 12.92 if share <= 0.03928 else ((share + 0.055) / 1.055) ** 2.4 for share in channels)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
     """Return the lines of a table in Markdown."""
-    return [*(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows)), ""]
+    return [*(f"| {' | '.join(row)} |" for row in (header, ("---",) * len(header), *rows)), ""]

@@ -47,12 +47,12 @@ class Address:
             raise AddressError(f"{self.uri}: {option}={text[:40]} must be a number above 0")
         return value
 
-    def word(self, option: str, words: tuple[Word, ...]) -> Word:
-        """Return an option that is one of `words`, the first where it is not given. Raises AddressError for another."""
-        text = self.options.get(option, words[0])
-        if text not in words:
-            raise AddressError(f"{self.uri}: {option}={text} must be {' or '.join(words)}")
-        return words[words.index(text)]
+    def word(self, option: str, choices: tuple[Word, ...]) -> Word:
+        """Return an option that is one of `choices`, the first where it is not given. Raises AddressError."""
+        text = self.options.get(option, choices[0])
+        if text not in choices:
+            raise AddressError(f"{self.uri}: {option}={text} must be {' or '.join(choices)}")
+        return choices[choices.index(text)]
 
 
 def parse_address(uri: str) -> Address:
@@ -69,7 +69,7 @@ def parse_address(uri: str) -> Address:
     scheme, marker, _ = uri.partition(":")
     if marker and " " in uri.strip() and uri.isprintable():
         raise AddressError(f"{uri}: a device address holds no space; write %20 for each, in the name of a file too")
-    if not marker or not parts.scheme or any(c.isspace() or not c.isprintable() for c in uri):
+    if not marker or not parts.scheme or any(character.isspace() or not character.isprintable() for character in uri):
         raise AddressError(f"{uri!r} is not a device address; one looks like net-ft://192.168.1.1")
     if port is not None:
         raise AddressError(f"{uri}: write the port as an option, for example {scheme}://{parts.hostname}?http={port}")
@@ -83,7 +83,7 @@ def parse_address(uri: str) -> Address:
 
 
 @contextmanager
-def at(address: Address) -> Generator[None]:
+def prefix_failures(address: Address) -> Generator[None]:
     """Put the address before what a link or a device says of its failure inside."""
     try:
         yield
@@ -141,6 +141,6 @@ def with_tool(info: TransducerInfo, tool: Tool) -> TransducerInfo:
     """Return who the transducer is, its wrench as the tool transform says."""
     if not tool:
         return info
-    words = "{:g} {:g} {:g} mm, {:g} {:g} {:g} degrees, as the address says".format(*tool)
-    settings = {**info.settings, "user's tool transform": words}
+    description = "{:g} {:g} {:g} mm, {:g} {:g} {:g} degrees, as the address says".format(*tool)
+    settings = {**info.settings, "user's tool transform": description}
     return replace(info, calibration=info.calibration.with_tool(tool), settings=settings)

@@ -27,7 +27,7 @@ class Calibration:
         """
         return (raw - bias) @ self.matrix.T
 
-    def own(self, wrench: Array) -> Array:
+    def in_own_frame(self, wrench: Array) -> Array:
         """Return a wrench (n, 6) [N, N mm] about the transducer's own origin and axes, for which `rated` holds."""
         if not self.tool:
             return wrench
@@ -43,22 +43,22 @@ class Calibration:
         >>> cal.with_tool((0.0, 0.0, -5.0, 0.0, 0.0, 0.0)).matrix[3].tolist()
         [0.0, -5.0, 0.0, 1.0, 0.0, 0.0]
         """
-        words = "tool transform {:g} {:g} {:g} mm, {:g} {:g} {:g} degrees".format(*tool)
+        description = "tool transform {:g} {:g} {:g} mm, {:g} {:g} {:g} degrees".format(*tool)
         matrix = _tool_matrix(tool) @ self.matrix
-        return replace(self, matrix=matrix, tool=tool, source=f"{self.source}; {words}, as the address says")
+        return replace(self, matrix=matrix, tool=tool, source=f"{self.source}; {description}, as the address says")
 
 
-def wrench_transform(d: Array, r: Array) -> Array:
-    """Return the matrix (6, 6) that takes a wrench [N, N mm] to a frame displaced by `d` (3,) [mm], turned by `r` (3,).
+def wrench_transform(displacement: Array, rotation: Array) -> Array:
+    """Return the matrix (6, 6) that takes a wrench [N, N mm] to a frame with a `displacement` (3,) [mm] and `rotation`.
 
-    The turn [rad] is about x, then y, then z, as in the maker's DAQ F/T C library (ftrt.c, version 1.0.2).
+    The `rotation` (3,) [rad] is about x, then y, then z, as in the maker's DAQ F/T C library (ftrt.c, version 1.0.2).
 
     >>> wrench_transform(np.array([0.0, 0.0, 4.0]), np.zeros(3))[3:, :3] + 0.0
     array([[ 0.,  4.,  0.],
            [-4.,  0.,  0.],
            [ 0.,  0.,  0.]])
     """
-    (sx, sy, sz), (cx, cy, cz) = np.sin(r), np.cos(r)
+    (sx, sy, sz), (cx, cy, cz) = np.sin(rotation), np.cos(rotation)
     turn = np.array(
         [
             [cy * cz, sx * sy * cz + cx * sz, sx * sz - cx * sy * cz],
@@ -66,7 +66,7 @@ def wrench_transform(d: Array, r: Array) -> Array:
             [sy, -sx * cy, cx * cy],
         ]
     )
-    dx, dy, dz = d
+    dx, dy, dz = displacement
     lever = np.array([[0.0, dz, -dy], [-dz, 0.0, dx], [dy, -dx, 0.0]])
     return np.block([[turn, np.zeros((3, 3))], [turn @ lever, turn]])
 
@@ -90,6 +90,6 @@ def loads(wrench: Array, rated: Array) -> Array:
     >>> loads(np.array([[18.0, 0.0, -9.0, 0.0, 0.0, 250.0]]), np.array([36.0, 36.0, 36.0, 500.0, 500.0, 500.0]))
     array([[0.5 , 0.  , 0.25, 0.  , 0.  , 0.5 , 1.  ]])
     """
-    fx, fy, fz, tx, ty, tz = parts = np.abs(wrench / rated).T
+    fx, fy, fz, tx, ty, tz = shares = np.abs(wrench / rated).T
     sums = np.maximum(np.hypot(fx, fy) + tz, fz + np.hypot(tx, ty))
-    return np.column_stack([*parts, sums])
+    return np.column_stack([*shares, sums])

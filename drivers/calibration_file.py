@@ -82,16 +82,16 @@ def _parse(data: bytes, name: str) -> CalibrationFile:
     if len(user) == 6:
         rounding = _ROUNDING * (units[:, None] + np.abs(transform) @ (units / scale)[:, None])
         _check(matrix, _rows(user) * units[:, None], rounding)
-    serial, part, model = (
-        _word(where, key) for where, key in ((sensor, "Serial"), (body, "PartNumber"), (sensor, "BodyStyle"))
+    serial, part_number, model = (
+        _word(element, key) for element, key in ((sensor, "Serial"), (body, "PartNumber"), (sensor, "BodyStyle"))
     )
     if not serial:
         raise _Unusable("it names no Serial")
     day = _day(_word(body, "CalDate"))
-    origin = " ".join(filter(None, (f"{name}:", model, part)))
+    origin = " ".join(filter(None, (f"{name}:", model, part_number)))
     source = f"{origin}, calibrated {day}" if day else f"{origin}, day of calibration not stated"
     calibration = Calibration(serial, "V", matrix, rated, source)
-    return CalibrationFile(calibration, hashlib.sha256(data).hexdigest(), model, part, day, len(user) == 6)
+    return CalibrationFile(calibration, hashlib.sha256(data).hexdigest(), model, part_number, day, len(user) == 6)
 
 
 def _sensor_and_body(data: bytes) -> tuple[Element, Element]:
@@ -173,10 +173,10 @@ def _unit(element: Element, key: str, units: Mapping[str, float], default: str =
     return size
 
 
-def _above_zero(what: str, text: str) -> float:
+def _above_zero(name: str, text: str) -> float:
     value = number(text.strip())
     if not (math.isfinite(value) and value > 0.0):
-        raise _Unusable(f"the {what} is {text[:40]!r}, which must be a number above 0")
+        raise _Unusable(f"the {name} is {text[:40]!r}, which must be a number above 0")
     return value
 
 

@@ -31,7 +31,7 @@ class RateWatch:
         self._silence = silence
         self._points: deque[tuple[int, float]] = deque(maxlen=2 * _FINE[0] + 1)  # count and arrival, one a window
         self._best: tuple[float, int, float] | None = None  # in this window: lateness, count, arrival
-        self._ends = 0.0  # of this window
+        self._window_end = 0.0  # of this window
         self._last = 0.0  # arrival
 
     def take(self, count: int, received_ns: int) -> bool:
@@ -42,16 +42,16 @@ class RateWatch:
         now = received_ns * 1e-9
         if self._best is None or now - self._last > self._silence:
             self._points.clear()
-            self._best, self._ends, self._last = (now - count / self.rate, count, now), now + self._window, now
+            self._best, self._window_end, self._last = (now - count / self.rate, count, now), now + self._window, now
             return False
         self._last = now
         late = now - count / self.rate
-        if now < self._ends:
+        if now < self._window_end:
             if late < self._best[0]:
                 self._best = late, count, now
             return False
         self._points.append(self._best[1:])
-        self._best, self._ends = (late, count, now), now + self._window
+        self._best, self._window_end = (late, count, now), now + self._window
         return self._rate_changed()
 
     def begin_anew(self) -> None:
@@ -64,8 +64,8 @@ class RateWatch:
             if len(self._points) <= 2 * windows:
                 continue
             first, middle, last = (self._points[i] for i in (-1 - 2 * windows, -1 - windows, -1))
-            before, after = (_rate(*pair) / self.rate - 1.0 for pair in ((first, middle), (middle, last)))
-            if min(abs(before), abs(after)) > most and before * after > 0.0 and abs(after - before) < 0.5 * abs(after):
+            early, late = (_rate(*pair) / self.rate - 1.0 for pair in ((first, middle), (middle, last)))
+            if min(abs(early), abs(late)) > most and early * late > 0.0 and abs(late - early) < 0.5 * abs(late):
                 self._points.clear()
                 self._find(_rate(first, last), most)
                 return True
@@ -82,7 +82,7 @@ class RateWatch:
         self._vague = 0.0
 
 
-def rate_of_least_late(came: Sequence[tuple[int, int]]) -> float:
+def rate_of_least_late(arrivals: Sequence[tuple[int, int]]) -> float:
     """Return the steady rate [Hz] at which these counts can have come [ns], each late but never early; nan of one.
 
     That of the line below all arrivals that is highest in their middle (Moon, Skelly and Towsley 1999, Proc. INFOCOM,
@@ -92,14 +92,14 @@ def rate_of_least_late(came: Sequence[tuple[int, int]]) -> float:
     >>> rate_of_least_late([(0, 7_000_000), (1, 10_000_000), (2, 20_000_000), (3, 30_000_000), (4, 70_000_000)])
     100.0
     """
-    if len(came) < 2:
+    if len(arrivals) < 2:
         return math.nan
     below: list[tuple[int, int]] = []  # corners of the lower hull
-    for count, at in came:
-        while len(below) > 1 and _turns_down(below[-2], below[-1], (count, at)):
+    for count, arrival_ns in arrivals:
+        while len(below) > 1 and _turns_down(below[-2], below[-1], (count, arrival_ns)):
             below.pop()
-        below.append((count, at))
-    middle = (came[0][0] + came[-1][0]) / 2.0
+        below.append((count, arrival_ns))
+    middle = (arrivals[0][0] + arrivals[-1][0]) / 2.0
     first, last = next(side for side in pairwise(below) if side[1][0] >= middle)
     return (last[0] - first[0]) / (last[1] - first[1]) * 1e9 if last[1] > first[1] else math.nan
 
@@ -109,15 +109,14 @@ def _turns_down(first: tuple[int, int], middle: tuple[int, int], last: tuple[int
     return (middle[1] - first[1]) * (last[0] - first[0]) >= (last[1] - first[1]) * (middle[0] - first[0])
 
 
-def rate_words(what: str, rate: float, nominal: float) -> str:
+def rate_words(subject: str, rate: float, nominal: float) -> str:
     """Return what is the matter with a rate, or that it no longer is.
 
     >>> rate_words("readings come", 147.5, 295.0), rate_words("readings come", 295.0, 295.0)
     ('readings come at 147.5 Hz, not at 295 Hz', 'readings come at 295 Hz again')
     """
-    return (
-        f"{what} at {nominal:.6g} Hz again" if rate == nominal else f"{what} at {rate:.4g} Hz, not at {nominal:.6g} Hz"
-    )
+    text = f"{nominal:.6g} Hz again" if rate == nominal else f"{rate:.4g} Hz, not at {nominal:.6g} Hz"
+    return f"{subject} at {text}"
 
 
 def _rate(first: tuple[int, float], last: tuple[int, float]) -> float:
@@ -189,9 +188,9 @@ class ClockRecovery:
         elapsed_s = (received_ns - self._looked_ns) * 1e-9
         if elapsed_s < self._settle:
             return _NONE
-        late, before = self._lateness(np.concatenate(self._held_damaged), received_ns), self._held_late
+        late, previous_late = self._lateness(np.concatenate(self._held_damaged), received_ns), self._held_late
         self._looked_ns, self._held_late = received_ns, late
-        steady = abs(late - before) < _STEADY * elapsed_s
+        steady = abs(late - previous_late) < _STEADY * elapsed_s
         if late < 0.5 * self._limit or steady or received_ns - self._held_since_ns > self._longest * 1e9:
             return self.release()
         return _NONE

@@ -31,7 +31,7 @@ class UdpLink:
             raise LinkLost(
                 f"no way leads to {address}: {_reason(error)}; check the network cable and settings"
             ) from None
-        self._where = f"{address}, UDP port {port}"
+        self._location = f"{address}, UDP port {port}"
         self._timeout = 0.0
         self._socket.settimeout(0.0)
 
@@ -43,7 +43,7 @@ class UdpLink:
             with contextlib.suppress(ConnectionError):
                 self._socket.send(data)
         except OSError as error:
-            raise LinkLost(f"cannot send to {self._where}: {_reason(error)}; check the network cable") from None
+            raise LinkLost(f"cannot send to {self._location}: {_reason(error)}; check the network cable") from None
 
     def receive(self, timeout: float) -> bytes | None:
         """Return the next datagram, or None when none came within `timeout` seconds."""
@@ -55,7 +55,7 @@ class UdpLink:
         except (TimeoutError, BlockingIOError, ConnectionError):  # the last: an earlier datagram of ours was refused
             return None
         except OSError as error:
-            raise LinkLost(f"cannot receive from {self._where}: {_reason(error)}; check the network cable") from None
+            raise LinkLost(f"cannot receive from {self._location}: {_reason(error)}; check the network cable") from None
 
     def close(self) -> None:
         """Give the port back."""
@@ -63,14 +63,14 @@ class UdpLink:
 
 
 @contextlib.contextmanager
-def _name_failures(where: str, absence: str, advice: str, deadline: Deadline) -> Generator[None]:
+def _name_failures(location: str, absence: str, advice: str, deadline: Deadline) -> Generator[None]:
     """Raise LinkLost for a failure of the network inside, which says where, what is missing and what to do."""
     try:
         yield
     except TimeoutError:
-        raise LinkLost(f"{where} gave {absence} within {deadline.spent:.2g} s; {advice}") from None
+        raise LinkLost(f"{location} gave {absence} within {deadline.spent:.2g} s; {advice}") from None
     except OSError as error:
-        raise LinkLost(f"nothing answers at {where}: {_reason(error)}; {advice}") from None
+        raise LinkLost(f"nothing answers at {location}: {_reason(error)}; {advice}") from None
 
 
 def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
@@ -78,9 +78,9 @@ def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Dea
 
     Raises LinkLost when nothing answers at the IP address, or not all by the deadline.
     """
-    where = f"{address}, TCP port {port}"
+    location = f"{address}, TCP port {port}"
     with (
-        _name_failures(where, "no whole answer", "check the address and the tcp port", deadline),
+        _name_failures(location, "no whole answer", "check the address and the tcp port", deadline),
         _Call(address, port, deadline) as call,
     ):
         return call.ask(request).read(size)
@@ -136,34 +136,35 @@ def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnsw
 
     Redirects are not followed. Raises LinkLost where no HTTP of at most MOST_BODY answers at the address in time.
     """
-    where = f"http://{address}:{port}{path}"
+    location = f"http://{address}:{port}{path}"
     with (
-        _name_failures(where, "no answer", "check power, cable and address", deadline),
+        _name_failures(location, "no answer", "check power, cable and address", deadline),
         _Call(address, port, deadline) as call,
     ):
-        return _answer(call.ask(f"GET {path} HTTP/1.0\r\nHost: {address}\r\nConnection: close\r\n\r\n".encode()), where)
+        request = f"GET {path} HTTP/1.0\r\nHost: {address}\r\nConnection: close\r\n\r\n"
+        return _answer(call.ask(request.encode()), location)
 
 
-def _answer(reader: io.BufferedReader, where: str) -> HttpAnswer:
+def _answer(reader: io.BufferedReader, location: str) -> HttpAnswer:
     """Read one HTTP/1.0 answer: to its stated length, or else to the end of the connection."""
-    no_page = LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
-    head = b""
-    while not head.endswith(b"\r\n\r\n"):
+    no_page = LinkLost(f"{location} does not answer as a web page does; check the address and the http port")
+    header = b""
+    while not header.endswith(b"\r\n\r\n"):
         line = reader.readline(MOST_HEAD)
-        head += line
-        if not line or len(head) > MOST_HEAD:
+        header += line
+        if not line or len(header) > MOST_HEAD:
             raise no_page
-    status = re.match(rb"HTTP/\S*[ \t]+(\d+)(?!\S)", head)
+    status = re.match(rb"HTTP/\S*[ \t]+(\d+)(?!\S)", header)
     if status is None:
         raise no_page
-    length_field = re.search(rb"\n[ \t]*content-length[ \t]*:[ \t]*(\d+)[ \t]*\r\n", head, re.IGNORECASE)
+    length_field = re.search(rb"\n[ \t]*content-length[ \t]*:[ \t]*(\d+)[ \t]*\r\n", header, re.IGNORECASE)
     length = None if length_field is None else int(length_field[1][:12])
     too_long = (length or 0) > MOST_BODY
     body = b"" if too_long else reader.read(MOST_BODY + 1 if length is None else length)
     if too_long or len(body) > MOST_BODY:
-        raise LinkLost(f"{where} sends more than {MOST_BODY} bytes; check that it is the address of the box")
+        raise LinkLost(f"{location} sends more than {MOST_BODY} bytes; check that it is the address of the box")
     if length is not None and len(body) < length:
-        raise LinkLost(f"{where} broke off after {len(body)} of {length} bytes; try again")
+        raise LinkLost(f"{location} broke off after {len(body)} of {length} bytes; try again")
     return HttpAnswer(int(status[1][:4]), body)
 
 

@@ -38,13 +38,13 @@ class ReadingBlock:
 
     def between(self, start: int, stop: int) -> "ReadingBlock":
         """Return the readings at positions start <= i < stop."""
-        return ReadingBlock(**{f.name: getattr(self, f.name)[start:stop] for f in fields(self)})
+        return ReadingBlock(**{field.name: getattr(self, field.name)[start:stop] for field in fields(self)})
 
     @staticmethod
     def empty() -> "ReadingBlock":
         """Return a block of no readings."""
-        whole = np.empty(0, np.int64)
-        return ReadingBlock(whole, whole, whole, np.empty(0), whole, np.empty((0, 6)))
+        integers = np.empty(0, np.int64)
+        return ReadingBlock(integers, integers, integers, np.empty(0), integers, np.empty((0, 6)))
 
     @staticmethod
     def concatenate(blocks: Iterable["ReadingBlock"]) -> "ReadingBlock":
@@ -52,7 +52,7 @@ class ReadingBlock:
         non_empty = [block for block in blocks if len(block)]
         if not non_empty:
             return ReadingBlock.empty()
-        names = [f.name for f in fields(ReadingBlock)]
+        names = [field.name for field in fields(ReadingBlock)]
         return ReadingBlock(**{name: np.concatenate([getattr(block, name) for block in non_empty]) for name in names})
 
 

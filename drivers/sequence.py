@@ -39,9 +39,9 @@ class _Record:
     counter: int
     received_ns: int
 
-    def since(self, before: "_Record") -> tuple[int, int]:
+    def since(self, previous: "_Record") -> tuple[int, int]:
         """Return how many numbers and ticks it lies ahead of one before."""
-        return _signed_difference(self.number - before.number), _signed_difference(self.counter - before.counter)
+        return _signed_difference(self.number - previous.number), _signed_difference(self.counter - previous.counter)
 
 
 class SequenceAccount:
@@ -80,7 +80,7 @@ class SequenceAccount:
         """
         if len(numbers) == 0:
             return Accounting(np.empty(0, np.intp), np.empty(0, np.int64), np.empty(0, np.int64), undecided=False)
-        return self._on_the_line(numbers, counters, received_ns) or self._one_by_one(
+        return self._on_the_line(numbers, counters, received_ns) or self._take_each(
             [_Record(*record) for record in zip(numbers.tolist(), counters.tolist(), received_ns, strict=True)], end
         )
 
@@ -102,14 +102,14 @@ class SequenceAccount:
         self._last = _Record(int(numbers[-1]), int(counters[-1]), received_ns[-1])
         return Accounting(np.arange(len(numbers)), sequence, counter, undecided=False)
 
-    def _one_by_one(self, records: list[_Record], end: bool) -> Accounting:
+    def _take_each(self, records: list[_Record], end: bool) -> Accounting:
         positions: list[int] = []
-        places: list[tuple[int, int]] = []
+        counts: list[tuple[int, int]] = []
         candidate: int | None = None
 
         def keep(position: int) -> None:
             positions.append(position)
-            places.append((self._sequence, self._counter))
+            counts.append((self._sequence, self._counter))
 
         for position, record in enumerate(records):
             relation = "off" if self._last is None else self._relation(self._last, record)
@@ -135,12 +135,12 @@ class SequenceAccount:
         if end and candidate is not None:
             self._reject(records[candidate])
             candidate = None
-        table = np.array(places, np.int64).reshape(-1, 2)
+        table = np.array(counts, np.int64).reshape(-1, 2)
         return Accounting(np.array(positions, np.intp), table[:, 0], table[:, 1], undecided=candidate is not None)
 
-    def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
-        """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""
-        ahead, ticks = record.since(before)
+    def _relation(self, previous: _Record, record: _Record, *, learning: bool = False) -> Relation:
+        """Say how a record lies to the previous one; when `learning`, one number may take any number of ticks."""
+        ahead, ticks = record.since(previous)
         on_line = self.step is not None and ticks == _signed_difference(ahead * self.step)
         if ahead == 0:
             return "same" if ticks == 0 else "off"
@@ -159,7 +159,7 @@ class SequenceAccount:
         else:
             assert self._last is not None
             self.frozen += relation == "frozen"
-            self._go(record, *record.since(self._last))
+            self._advance(record, *record.since(self._last))
             return True
         return False
 
@@ -176,7 +176,7 @@ class SequenceAccount:
         last = self._last
         if last is None:
             self._sequence = self._first - 1
-            self._go(record, max(_signed_difference(record.number - self._first), 0) + 1, record.counter)
+            self._advance(record, max(_signed_difference(record.number - self._first), 0) + 1, record.counter)
             return
         ahead, ticks = record.since(last)
         step = self.step or 1
@@ -188,9 +188,9 @@ class SequenceAccount:
             ticks = ahead * step
         elif ahead <= 0:  # the same device numbers its records anew: its counter tells what is missing
             ahead = max(round(ticks / step), 1)
-        self._go(record, ahead, ticks)
+        self._advance(record, ahead, ticks)
 
-    def _go(self, record: _Record, ahead: int, ticks: int) -> None:
+    def _advance(self, record: _Record, ahead: int, ticks: int) -> None:
         """Move to `record`, which lies `ahead` numbers and `ticks` further on."""
         self.lost += ahead - 1
         self._sequence += ahead

@@ -37,7 +37,7 @@ class SerialLink:
 
     def __init__(self, port: str, baud: int, parity: Parity = "none") -> None:
         """Open `port` at `baud` bits a second. Raises SetupError when it is missing, busy or not permitted."""
-        self._where = port
+        self._port_name = port
         self._timeout = 0.0
         try:
             self._port = serial.Serial(
@@ -63,7 +63,7 @@ class SerialLink:
                     raise OSError
                 data = data[self._port.write(data) :]
         except (*_PORT_ERRORS, ValueError):  # the latter from a port that is closed
-            raise LinkLost(f"{self._where} takes no bytes any more; check that its plug is in") from None
+            raise LinkLost(f"{self._port_name} takes no bytes any more; check that its plug is in") from None
 
     def receive(self, timeout: float) -> bytes | None:
         """Return what has arrived, or None when nothing came within `timeout` real seconds."""
@@ -76,7 +76,7 @@ class SerialLink:
                 data += self._port.read(available)
             return data or None
         except (*_PORT_ERRORS, ValueError):  # the latter from a port that vanishes while its waiting time is set
-            raise LinkLost(f"{self._where} is gone; check that its plug is in") from None
+            raise LinkLost(f"{self._port_name} is gone; check that its plug is in") from None
 
     def close(self) -> None:
         """Give the port back. Harmless when repeated."""

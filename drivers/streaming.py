@@ -61,32 +61,32 @@ def measured_rate(
     when hardly any records come, and what `conversation.begin` raises.
     """
     decoder = conversation.decoder()
-    came: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
+    arrivals: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
     rate, count = math.nan, 0
     try:
         data: bytes | None = conversation.begin(deadline.bound(link))
         for look in range(_LOOKS):
-            part, earlier = deadline.within(seconds / 2.0), len(came)
+            limit, earlier = deadline.within(seconds / 2.0), len(arrivals)
             while True:
                 more = len(decoder.feed(data).status) if data else 0
                 if more:
                     count += more
-                    came.append((count, clock.now_ns()))
+                    arrivals.append((count, clock.now_ns()))
                 data = link.receive(TICK)
-                if part.remaining <= 0.0:
+                if limit.remaining <= 0.0:
                     break
-            before, latest, rate = rate, rate_of_least_late(came[earlier:]), rate_of_least_late(came)
-            alike = look and (abs(rate / nominal - 1.0) < _ALIKE or abs(latest / before - 1.0) < _ALIKE)
+            previous_rate, latest, rate = rate, rate_of_least_late(arrivals[earlier:]), rate_of_least_late(arrivals)
+            alike = look and (abs(rate / nominal - 1.0) < _ALIKE or abs(latest / previous_rate - 1.0) < _ALIKE)
             if alike or deadline.remaining <= 0.0:
                 break
     finally:
-        _end(conversation, link)
+        _end_stream(conversation, link)
     if math.isnan(rate):
         raise LinkLost("it sends no readings when asked to stream; switch it off and on, and check the cable")
     return rate
 
 
-def _end(conversation: Conversation, link: Link) -> None:
+def _end_stream(conversation: Conversation, link: Link) -> None:
     with contextlib.suppress(LinkLost):
         conversation.end(Deadline(ENDING).bound(link))
 
@@ -147,8 +147,8 @@ class StreamingTransducer(ThreadedTransducer):
     def never_came(self, seconds: float) -> str:
         """Return why no reading came within `seconds`, in a sentence."""
         count = self.health.malformed
-        what = f"{count} broken records and no reading" if count else "no reading"
-        return f"{self.info.uri} sent {what} within {seconds:.1f} s; check its power, the cable and the address"
+        description = f"{count} broken records and no reading" if count else "no reading"
+        return f"{self.info.uri} sent {description} within {seconds:.1f} s; check its power, the cable and the address"
 
     def reset(self) -> None:
         """Forget what an earlier stream left."""
@@ -189,7 +189,7 @@ class StreamingTransducer(ThreadedTransducer):
             try:
                 self._listen(link, self._decoder, first)
             finally:
-                _end(self._conversation, link)
+                _end_stream(self._conversation, link)
         finally:
             link.close()
 
@@ -237,15 +237,15 @@ class StreamingTransducer(ThreadedTransducer):
         if not len(placement.sequence):
             return
         arrivals, self._held_back = self._held_back, []
-        parts = [(a.records, a.received_ns) for a in arrivals if a.records is not None]
-        status = np.concatenate([records.status for records, _ in parts])
+        batches = [arrival.records for arrival in arrivals if arrival.records is not None]
+        received_ns = np.array([arrival.received_ns for arrival in arrivals if arrival.records is not None], np.int64)
         self.hand_over(
             ReadingBlock(
                 sequence=placement.sequence,
                 counter=placement.sequence,
-                status=status,
+                status=np.concatenate([records.status for records in batches]),
                 time=placement.time,
-                received_ns=np.concatenate([np.full(len(records.status), at, np.int64) for records, at in parts]),
-                raw=np.concatenate([records.raw for records, _ in parts]),
+                received_ns=np.repeat(received_ns, [len(records.status) for records in batches]),
+                raw=np.concatenate([records.raw for records in batches]),
             )
         )

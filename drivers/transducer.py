@@ -43,10 +43,10 @@ class StatusTable:
     def entries(self, status: int) -> tuple[StatusBit, ...]:
         """Return what a status says; nothing when the device is healthy."""
         entries = [entry for entry in self.bits if status & entry.mask == entry.value]
-        rest = status & ~self.summary
+        unnamed = status & ~self.summary
         for entry in entries:
-            rest &= ~entry.mask
-        unknown = [number for number in range(63, -1, -1) if rest >> number & 1]
+            unnamed &= ~entry.mask
+        unknown = [number for number in range(63, -1, -1) if unnamed >> number & 1]
         verdict: Verdict = "doubtful" if any(entry.verdict != "note" for entry in self.bits) else "saturated"
         entries += [bit(number, f"unknown bit {number}", verdict) for number in unknown]
         if not entries and status & self.summary:
@@ -60,7 +60,7 @@ class StatusTable:
     def verdict(self, status: int) -> Verdict | None:
         """Return what a status says of the values, the gravest of all that is set; None when the device is healthy."""
         verdicts = {entry.verdict for entry in self.entries(status)}
-        return next((one for one in ("saturated", "doubtful", "note") if one in verdicts), None)
+        return next((candidate for candidate in ("saturated", "doubtful", "note") if candidate in verdicts), None)
 
     def doubtful(self, status: Indices) -> Mask:
         """Tell of each status (n,) whether it speaks against the reading's six values."""
@@ -73,8 +73,8 @@ class StatusTable:
     def _mask(self, status: Indices, verdicts: tuple[Verdict, ...]) -> Mask:
         if not status.any():
             return np.zeros(len(status), np.bool_)
-        kinds, which = np.unique(status, return_inverse=True)
-        return np.array([self.verdict(int(kind)) in verdicts for kind in kinds], np.bool_)[which]
+        values, inverse = np.unique(status, return_inverse=True)
+        return np.array([self.verdict(int(value)) in verdicts for value in values], np.bool_)[inverse]
 
     @property
     def harmless(self) -> int:
@@ -94,11 +94,11 @@ class StatusCount:
         """Count readings of these statuses (n,)."""
         if not status.any():
             return
-        for kind, count in zip(*(column.tolist() for column in np.unique(status, return_counts=True)), strict=True):
-            if (verdict := self.table.verdict(kind)) is not None:
+        for value, count in zip(*(column.tolist() for column in np.unique(status, return_counts=True)), strict=True):
+            if (verdict := self.table.verdict(value)) is not None:
                 self.verdicts[verdict] += count
-            for words in self.table.words(kind):
-                self.flagged[words] += count
+            for text in self.table.words(value):
+                self.flagged[text] += count
 
 
 def flagged_words(flagged: Mapping[str, int]) -> str:
@@ -108,7 +108,7 @@ def flagged_words(flagged: Mapping[str, int]) -> str:
     'gauge excitation current too low (200), HTTP error (2)'
     """
     by_count = sorted(flagged.items(), key=lambda item: -item[1])
-    return ", ".join(f"{words} ({count})" for words, count in by_count)
+    return ", ".join(f"{text} ({count})" for text, count in by_count)
 
 
 class SetupError(Exception):
@@ -160,7 +160,7 @@ class Health:
     lag_ms: float = 0.0  # age of the newest reading when it was handed over [ms of the session's clock]
 
 
-COUNTS = tuple(one.name for one in fields(Health) if one.type is int and one.name != "received")  # of what went wrong
+COUNTS = tuple(count.name for count in fields(Health) if count.type is int and count.name != "received")  # of flaws
 
 
 class Transducer(Protocol):

@@ -29,11 +29,11 @@ class Endpoints(NamedTuple):
 class UsbLink:
     """One device, which nobody else can open meanwhile. What is received after a request is its answer."""
 
-    def __init__(self, device: Any, endpoints: Endpoints, where: str) -> None:  # noqa: ANN401 - pyusb has no types
+    def __init__(self, device: Any, endpoints: Endpoints, location: str) -> None:  # noqa: ANN401 - pyusb has no types
         """Take a device that was found. Raises SetupError when another program has it or it is not permitted."""
         self._device = device
         self._endpoints = endpoints
-        self._where = where
+        self._location = location
         self._awaits_answer = False
         try:
             try:
@@ -43,34 +43,34 @@ class UsbLink:
             _util.claim_interface(device, 0)
         except _core.USBError as error:
             _util.dispose_resources(device)
-            raise SetupError(f"{where} cannot be opened: {_reason(error)}") from None
+            raise SetupError(f"{location} cannot be opened: {_reason(error)}") from None
 
     def send(self, data: bytes) -> None:
         """Send a request. Raises LinkLost when the device is gone."""
         try:
             self._device.write(self._endpoints.requests, data, _WRITE_MS)
         except _core.USBError as error:
-            raise LinkLost(f"{self._where} takes no bytes any more: {_reason(error)}") from None
+            raise LinkLost(f"{self._location} takes no bytes any more: {_reason(error)}") from None
         self._awaits_answer = True
 
     def receive(self, timeout: float) -> bytes | None:
         """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
         awaits = self._awaits_answer
         endpoint = self._endpoints.answers if awaits else self._endpoints.stream
-        parts: list[bytes] = []
+        packets: list[bytes] = []
         wait_ms = max(round(timeout * 1000), 1)
-        while len(parts) < (1 if awaits else _PACKETS):
+        while len(packets) < (1 if awaits else _PACKETS):
             try:
-                parts.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
+                packets.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
                 self._awaits_answer = False  # only now: who waits in short turns must still find the answer
             except _core.USBTimeoutError:
                 break
             except _core.USBError as error:
-                if parts:
+                if packets:
                     break  # the next call tells
-                raise LinkLost(f"{self._where} is gone: {_reason(error)}") from None
+                raise LinkLost(f"{self._location} is gone: {_reason(error)}") from None
             wait_ms = _PAUSE_MS
-        return b"".join(parts) or None
+        return b"".join(packets) or None
 
     def close(self) -> None:
         """Give the device back. Harmless when repeated."""

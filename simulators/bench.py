@@ -101,8 +101,8 @@ class Bench:
         with self._lock:
             self._surface = surface
 
-    def begin_stroke(self, stroke: Stroke, at: float) -> StrokeGroundTruth:
-        """Let a stroke over the mounted stimulus begin at time `at` [s]; return its ground truth.
+    def begin_stroke(self, stroke: Stroke, time: float) -> StrokeGroundTruth:
+        """Let a stroke over the mounted stimulus begin at time `time` [s]; return its ground truth.
 
         Raises ValueError when nothing is mounted or the stroke before has not ended by then.
         """
@@ -110,11 +110,11 @@ class Bench:
             surface = self._surface
             if surface is None:
                 raise ValueError("nothing is mounted on the bench: mount a surface before a stroke begins")
-            if self._strokes and at < self._strokes[-1][0] + self._strokes[-1][1].lift:
-                raise ValueError(f"a stroke cannot begin at {at} s: the one before has not ended")
+            if self._strokes and time < self._strokes[-1][0] + self._strokes[-1][1].lift:
+                raise ValueError(f"a stroke cannot begin at {time} s: the one before has not ended")
             course = Course(stroke, surface.mu, surface.holds)
-            ground_truth = self._stroke_ground_truth(at, course, surface)
-            self._strokes = (*self._strokes, (at, course, ground_truth))
+            ground_truth = self._stroke_ground_truth(time, course, surface)
+            self._strokes = (*self._strokes, (time, course, ground_truth))
         return ground_truth
 
     def ground_truth(self) -> tuple[StrokeGroundTruth, ...]:
@@ -183,7 +183,7 @@ def _course_wrench(course: Course, time: Array, height: float) -> Array:
 
 def _rotation(about_x: float, about_y: float) -> Array:
     """Return the matrix (3, 3) that turns the stimulus's axes about x, then about y [degrees]."""
-    (sx, cx), (sy, cy) = ((np.sin(a), np.cos(a)) for a in np.radians([about_x, about_y]))
+    (sx, cx), (sy, cy) = ((np.sin(angle), np.cos(angle)) for angle in np.radians([about_x, about_y]))
     turn_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     turn_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     return turn_y @ turn_x
@@ -295,5 +295,5 @@ class DirectTransducer:
         if not 0 < number <= len(truths):
             return np.inf, np.inf
         stroke = truths[number - 1]
-        first, last = (stroke.slip + part * (stroke.lift - stroke.slip) for part in _MIDDLE)
+        first, last = (stroke.slip + fraction * (stroke.lift - stroke.slip) for fraction in _MIDDLE)
         return first, last

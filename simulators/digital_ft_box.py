@@ -95,22 +95,22 @@ class DigitalFtBox(LineBox):
                 self._deaf_until = self.now() + _DEAF
         elif self.now() >= self._deaf_until:
             self._inbox += data
-            port.say(self._answers())
+            port.send(self._answers())
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
         if self._streaming_since is None:
             return
         times, self._sent = self.faults.due(self._streaming_since, now, self._rate, self._sent, _BURST)
-        port.say(b"".join(self.faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
+        port.send(b"".join(self.faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
 
     def _packets(self, times: Array) -> list[bytes]:
         """Return a packet for each of `times` (n,) [s]."""
         gauges = np.rint(self.faults.sensed_wrench(self._bench, times) @ self._gauges.T)
         gauges[self.faults.during("saturate", times)] = 32767
-        over = np.any(np.abs(gauges) >= 32767, axis=1)
+        overloaded = np.any(np.abs(gauges) >= 32767, axis=1)
         gauges = np.clip(gauges, -32768, 32767)[:, [0, 2, 4, 1, 3, 5]].astype(">i2")
         packets: list[bytes] = []
-        for time, six, above in zip(times.tolist(), gauges, over.tolist(), strict=True):
+        for time, six, above in zip(times.tolist(), gauges, overloaded.tolist(), strict=True):
             if not self.faults.active("stall", time):
                 body, fault = six.tobytes(), above or self.faults.status(time) != 0
                 self._last = body + bytes([sum(body) & 0x7F | (0x80 if fault else 0)])
@@ -145,15 +145,15 @@ class DigitalFtBox(LineBox):
         if function not in (0x03, 0x10):
             return bytes([function | 0x80, 1])
         first, count = struct.unpack(">HH", data[:4])
-        place = slice(2 * first, 2 * (first + count))
+        registers = slice(2 * first, 2 * (first + count))
         if not (1 <= count <= 64 and first + count <= _SIZE):
             return bytes([function | 0x80, 2])
         self._registers[2 * _STATUS : 2 * _STATUS + 2] = struct.pack(">H", self.faults.status(self.now()) & 0xFFFF)
         if function == 0x03:
-            return bytes([3, 2 * count]) + bytes(self._registers[place])
+            return bytes([3, 2 * count]) + bytes(self._registers[registers])
         if not self._unlocked or len(data) != 5 + 2 * count:
             return bytes([0x90, 4])
-        self._registers[place] = data[5:]
+        self._registers[registers] = data[5:]
         return b"\x10" + data[:4]
 
 

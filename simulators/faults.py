@@ -66,16 +66,16 @@ class Faults:
 
     def active(self, kind: Kind, time: float) -> bool:
         """Tell whether a fault of the box itself is on at `time` [s]."""
-        return self._at(kind, time) is not None
+        return self._active_fault(kind, time) is not None
 
     def status(self, time: float) -> int:
         """Return the status bits the box sets at `time` [s] beyond its own."""
-        fault = self._at("status", time)
+        fault = self._active_fault("status", time)
         return 0 if fault is None else fault.status
 
     def count_factor(self, time: float) -> float:
         """Return how many times as much as at first the box counts to a unit at `time` [s]."""
-        fault = self._at("units", time)
+        fault = self._active_fault("units", time)
         return 1.0 if fault is None else fault.share
 
     def device_time(self, times: Array) -> Array:
@@ -107,11 +107,11 @@ class Faults:
         local = times % self._repeat if self._repeat > 0.0 else times
         for fault in self._timetable:
             if fault.kind == "drift":
-                part = np.clip((local - fault.start) / (fault.stop - fault.start), 0.0, 1.0)
-                wrench = wrench + fault.share * part[:, None] * np.array(bench.settings.rated)
+                fraction = np.clip((local - fault.start) / (fault.stop - fault.start), 0.0, 1.0)
+                wrench = wrench + fault.share * fraction[:, None] * np.array(bench.settings.rated)
             elif fault.kind == "miscalibrate":
-                on = (local >= fault.start) & (local < fault.stop)
-                wrench = wrench * np.where(on, 1.0 + fault.share, 1.0)[:, None]
+                during = (local >= fault.start) & (local < fault.stop)
+                wrench = wrench * np.where(during, 1.0 + fault.share, 1.0)[:, None]
         return wrench
 
     def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
@@ -134,7 +134,7 @@ class Faults:
         """Return what becomes of one datagram, in the order it leaves."""
         datagrams = [datagram]
         for kind in _ON_THE_WAY:
-            fault = self._at(kind, time)
+            fault = self._active_fault(kind, time)
             if fault is None:
                 continue
             draw = np.random.default_rng([self._seed, round(time * 1e6), FAULT_KINDS.index(kind)])
@@ -165,9 +165,10 @@ class Faults:
             case _:
                 return [datagram]
 
-    def _at(self, kind: Kind, time: float) -> Fault | None:
+    def _active_fault(self, kind: Kind, time: float) -> Fault | None:
         local = time % self._repeat if self._repeat > 0.0 else time
-        return next((f for f in self._timetable if f.kind == kind and f.start <= local < f.stop), None)
+        faults = (fault for fault in self._timetable if fault.kind == kind)
+        return next((fault for fault in faults if fault.start <= local < fault.stop), None)
 
 
 def _device_clock(timetable: Sequence[Fault], repeat: float) -> tuple[Array, Array] | None:

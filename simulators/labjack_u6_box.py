@@ -51,7 +51,7 @@ class LabJackU6Box:
     @property
     def is_plugged(self) -> bool:
         """Whether the computer sees it; it loses its power with the plug."""
-        away = any(self._faults.active(kind, self.now()) for kind in ("unplug", "reboot"))
+        away = any(self._faults.active(fault, self.now()) for fault in ("unplug", "reboot"))
         if away:
             with self._lock:
                 self._switch_on()
@@ -125,9 +125,9 @@ class LabJackU6Box:
         first = 0 if block in (0, 2) else 2
         numbers = [0.0] * 4
         if block in (0, 1):
-            numbers = [x for g in gains[first : first + 2] for x in (_VOLTS_PER_CODE * g, -10.58 * g)]
+            numbers = [x for gain in gains[first : first + 2] for x in (_VOLTS_PER_CODE * gain, -10.58 * gain)]
         elif block in (2, 3):
-            numbers = [x for g in gains[first : first + 2] for x in (_VOLTS_PER_CODE_BELOW * g, _ZERO_CODE)]
+            numbers = [x for gain in gains[first : first + 2] for x in (_VOLTS_PER_CODE_BELOW * gain, _ZERO_CODE)]
         return b"".join(round(x * 2**32).to_bytes(8, "little", signed=True) for x in numbers)
 
     def _configure(self, body: bytes) -> int:
@@ -177,9 +177,9 @@ class LabJackU6Box:
         codes, self._buffer = self._buffer[:samples], self._buffer[samples:]
         loss, error = 0, 59 if self._lost_scans else 0
         if self._report is not None:
-            at, reported_loss = self._report
-            self._report = (at - samples, reported_loss) if at >= samples else None
-            loss, error = (0, 59) if at >= samples else (reported_loss, 60)
+            position, reported_loss = self._report
+            self._report = (position - samples, reported_loss) if position >= samples else None
+            loss, error = (0, 59) if position >= samples else (reported_loss, 60)
         error = error or self._faults.status(self.now()) & 0xFF
         data = loss.to_bytes(4, "little") + bytes([self._sent % 256, error])
         data += b"".join(code.to_bytes(2, "little") for code in codes) + bytes([min(len(self._buffer) // 4, 255), 0])
@@ -201,13 +201,13 @@ def _short(command: int, error: int) -> bytes:
 
 def _long(number: int, data: bytes, command: int = 0xF8) -> bytes:
     sixteen = (sum(data) % 65536).to_bytes(2, "little")
-    head = bytes([command, len(data) // 2, number]) + sixteen
-    return bytes([_checksum8(head)]) + head + data
+    header = bytes([command, len(data) // 2, number]) + sixteen
+    return bytes([_checksum8(header)]) + header + data
 
 
 def _sums_agree(request: bytes) -> bool:
-    whole = (sum(request[6:]) % 65536).to_bytes(2, "little")
-    return request[0] == _checksum8(request[1:6]) and request[4:6] == whole
+    checksum = (sum(request[6:]) % 65536).to_bytes(2, "little")
+    return request[0] == _checksum8(request[1:6]) and request[4:6] == checksum
 
 
 def _checksum8(data: bytes) -> int:
@@ -252,7 +252,7 @@ class SimulatedBus(_Backend):
         return len(self._claims)
 
     def enumerate_devices(self) -> Iterator[int]:
-        return iter([place for place, box in enumerate(self._boxes) if box.is_plugged])
+        return iter([number for number, box in enumerate(self._boxes) if box.is_plugged])
 
     def get_device_descriptor(self, dev: int) -> SimpleNamespace:
         values = 18, 1, 0x0200, 0xFF, 0, 0, 64, 0x0CD5, 0x0006, 0x0100, 0, 0, 0, 1

@@ -60,9 +60,9 @@ class NetFtBox(ServedBox):
         super().__init__(clock, faults)
         first_tick, self._first_record = first
         self._inside = Electronics(bench, self.faults, rate=rate, first_tick=first_tick, product=product)
-        kinds = socket.SOCK_DGRAM, socket.SOCK_STREAM, socket.SOCK_STREAM
-        self._addresses = tuple(zip(kinds, ("rdt", "tcp", "http"), ports, strict=True))
-        self._on = True
+        socket_types = socket.SOCK_DGRAM, socket.SOCK_STREAM, socket.SOCK_STREAM
+        self._addresses = tuple(zip(socket_types, ("rdt", "tcp", "http"), ports, strict=True))
+        self._is_on = True
         self._stream: _Stream | None = None
         self._selector = selectors.SelectSelector()  # the one whose waits are finer than a millisecond
         self._sockets: list[socket.socket] = []
@@ -110,14 +110,14 @@ class NetFtBox(ServedBox):
 
     def _has_power(self, now: float) -> bool:
         """Follow the timetable's reboots; return whether the box is on."""
-        on = not self.faults.active("reboot", now)
-        if on and not self._on:
+        is_on = not self.faults.active("reboot", now)
+        if is_on and not self._is_on:
             self._inside.reboot(now)
             self._stream = None
             while self._receive() is not None:  # what came while it was off is forgotten too
                 pass
-        self._on = on
-        return on
+        self._is_on = is_on
+        return is_on
 
     def _send_due(self, now: float) -> bool:
         """Send the records due, at most a burst, and whatever was delayed until now; tell whether more are due."""
@@ -216,22 +216,22 @@ class NetFtBox(ServedBox):
         return self._inside.http_reply(bytes(request), self.now()), True
 
 
-def _open_port(kind: socket.SocketKind, option: str, port: int | None) -> socket.socket:
+def _open_port(socket_type: socket.SocketKind, option: str, port: int | None) -> socket.socket:
     """Return a socket on `port` of loopback; None: 80 or a free one. Raises SetupError when it cannot be had."""
     if port is None:
         with contextlib.suppress(SetupError):
-            return _open_port(kind, option, 80)
+            return _open_port(socket_type, option, 80)
         port = 0
-    server = socket.socket(socket.AF_INET, kind)
+    server = socket.socket(socket.AF_INET, socket_type)
     try:
-        if kind == socket.SOCK_STREAM and os.name == "posix":  # there it lets a port be had again soon after its end
+        if socket_type == socket.SOCK_STREAM and os.name == "posix":  # there it frees a port soon after its end
             server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         server.bind((HOST, port))
-        if kind == socket.SOCK_STREAM:
+        if socket_type == socket.SOCK_STREAM:
             server.listen()
     except OSError as error:
         server.close()
-        name = "UDP" if kind == socket.SOCK_DGRAM else "TCP"
+        name = "UDP" if socket_type == socket.SOCK_DGRAM else "TCP"
         raise SetupError(
             f"{name} port {port} on {HOST} cannot be opened ({(error.strerror or 'refused').lower()}); "
             f"end the program that holds it, or choose another {option} port"

@@ -87,14 +87,14 @@ class Pages:
 
     def answer(self, target: str, status: int, counts: list[int]) -> tuple[int, str]:
         """Return (HTTP status, page) for a GET of `target`, with the box's status and counts of this instant."""
-        parts = urlsplit(target)
-        query = dict(parse_qsl(parts.query))
-        if parts.path == "/netftapi2.xml":
+        url = urlsplit(target)
+        query = dict(parse_qsl(url.query))
+        if url.path == "/netftapi2.xml":
             return 200, self._configuration(status, counts)
-        if parts.path == "/netftcalapi.xml":
+        if url.path == "/netftcalapi.xml":
             return 200, _page("netftCalibration", {"calsn": self._serial, "calcpf": self.counts, "calcpt": self.counts})
-        if parts.path in _SETTABLE:
-            for name in _SETTABLE[parts.path] & query.keys():
+        if url.path in _SETTABLE:
+            for name in _SETTABLE[url.path] & query.keys():
                 self._set(name, query[name])
             return 302, ""
         return 404, ""
@@ -124,7 +124,7 @@ class Pages:
             "scfgtu": torque[0],
             "cfgcpf": self.counts,
             "cfgcpt": self.counts,
-            "cfgmr": _join([f"{r:.9g}" for r in rated]),
+            "cfgmr": _join([f"{limit:.9g}" for limit in rated]),
             "cfgtdu": 3,
             "scfgtdu": "mm",
             "cfgtau": 1,
@@ -255,26 +255,26 @@ class Electronics:
 
     def http_reply(self, request: bytes, now: float) -> bytes:
         """Return the reply to an HTTP request."""
-        words = request.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
-        target = words[1] if len(words) == 3 and words[0] == "GET" else "/"
+        request_line = request.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
+        target = request_line[1] if len(request_line) == 3 and request_line[0] == "GET" else "/"
         if target.startswith("/rundata.cgi") and "cmd=bias" in target:
             self.set_bias(now)
         self.pages.count_factor = self._faults.count_factor(now)
         status, counts = self._status_and_counts(np.array([now]))
         code, page = self.pages.answer(target, status[0], counts[0].tolist())
         body = page.encode()
-        head = f"HTTP/1.0 {code} {_REASONS[code]}\r\nContent-Type: text/xml\r\nContent-Length: {len(body)}\r\n"
-        return (head + ("Location: /index.htm\r\n" if code == 302 else "") + "\r\n").encode() + body
+        header = f"HTTP/1.0 {code} {_REASONS[code]}\r\nContent-Type: text/xml\r\nContent-Length: {len(body)}\r\n"
+        return (header + ("Location: /index.htm\r\n" if code == 302 else "") + "\r\n").encode() + body
 
     def _status_and_counts(self, times: Array) -> tuple[list[int], Indices]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
         wrench = self._faults.sensed_wrench(self._bench, times)
         saturation = self._faults.during("saturate", times)
         wrench[saturation] = self._rated  # what a clipped converter shows
-        over = saturation | np.any(np.abs(wrench) > self._rated, axis=1)
+        overloaded = saturation | np.any(np.abs(wrench) > self._rated, axis=1)
         counts = (np.clip(wrench, -self._rated, self._rated) - self._bias) * self.pages.counts_per_wrench
         counts *= np.array([self._faults.count_factor(time) for time in times.tolist()])[:, None]
-        whole = np.clip(np.rint(counts), -(2**31), 2**31 - 1).astype(np.int64)
+        integers = np.clip(np.rint(counts), -(2**31), 2**31 - 1).astype(np.int64)
         saturated = self.pages.product.saturated
-        flags = zip(over.tolist(), times.tolist(), strict=True)
-        return [(saturated if above else 0) | self._faults.status(time) for above, time in flags], whole
+        flags = zip(overloaded.tolist(), times.tolist(), strict=True)
+        return [(saturated if above else 0) | self._faults.status(time) for above, time in flags], integers

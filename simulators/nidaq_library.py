@@ -49,7 +49,7 @@ class SimulatedNidaqmx(ModuleType):
         self.requests: list[tuple[Any, ...]] = []  # channels, terminals and limits
         self._clock = clock
         self._origin_ns = clock.now_ns()
-        self._before: dict[str, ModuleType | None] = {}
+        self._previous_modules: dict[str, ModuleType | None] = {}
 
     def now(self) -> float:
         """Return the device's and the bench's time [s]."""
@@ -57,18 +57,18 @@ class SimulatedNidaqmx(ModuleType):
 
     def install(self) -> None:
         """Let it be what `import nidaqmx` gives."""
-        parts = {name: self if "." not in name else ModuleType(name) for name in _MODULES}
-        self._before = {name: sys.modules.get(name) for name in _MODULES}
-        sys.modules.update(parts)
+        modules = {name: self if "." not in name else ModuleType(name) for name in _MODULES}
+        self._previous_modules = {name: sys.modules.get(name) for name in _MODULES}
+        sys.modules.update(modules)
 
     def remove(self) -> None:
         """Undo `install`."""
-        for name, module in self._before.items():
+        for name, module in self._previous_modules.items():
             if module is None:
                 sys.modules.pop(name, None)
             else:
                 sys.modules[name] = module
-        self._before = {}
+        self._previous_modules = {}
 
     def Task(self) -> "_Task":  # noqa: N802 - NI's name
         """Return a new acquisition."""
@@ -122,7 +122,7 @@ class _Task:
         return volts.T.tolist()
 
     def _refuse_without_device(self) -> None:
-        if any(self._library.faults.active(kind, self._library.now()) for kind in ("unplug", "reboot")):
+        if any(self._library.faults.active(fault, self._library.now()) for fault in ("unplug", "reboot")):
             raise DaqError(_ABSENT)
 
 

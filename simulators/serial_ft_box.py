@@ -65,15 +65,15 @@ class SerialFtBox(LineBox):
         """Send the banner and records that are due, and answer bytes as they come."""
         if self._ready_at is not None and now >= self._ready_at:
             self._ready_at = None
-            self._say(port, BANNER % self._bench.serial.encode() + b">")
+            self._send(port, BANNER % self._bench.serial.encode() + b">")
         self._send_due(port, now)
         for byte in port.receive(self._until_due()):
             if self._ready_at is None:
                 self._on_byte(port, byte if port.baud == self._baud else byte ^ 0x55)
 
-    def _say(self, port: PseudoTerminal, data: bytes) -> None:
+    def _send(self, port: PseudoTerminal, data: bytes) -> None:
         """Send `data`, garbled where the reader listens at another speed."""
-        port.say(data if port.baud == self._baud else bytes(byte ^ 0xA5 for byte in data))
+        port.send(data if port.baud == self._baud else bytes(byte ^ 0xA5 for byte in data))
 
     @property
     def _period(self) -> float:
@@ -94,21 +94,21 @@ class SerialFtBox(LineBox):
             return
         times, self._sent = self.faults.due(self._streaming_since, now, 1.0 / self._period, self._sent, _BURST)
         for record in self.faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
-            self._say(port, record)
+            self._send(port, record)
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
         if byte == 0x17:
             self.power_up(self.now())
         elif byte == 0x14:
-            self._say(port, self._one())
+            self._send(port, self._record())
         elif byte == 0x0D:
             command = bytes(self._line).strip().upper()
             self._line.clear()
             if self._streaming_since is not None:
                 self._streaming_since = None
-                self._say(port, b"\r\n>")
+                self._send(port, b"\r\n>")
             else:
-                self._say(port, command + b"\r\n" + self._answer(command))
+                self._send(port, command + b"\r\n" + self._answer(command))
         elif byte != 0x0A and len(self._line) < 80:
             self._line.append(byte)
 
@@ -119,7 +119,7 @@ class SerialFtBox(LineBox):
             self._streaming_since, self._sent = self.now(), 0
             return b""
         if command == b"QR":
-            return self._one() + (b"\x06\r\n>" if self._binary else b">")
+            return self._record() + (b"\x06\r\n>" if self._binary else b">")
         if name == b"CD":
             if argument not in (b"A", b"B", b"R", b"U"):
                 return b"not simulated\r\n>"
@@ -136,7 +136,7 @@ class SerialFtBox(LineBox):
             return b"not a command\r\n>"
         return b"\r\n>"
 
-    def _one(self) -> bytes:
+    def _record(self) -> bytes:
         return self._records(np.array([self.now()]))[0]
 
     def _records(self, times: Array) -> list[bytes]:
@@ -145,11 +145,11 @@ class SerialFtBox(LineBox):
             return []
         wrench = self.faults.sensed_wrench(self._bench, times)
         records: list[bytes] = []
-        over = np.any(np.abs(wrench) > self._rated, axis=1)
+        overloaded = np.any(np.abs(wrench) > self._rated, axis=1)
         bias = self._biases[-1] if self._biases else np.zeros(6)
         counts = np.rint((np.clip(wrench, -self._rated, self._rated) - bias) * self._counts)
         counts = np.clip(counts, -32768, 32767).astype(int)
-        for time, above, six in zip(times.tolist(), over.tolist(), counts.tolist(), strict=True):
+        for time, above, six in zip(times.tolist(), overloaded.tolist(), counts.tolist(), strict=True):
             if not self.faults.active("stall", time):
                 self._last = (self.faults.status(time) or int(above or self.faults.active("saturate", time)), six)
             error, values = self._last

@@ -41,12 +41,12 @@ class Timetable:
 
     def __post_init__(self) -> None:
         """Refuse strokes that would overlap. Raises TimetableError."""
-        times = [at for at, _ in self.strokes]
+        times = [time for time, _ in self.strokes]
         if self.repeat > 0.0 and times:
             times.append(times[0] + self.repeat)
-        for before, after in itertools.pairwise(times):
-            if after - before < APART:
-                raise TimetableError(f"the strokes at {before:g} s and {after:g} s are less than {APART:g} s apart")
+        for first, second in itertools.pairwise(times):
+            if second - first < APART:
+                raise TimetableError(f"the strokes at {first:g} s and {second:g} s are less than {APART:g} s apart")
         if self.repeat > 0.0 and any(fault.stop > self.repeat for fault in self.faults):
             raise TimetableError(f"a fault ends after repeat = {self.repeat:g} s, when the timetable begins anew")
 
@@ -66,15 +66,15 @@ class ScriptedBench(Bench):
         strokes = self._timetable.strokes
         while len(times) and strokes:
             cycle, position = divmod(self._stroke_count, len(strokes))
-            at, surface = strokes[position]
-            at += cycle * self._timetable.repeat
-            if at > times[-1] or (cycle > 0 and self._timetable.repeat == 0.0):
+            time, surface = strokes[position]
+            time += cycle * self._timetable.repeat
+            if time > times[-1] or (cycle > 0 and self._timetable.repeat == 0.0):
                 break
             self._stroke_count += 1
-            if at + APART < times[0]:  # nobody asked in its time
+            if time + APART < times[0]:  # nobody asked in its time
                 continue
             self.mount(surface)
-            self.begin_stroke(self._subject.stroke(surface, repetition=cycle + 1), at)
+            self.begin_stroke(self._subject.stroke(surface, repetition=cycle + 1), time)
         return super().wrench(times)
 
 

@@ -79,7 +79,7 @@ class PseudoTerminal:
         ready, _, _ = select.select([self._ours], [], [], timeout)
         return self._read() if ready else b""
 
-    def say(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
         """Send `data`. What the other side has not read beyond ROOM bytes is lost, as on a line."""
         self._obey()
         self._buffer += data[: max(ROOM - len(self._buffer), 0)]

@@ -64,23 +64,24 @@ class SimulatedSubject:
             across=float(draw.normal(0.0, 1.0)),
         )
 
-    def score(self, surface: Surface, repetition: int = 1, place: int = 0, before: int | None = None) -> float:
+    def score(self, surface: Surface, take: int = 1, position: int = 0, previous_index: int | None = None) -> float:
         """Return the score on the line from 0 to 100, in tenths: the mark's position in hundredths of the line.
 
-        `place` counts the trials of the block before this one, `before` is the index judged last; None: the first.
+        `position` counts the earlier trials of the block, `previous_index` is the index judged last; None: the first.
         """
-        noise = self._draw(surface, repetition, 4).normal(0.0, self.settings.judgement_noise)
-        return round(min(max(self.expected_score(surface, place, before) + float(noise), 0.0), 100.0), 1)
+        noise = self._draw(surface, take, 4).normal(0.0, self.settings.judgement_noise)
+        score = self.expected_score(surface, position, previous_index) + float(noise)
+        return round(min(max(score, 0.0), 100.0), 1)
 
-    def expected_score(self, surface: Surface, place: int = 0, before: int | None = None) -> float:
+    def expected_score(self, surface: Surface, position: int = 0, previous_index: int | None = None) -> float:
         """Return what `score` would be without the noise of a single judgement and without an end of the line."""
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
         friction_score = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
         judgement = friction_score if surface.descriptor == "stickiness" else 100.0 - friction_score
         target = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * judgement
-        carry_over = 0.0 if before is None else settings.carry_over * (before - 50)
-        return 50.0 + self._gain * (target - 50.0) + self._offset + settings.drift * place + carry_over
+        carry_over = 0.0 if previous_index is None else settings.carry_over * (previous_index - 50)
+        return 50.0 + self._gain * (target - 50.0) + self._offset + settings.drift * position + carry_over
 
     def by_friction(self, descriptor: str) -> float:
         """Return how many points a score rises with each unit of µ felt, over subjects of these settings."""

@@ -31,13 +31,14 @@ R = TypeVar("R", Speed, GuaranteedCost, Estimate, Growth)
 
 
 def _by_strain(rows: Sequence[R]) -> dict[str, list[R]]:
-    return {kind: [row for row in rows if row.kinematics == kind] for kind in dict.fromkeys(r.kinematics for r in rows)}
+    strains = dict.fromkeys(row.kinematics for row in rows)
+    return {strain: [row for row in rows if row.kinematics == strain] for strain in strains}
 
 
-def _strain_legend(axes: Axes, kinds: Iterable[str], place: Literal["upper right", "lower right"]) -> None:
-    for kind in kinds:
-        axes.plot([], [], _MARKS[kind], color=_COLOURS[kind], markersize=4, label=f"{kind} strain")
-    axes.legend(frameon=False, loc=place)
+def _strain_legend(axes: Axes, strains: Iterable[str], location: Literal["upper right", "lower right"]) -> None:
+    for strain in strains:
+        axes.plot([], [], _MARKS[strain], color=_COLOURS[strain], markersize=4, label=f"{strain} strain")
+    axes.legend(frameon=False, loc=location)
 
 
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
@@ -45,8 +46,8 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     axes = sheet.axes[0]
     table: list[tuple[str | float, ...]] = []
     for kinematics, group in _by_strain(rows).items():
-        spans = [(r.judged_error, getattr(r, time), r) for r in group]
-        timings = [(error, 1e3 * span, r) for error, span, r in spans if error is not None and span is not None]
+        spans = [(row.judged_error, getattr(row, time), row) for row in group]
+        timings = [(error, 1e3 * span, row) for error, span, row in spans if error is not None and span is not None]
         if not timings:
             continue
         colour = _COLOURS[kinematics]
@@ -72,8 +73,8 @@ def _curve(sheet: style.Sheet, kinematics: str, points: Sequence[tuple[float, fl
     """Draw times [ms] against errors [-], with a mark at each, hollow or not, and words around its numbers."""
     axes, colour = sheet.axes[0], _COLOURS[kinematics]
     axes.plot([100 * error for error, *_ in points], [span for _, span, *_ in points], color=colour, linewidth=0.8)
-    for error, span, hollow, before, behind in points:
-        gid = sheet.note(f"{before}{100 * error:.2g} %, {span:.3g} ms{behind}")
+    for error, span, hollow, prefix, suffix in points:
+        gid = sheet.note(f"{prefix}{100 * error:.2g} %, {span:.3g} ms{suffix}")
         face = "white" if hollow else colour
         axes.plot(100 * error, span, _MARKS[kinematics], color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
 
@@ -83,12 +84,12 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
     axes = sheet.axes[0]
     by_strain = _by_strain(rows)
     for kinematics, group in by_strain.items():
-        for error_of, words in (("worst_estimate", "guaranteed"), ("worst_error", "true")):
+        for error_of, error_label in (("worst_estimate", "guaranteed"), ("worst_error", "true")):
             points = [
-                (error, 1e3 * r.took_s / r.surfaces, words == "true",
-                 f"{r.surfaces} surfaces, {r.dofs} unknowns: {words} ", " each")
-                for r in group
-                if (error := getattr(r, error_of))
+                (error, 1e3 * cost.took_s / cost.surfaces, error_label == "true",
+                 f"{cost.surfaces} surfaces, {cost.dofs} unknowns: {error_label} ", " each")
+                for cost in group
+                if (error := getattr(cost, error_of))
             ]  # fmt: skip
             _curve(sheet, kinematics, points)
     _logarithmic(axes)
@@ -100,9 +101,9 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel:
         "time for a surface [s]",
     )  # fmt: skip
     table = [
-        (r.kinematics, r.tolerance, r.surfaces, r.dofs, r.worst_estimate,
-         "not known" if r.worst_error is None else r.worst_error, r.took_s / r.surfaces)
-        for r in rows
+        (cost.kinematics, cost.tolerance, cost.surfaces, cost.dofs, cost.worst_estimate,
+         "not known" if cost.worst_error is None else cost.worst_error, cost.took_s / cost.surfaces)
+        for cost in rows
     ]  # fmt: skip
     return sheet.panel("speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
 
@@ -113,12 +114,12 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
     table: list[tuple[str | float, ...]] = []
     colours = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
     for row in rows:
-        across, up = (row.errors, row.took_s) if timed else (row.sizes, row.errors)
-        words = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
+        x, y = (row.errors, row.took_s) if timed else (row.sizes, row.errors)
+        note = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
         dashes = "--" if row.kinematics == "finite" else "-"
         axes.plot(
-            across, up, dashes, marker=_mark(row.problem), color=colours.get(row.quantity, style.GREEN), markersize=3.5,
-            linewidth=0.9, gid=sheet.note(words),
+            x, y, dashes, marker=_mark(row.problem), color=colours.get(row.quantity, style.GREEN), markersize=3.5,
+            linewidth=0.9, gid=sheet.note(note),
         )  # fmt: skip
         table += [
             (row.problem, row.quantity, row.kinematics, size, error, span)
@@ -126,8 +127,8 @@ def _order_panel(rows: Sequence[Order], *, timed: bool) -> style.Panel:
         ]
     for quantity in dict.fromkeys(row.quantity for row in rows):
         axes.plot([], [], "-", color=colours.get(quantity, style.GREEN), label=quantity)
-    for kind in dict.fromkeys(row.problem.split(",")[0] for row in rows):
-        axes.plot([], [], " ", marker=_mark(kind), color=style.GREY, markersize=3.5, label=kind)
+    for problem_name in dict.fromkeys(row.problem.split(",")[0] for row in rows):
+        axes.plot([], [], " ", marker=_mark(problem_name), color=style.GREY, markersize=3.5, label=problem_name)
     if any(row.kinematics == "finite" for row in rows):
         axes.plot([], [], "--", color=style.GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -150,10 +151,10 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     axes = sheet.axes[0]
     for row in rows:
         face = _COLOURS[row.kinematics] if row.above is not None else "none"
-        words = f"{row.case}, {row.kinematics}: estimate {100 * row.estimate:.2g} %, true {100 * row.error:.2g} %"
+        note = f"{row.case}, {row.kinematics}: estimate {100 * row.estimate:.2g} %, true {100 * row.error:.2g} %"
         axes.plot(
             100 * max(row.error, 1e-7), 100 * row.estimate, _MARKS[row.kinematics], color=_COLOURS[row.kinematics],
-            markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=sheet.note(words),
+            markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=sheet.note(note),
         )  # fmt: skip
     _logarithmic(axes)
     low, high = axes.get_xlim()
@@ -165,7 +166,8 @@ def _estimate_panel(rows: Sequence[Estimate]) -> style.Panel:
     number = rows[0].number
     axes.set(xlabel="true error [%]", ylabel="estimated error [%]", title=number)
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
-    table = [(r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows]
+    columns = ("kinematics", "case", "tolerance", "dofs", "estimate", "error", "doubt")
+    table = [tuple(getattr(row, name) for name in columns) for row in rows]
     name = "estimate-" + number.split()[0].lower()
     return sheet.panel(name, f"Estimated against true error of the {number}", header, table)
 
@@ -200,19 +202,19 @@ def _growth_panel(rows: Sequence[Growth]) -> style.Panel:
     axes = sheet.axes[0]
     for kinematics, group in _by_strain(rows).items():
         power = exponent(group)
-        words = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
+        label = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
         axes.plot(
-            [r.dofs for r in group], [1e3 * r.floor_s for r in group], label=words, color=_COLOURS[kinematics],
-            marker=_MARKS[kinematics], markersize=4, linewidth=0.9,
+            [row.dofs for row in group], [1e3 * row.floor_s for row in group], label=label,
+            color=_COLOURS[kinematics], marker=_MARKS[kinematics], markersize=4, linewidth=0.9,
         )  # fmt: skip
     largest = max(rows, key=lambda row: row.dofs)
-    ends = np.array([min(row.dofs for row in rows), largest.dofs])
-    axes.plot(ends, 1e3 * largest.floor_s * (ends / largest.dofs) ** 1.5, color=style.GREY, linewidth=0.7)
+    dof_range = np.array([min(row.dofs for row in rows), largest.dofs])
+    axes.plot(dof_range, 1e3 * largest.floor_s * (dof_range / largest.dofs) ** 1.5, color=style.GREY, linewidth=0.7)
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper left")
     axes.set(xlabel="unknowns", ylabel="time [ms]")
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
-    table = [(r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows]
+    table = [(row.kinematics, row.fineness, row.dofs, row.setup_s, row.floor_s) for row in rows]
     return sheet.panel("growth", "Growth of the time with the unknowns", header, table)
 
 
@@ -244,7 +246,7 @@ def plates(results: RunResults) -> dict[str, style.Plate]:
     speeds, guaranteed, orders = results.of(Speed), results.of(GuaranteedCost), results.of(Order)
     costs, growth = results.of(Cost), results.of(Growth)
     truths = [truth for truth in results.of(Truth) if truth.case in JUDGED and truth.doubt]
-    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in _COLOURS}
+    doubt = {strain: max((t.doubt[0] for t in truths if t.kinematics == strain), default=0.0) for strain in _COLOURS}
     estimates = [[row for row in results.of(Estimate) if row.number == number] for number in GOALS]
     with style.look():
         panels: dict[str, list[style.Panel | None]] = {
@@ -259,7 +261,7 @@ def plates(results: RunResults) -> dict[str, style.Plate]:
             "costs": [_cost_panel(costs) if costs else None],
             "growth": [_growth_panel(growth) if growth else None],
         }
-    every = (style.plate(name, CAPTIONS[name], parts) for name, parts in panels.items())
+    every = (style.plate(name, CAPTIONS[name], figure_panels) for name, figure_panels in panels.items())
     return {plate.name: plate for plate in every if plate.panels}
 
 

@@ -64,7 +64,7 @@ def _cell(text: str) -> str:
 
 def _table_maker(
     name: str,
-    kind: type[R],
+    row_type: type[R],
     caption: str,
     columns: Mapping[str, Callable[[R], str]],
     order: Callable[[R], tuple[bool, int]] = lambda _: (False, 0),
@@ -72,7 +72,7 @@ def _table_maker(
     """Return the function that makes a table with a line for each row of a kind, each cell made by its column."""
 
     def table(results: RunResults) -> Table:
-        rows = sorted(results.of(kind), key=order)
+        rows = sorted(results.of(row_type), key=order)
         return Table(
             name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows)
         )
@@ -137,8 +137,8 @@ def _limit(value: float | None, unit: str) -> str:
     return "–" if value is None else f"{value:g} {unit}"
 
 
-def _value(row: Truth, at: int) -> str:
-    return number(row.numbers[at], 5) if row.numbers else "–"
+def _value(row: Truth, index: int) -> str:
+    return number(row.numbers[index], 5) if row.numbers else "–"
 
 
 _TABLES: tuple[Callable[[RunResults], Table], ...] = (
@@ -287,12 +287,12 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 def page(results: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, by_name = plates(results) if figures is None else figures, tables(results)
-    sections = [section for section in SECTIONS if any(part in figures or part in by_name for part in section[2])]
+    sections = [section for section in SECTIONS if any(item in figures or item in by_name for item in section[2])]
     return template("accuracy.html.jinja", "daq_app.accuracy_page").render(
         results=results,
         figures=figures,
         tables=by_name,
-        sections=[(name, words) for name, words, _ in sections],
+        sections=[(name, title) for name, title, _ in sections],
         parts={name: parts for name, _, parts in sections},
         wide=("benchmarks", "orders", "costs"),
         embed=embed,

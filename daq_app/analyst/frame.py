@@ -41,7 +41,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Parts:
+class FrameMesh:
     """What the nodes of a frame are put together to."""
 
     triangles: Indices  # (t, 3)
@@ -54,7 +54,7 @@ class Parts:
 class Finger:
     """A finger's settled state, or the last good one where there is none."""
 
-    parts: Parts
+    mesh: FrameMesh
     frame: Frame
     arcs: Array  # (r,) where the receptors of the row lie along the skin [mm]
 
@@ -88,7 +88,7 @@ class Instant:
 class Film:
     """A finger from first touch to its last state; where there is no settled one, as far as it was found."""
 
-    parts: Parts
+    mesh: FrameMesh
     frames: tuple[Frame, ...]
     instants: tuple[Instant, ...]
     arcs: Array
@@ -137,8 +137,8 @@ class View:
 
     x: float  # [mm]
     y: float  # [mm]
-    across: float  # [pixel]
-    down: float  # [pixel]
+    screen_x: float  # [pixel]
+    screen_y: float  # [pixel]
     per_mm: float  # [pixel/mm]
 
     @staticmethod
@@ -150,15 +150,15 @@ class View:
 
     def to_screen(self, points: Array) -> Array:
         """Return where points (n, 2) [mm] lie on the screen (n, 2) [pixel]."""
-        return np.array([self.across, self.down]) + (points - [self.x, self.y]) * [self.per_mm, -self.per_mm]
+        return np.array([self.screen_x, self.screen_y]) + (points - [self.x, self.y]) * [self.per_mm, -self.per_mm]
 
-    def place(self, across: float, down: float) -> tuple[float, float]:
+    def from_screen(self, screen_x: float, screen_y: float) -> tuple[float, float]:
         """Return the place [mm] at a pixel."""
-        return self.x + (across - self.across) / self.per_mm, self.y - (down - self.down) / self.per_mm
+        return self.x + (screen_x - self.screen_x) / self.per_mm, self.y - (screen_y - self.screen_y) / self.per_mm
 
     def visible(self, left: float, top: float, width: float, height: float) -> Box:
         """Return what a rectangle of the screen shows."""
-        (x0, y1), (x1, y0) = self.place(left, top), self.place(left + width, top + height)
+        (x0, y1), (x1, y0) = self.from_screen(left, top), self.from_screen(left + width, top + height)
         return x0, x1, y0, y1
 
 
@@ -172,12 +172,12 @@ class FieldChoice:
     factor: float  # from the solver's unit to this one
     signed: bool
 
-    def of(self, frame: Frame) -> Array:
+    def values_of(self, frame: Frame) -> Array:
         """Return the field at the nodes of a frame (n,), in its own unit; nan where the frame has none."""
         values = frame.values.get(self.name)
         return np.full(len(frame.nodes), np.nan) if values is None else self.factor * values
 
-    def words(self, value: float) -> str:
+    def text(self, value: float) -> str:
         """Return a value with its unit."""
         return f"{tr(self.label)} {value:.4g} {self.unit}".removesuffix(" -").replace(" -", " −")
 
@@ -188,7 +188,7 @@ class FieldChoice:
 
 
 FIELD_CHOICES = (
-    *(FieldChoice(one.name, one.label, *_UNITS.get(one.unit, (one.unit, 1.0)), one.signed) for one in FIELDS),
+    *(FieldChoice(row.name, row.label, *_UNITS.get(row.unit, (row.unit, 1.0)), row.signed) for row in FIELDS),
     FieldChoice("displacement", tr_noop("displacement from the bone"), "mm", 1.0, signed=False),
 )
 
@@ -197,7 +197,7 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
     """Return where the colours of frames begin and end: few nodes lie beyond; nought is the middle of signed ones."""
     tops = [0.0]
     for frame in frames:
-        values = np.abs(field.of(frame))
+        values = np.abs(field.values_of(frame))
         finite = values[np.isfinite(values)]
         if len(finite):
             tops.append(float(np.quantile(finite, _TOP)))
@@ -205,63 +205,63 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
     return (-high if field.signed else 0.0), high
 
 
-def corners_at(frame: Frame, parts: Parts, points: Array) -> tuple[Indices, Array]:
+def corners_at(frame: Frame, mesh: FrameMesh, points: Array) -> tuple[Indices, Array]:
     """Return the triangle that holds each of `points` (p, 2) [mm] and the share of each of its corners (p, 3).
 
     The triangle is -1, and the shares are nan, outside of the tissue.
     """
-    triangle, out = np.full(len(points), -1), np.full((len(points), 3), np.nan)
-    corners = frame.nodes[parts.triangles]  # (t, 3, 2)
+    triangle, corner_shares = np.full(len(points), -1), np.full((len(points), 3), np.nan)
+    corners = frame.nodes[mesh.triangles]  # (t, 3, 2)
     low, high = corners.min(axis=1), corners.max(axis=1)
     some = np.flatnonzero(((low <= points.max(axis=0)) & (high >= points.min(axis=0))).all(axis=1))
     boxed = (low[some] <= points[:, None]) & (points[:, None] <= high[some])
     point, near = np.nonzero(boxed.all(axis=2))
     a, b, c = np.moveaxis(corners[some[near]], 1, 0)
-    place = points[point]
+    position = points[point]
     with np.errstate(invalid="ignore", divide="ignore"):  # a triangle without an area holds no place
         area = _cross(b - a, c - a)
-        shares = np.column_stack([_cross(b - place, c - place) / area, _cross(c - place, a - place) / area])
+        shares = np.column_stack([_cross(b - position, c - position) / area, _cross(c - position, a - position) / area])
     shares = np.column_stack([shares, 1.0 - shares.sum(axis=1)])
     inside = shares.min(axis=1, initial=np.inf) >= OUTSIDE
-    triangle[point[inside]], out[point[inside]] = some[near[inside]], shares[inside]
-    return triangle, out
+    triangle[point[inside]], corner_shares[point[inside]] = some[near[inside]], shares[inside]
+    return triangle, corner_shares
 
 
-def value_at(frame: Frame, parts: Parts, field: FieldChoice, points: Array) -> tuple[Array, Indices]:
+def value_at(frame: Frame, mesh: FrameMesh, field: FieldChoice, points: Array) -> tuple[Array, Indices]:
     """Return a field at `points` (p, 2) [mm], nan outside of the tissue, and the triangles that hold them (p,)."""
-    triangle, shares = corners_at(frame, parts, points)
-    if not len(parts.triangles):
+    triangle, shares = corners_at(frame, mesh, points)
+    if not len(mesh.triangles):
         return np.full(len(points), np.nan), triangle
-    return np.sum(field.of(frame)[parts.triangles[triangle]] * shares, axis=1), triangle
+    return np.sum(field.values_of(frame)[mesh.triangles[triangle]] * shares, axis=1), triangle
 
 
-def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: float) -> str:
+def probe_text(frame: Frame, mesh: FrameMesh, field: FieldChoice, x: float, y: float) -> str:
     """Return what is at a place [mm]: the field with its unit, where it is, and the tissue."""
-    where = f"x {x:.3f} mm, y {y:.3f} mm".replace("-", "−")
-    (value,), (triangle,) = value_at(frame, parts, field, np.array([[x, y]]))
+    position_text = f"x {x:.3f} mm, y {y:.3f} mm".replace("-", "−")
+    (value,), (triangle,) = value_at(frame, mesh, field, np.array([[x, y]]))
     if triangle < 0:
-        return tr("{where} · no tissue", where=where)
-    return f"{field.words(value)} · {where} · {tr(_TISSUES[parts.region[triangle]])}"
+        return tr("{where} · no tissue", where=position_text)
+    return f"{field.text(value)} · {position_text} · {tr(_TISSUES[mesh.region[triangle]])}"
 
 
-def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, Array]:
+def along_skin(frame: Frame, mesh: FrameMesh, field: FieldChoice) -> tuple[Array, Array]:
     """Return the place on the skin at rest (m,) [mm], 0 over the receptor, and the field on the skin there (m,)."""
-    skin = parts.skin
+    skin = mesh.skin
     if skin is None:
         return np.empty(0), np.empty(0)
-    return skin.arc, np.sum(skin.shape * field.of(frame)[skin.nodes], axis=1)
+    return skin.arc, np.sum(skin.shape * field.values_of(frame)[skin.nodes], axis=1)
 
 
-def along_line(frame: Frame, parts: Parts, field: FieldChoice, line: Line) -> tuple[Array, Array]:
+def along_line(frame: Frame, mesh: FrameMesh, field: FieldChoice, line: Line) -> tuple[Array, Array]:
     """Return the distance from the first end (m,) [mm] and the field there (m,); nan where there is no tissue."""
-    ends = np.array(line)
-    part = np.linspace(0.0, 1.0, _POINTS)
-    values, _ = value_at(frame, parts, field, ends[0] + part[:, None] * (ends[1] - ends[0]))
-    return part * float(np.hypot(*(ends[1] - ends[0]))), values
+    endpoints = np.array(line)
+    fraction = np.linspace(0.0, 1.0, _POINTS)
+    values, _ = value_at(frame, mesh, field, endpoints[0] + fraction[:, None] * (endpoints[1] - endpoints[0]))
+    return fraction * float(np.hypot(*(endpoints[1] - endpoints[0]))), values
 
 
-def read_out(unit: str, across: Array, at: float, curves: Sequence[tuple[str, str, Array]]) -> str:
-    """Return the sample of `across` (m,) nearest to `at`, and the name, value and unit of each curve (m,) there.
+def read_out(unit: str, across: Array, position: float, curves: Sequence[tuple[str, str, Array]]) -> str:
+    """Return the sample of `across` (m,) nearest to `position`, and the name, value and unit of each curve (m,) there.
 
     It is empty beyond the curves' ends. A value that is not known is a dash.
 
@@ -269,15 +269,15 @@ def read_out(unit: str, across: Array, at: float, curves: Sequence[tuple[str, st
     >>> read_out("s", np.array([0.0, 0.1, 0.2]), 0.12, curves)
     '0.100 s · N 1.5 N · µ –'
     """
-    if not len(across) or not across[0] <= at <= across[-1]:
+    if not len(across) or not across[0] <= position <= across[-1]:
         return ""
-    near = int(np.argmin(np.abs(across - at)))
-    parts = [f"{across[near]:.3f} {unit}"]
-    for name, of, values in curves:
-        value = f"{values[near]:.4g} {of}" if np.isfinite(values[near]) else "–"
-        parts.append(f"{name} {value}".strip())
-    return " · ".join(parts).replace("-", "−")
+    near = int(np.argmin(np.abs(across - position)))
+    texts = [f"{across[near]:.3f} {unit}"]
+    for name, value_unit, values in curves:
+        value = f"{values[near]:.4g} {value_unit}" if np.isfinite(values[near]) else "–"
+        texts.append(f"{name} {value}".strip())
+    return " · ".join(texts).replace("-", "−")
 
 
-def _cross(one: Array, other: Array) -> Array:
-    return one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
+def _cross(first: Array, second: Array) -> Array:
+    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]

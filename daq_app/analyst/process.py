@@ -30,7 +30,7 @@ class _Server:
     """Does what is asked, one thing after the other, and the model's answers in between."""
 
     def __init__(self, connection: Connection) -> None:
-        self._connection, self._say = connection, connection.send
+        self._connection, self._send = connection, connection.send
         self._requests: deque[m.Ask] = deque()
         self._halted = False  # somebody stopped the model's answers
 
@@ -40,15 +40,15 @@ class _Server:
         from solver import Cancelled
 
         try:
-            work = Work(folder, self._say, self._urgent)
+            work = Work(folder, self._send, self._urgent)
         except Exception as error:  # noqa: BLE001  whatever it is, the window gets a message and stays
-            self._say(m.Problem(sentence_of(error)))
+            self._send(m.Problem(sentence_of(error)))
             return
         while True:
             self._take()
             going_on = work.unfinished and not self._halted
             if not self._requests and not going_on:
-                self._say(m.Idle())
+                self._send(m.Idle())
                 self._requests.append(self._connection.recv())
             request = self._requests.popleft() if self._requests else None
             try:
@@ -56,7 +56,7 @@ class _Server:
                     work.go_on()
                 elif isinstance(request, m.Stop):
                     self._halted = True
-                    self._say(m.Cancelled())
+                    self._send(m.Cancelled())
                 else:
                     self._halted = self._halted and not isinstance(request, m.GoOn | m.Move | m.Undo)
                     work.do(request)
@@ -64,7 +64,7 @@ class _Server:
                 pass  # what it was left for is the next that is asked
             except Exception as error:  # noqa: BLE001  likewise
                 self._halted = self._halted or request is None
-                self._say(m.Problem(sentence_of(error)))
+                self._send(m.Problem(sentence_of(error)))
 
     def _take(self) -> None:
         while self._connection.poll():
@@ -99,9 +99,9 @@ class Analyst:
             except (EOFError, OSError):
                 self.close()
                 if not messages or not isinstance(messages[-1], m.Problem):
-                    words = tr("The work has stopped without a word; what is asked next begins it anew.")
-                    messages.append(m.Problem(words))
-        if any(isinstance(one, m.Cancelled) for one in messages):
+                    sentence = tr("The work has stopped without a word; what is asked next begins it anew.")
+                    messages.append(m.Problem(sentence))
+        if any(isinstance(message_, m.Cancelled) for message_ in messages):
             self._stop_time = None
         if self._stop_time is not None and time.monotonic() - self._stop_time > _PATIENCE:
             self.close()

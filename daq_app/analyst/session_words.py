@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.analyst.state import AnalystState, Row, Step, rows, selected_row
-from daq_app.wording import answer_words, errors_words, quantity, tr, tr_noop
+from daq_app.wording import answer_text, errors_text, quantity, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import AnswerFinding, PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
 
-Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
+Target = Literal["session", "trial", "prediction", "friction", "window", "readings"]
 _PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
 RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
 FRICTION_HEAD = tr_noop(
@@ -20,7 +20,7 @@ PICTURES = {  # one of each experiment
     "relation": tr_noop("SED against score"), "scores": tr_noop("scores"), "friction": tr_noop("friction over time"),
     "speed": tr_noop("speed over time"), "response": tr_noop("response over time"),
 }  # fmt: skip
-_WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
+_DIRECTIONS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +34,13 @@ class Point:
     row: int  # that is chosen by it
 
 
-def words_of(row: Row) -> str:
+def row_text(row: Row) -> str:
     """Return a line of the list of trials; `marks_of` explains its marks."""
-    answer = "" if row.answer is None else f"  {answer_words(row.answer.outcome, row.answer.answer)}"
+    answer = "" if row.answer is None else f"  {answer_text(row.answer.outcome, row.answer.answer)}"
     if row.stroke is None:
-        of = row.prediction or row.answer
-        assert of is not None  # a row has at least one of them
-        return _name_of(of) + ("" if row.prediction is None else tr("  no stroke")) + answer
+        finding = row.prediction or row.answer
+        assert finding is not None  # a row has at least one of them
+        return _name_of(finding) + ("" if row.prediction is None else tr("  no stroke")) + answer
     mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     cross = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
@@ -62,8 +62,8 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
         return ()
     lines: list[tuple[str, str]] = []
     if (stroke := row.stroke) is not None:
-        ends = stroke.mu_dynamic_interval
-        interval = "" if ends is None else f"  [{ends[0]:.3f}, {ends[1]:.3f}]"
+        limits = stroke.mu_dynamic_interval
+        interval = "" if limits is None else f"  [{limits[0]:.3f}, {limits[1]:.3f}]"
         lines += [
             (tr("µ over the steady window"), _value(stroke, "mu_dynamic", "{:.3f}" + interval)),
             (tr("µ at its greatest"), _value(stroke, "mu_max", "{:.3f}")),
@@ -73,15 +73,15 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (tr("flaws"), _flaws(stroke) or tr("none")),
         ]
     if (prediction := row.prediction) is not None:
-        under = condition(state.report, prediction)
-        force = _value(prediction, "normal_force", "{:.2f} N" + errors_words(prediction.normal_force_error))
+        condition_text = condition(state.report, prediction)
+        force = _value(prediction, "normal_force", "{:.2f} N" + errors_text(prediction.normal_force_error))
         sed = _value(prediction, "sed", "") if prediction.sed is None else sed_with_errors(state.report, prediction)
         lines += [
-            (tr("SED {condition}, averaged over the ending", condition=under), sed),
+            (tr("SED {condition}, averaged over the ending", condition=condition_text), sed),
             *_other_response(state, prediction),
             (tr("model: µ"), _value(prediction, "mu", "{:.3f} (" + tr(prediction.mu_rule) + ")")),
             (tr("model: indentation"), _value(prediction, "indentation", "{:.2f} mm, " + tr("prescribed"))),
-            (tr("model: normal force {condition}", condition=under), force),
+            (tr("model: normal force {condition}", condition=condition_text), force),
         ]
     elif state.stage == "analysed":
         lines.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
@@ -90,24 +90,24 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
 
 def _other_response(state: AnalystState, prediction: PredictionFinding) -> list[tuple[str, str]]:
     """Return the chosen quantity with its errors; nothing where it is the SED, which always stands."""
-    kind = shown_response(state.response)
-    response = kind.numbers(prediction)
-    if kind.name == SED.name or not response:
+    response_kind = shown_response(state.response)
+    response = response_kind.numbers(prediction)
+    if response_kind.name == SED.name or not response:
         return []
     value, *error = response
     mesh = error[0] / abs(value) if error and value else None
-    under, words = condition(state.report, prediction), tr(kind.label)
-    name = tr("{response} {condition}, averaged over the ending", response=words, condition=under)
-    return [(name, kind.text(kind.factor * value) + errors_words(mesh))]
+    condition_text, label = condition(state.report, prediction), tr(response_kind.label)
+    name = tr("{response} {condition}, averaged over the ending", response=label, condition=condition_text)
+    return [(name, response_kind.text(response_kind.factor * value) + errors_text(mesh))]
 
 
 def sed_with_errors(report: Report | None, prediction: PredictionFinding) -> str:
     """Return a SED with its error from the mesh, and the greatest from what the model leaves out, over all trials."""
     assert prediction.sed is not None  # a trial without an answer has a reason in its place
-    return f"{1000.0 * prediction.sed:.3f} kPa{errors_words(prediction.error_estimate, _effect(report))}"
+    return f"{1000.0 * prediction.sed:.3f} kPa{errors_text(prediction.error_estimate, _effect(report))}"
 
 
-def sed_words(report: Report | None, prediction: PredictionFinding) -> str:
+def sed_text(report: Report | None, prediction: PredictionFinding) -> str:
     """Return a SED with its condition and errors."""
     return f"SED {condition(report, prediction)} {sed_with_errors(report, prediction)}"
 
@@ -117,16 +117,16 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
 
     The mesh's error is the greatest of all trials, and unknown where that of one is.
     """
-    kind = shown_response(response)
-    pairs = [(prediction, kind.numbers(prediction)) for prediction in (() if report is None else report.predictions)]
-    answers = [(prediction, value) for prediction, value in pairs if value]
+    response_kind = shown_response(response)
+    predictions = () if report is None else report.predictions
+    answers = [(prediction, value) for prediction in predictions if (value := response_kind.numbers(prediction))]
     if not answers:
         return ""
     mesh = [value[1] / abs(value[0]) for _, value in answers if len(value) > 1 and value[0]]
     effect = _effect(report) if response == SED.name else ""
-    errors = errors_words(max(mesh) if len(mesh) == len(answers) else None, effect)
-    under = " / ".join(sorted({condition(report, prediction) for prediction, _ in answers}))
-    return tr("{response} {condition}{errors}", response=tr(kind.label), condition=under, errors=errors)
+    errors = errors_text(max(mesh) if len(mesh) == len(answers) else None, effect)
+    conditions = " / ".join(sorted({condition(report, prediction) for prediction, _ in answers}))
+    return tr("{response} {condition}{errors}", response=tr(response_kind.label), condition=conditions, errors=errors)
 
 
 def picture_errors(report: Report | None, picture: str) -> str:
@@ -161,12 +161,13 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     prediction = None if row is None else row.prediction
     facts: list[tuple[str, str, str]] = []
     if prediction is not None:
-        way = "" if prediction.direction is None else tr("{way}, as measured", way=tr(_WAYS[prediction.direction]))
+        sense = prediction.direction
+        direction = "–" if sense is None else tr("{way}, as measured", way=tr(_DIRECTIONS[sense]))
         facts += [
             (tr("µ of this trial"), _value(prediction, "mu", "{:.4f}"), tr(prediction.mu_rule)),
             (tr("τ max of this trial"), _value(prediction, "tau_max", "{:.2f} kPa", 1000.0), ""),
             (tr("indentation"), _value(prediction, "indentation", "{:.3g} mm"), tr("of the block's plan")),
-            (tr("way"), way or "–", ""),
+            (tr("way"), direction, ""),
         ]
     if (report := state.report) is not None:
         facts += [(fact.name, fact.value, fact.remark) for fact in (*report.modelled, *report.left_out)]
@@ -179,8 +180,8 @@ def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
         return ()
     experiments = [experiment.name for experiment in report.experiments] or [""]
     names = [("course", tr("forces over the whole recording"))]
-    for kind, words in ((kind, tr(words)) for kind, words in PICTURES.items()):
-        names += [(f"{kind} {name}".rstrip(), f"{words}, {name}" if name else words) for name in experiments]
+    for picture, title in ((picture, tr(title)) for picture, title in PICTURES.items()):
+        names += [(f"{picture} {name}".rstrip(), f"{title}, {name}" if name else title) for name in experiments]
     return tuple(names)
 
 
@@ -189,21 +190,21 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     report = state.report
     if report is None:
         return ()
-    kind = shown_response(state.response)
-    scores = {(one.name, score.index): score.mean for one in report.experiments for score in one.scores}
+    response_kind = shown_response(state.response)
+    scores = {(group.name, score.index): score.mean for group in report.experiments for score in group.scores}
     points: list[Point] = []
     for number, row in enumerate(rows(state)):
         prediction = row.prediction
-        response = None if prediction is None else kind.numbers(prediction)
+        response = None if prediction is None else response_kind.numbers(prediction)
         if prediction is None or prediction.index is None or not response:
             continue
         stimulus = prediction.experiment, prediction.index
         if stimulus in scores:
-            points.append(Point(*stimulus, scores[stimulus], kind.factor * response[0], number))
+            points.append(Point(*stimulus, scores[stimulus], response_kind.factor * response[0], number))
     return tuple(points)
 
 
-def progress_words(step: Step | None) -> str:
+def progress_text(step: Step | None) -> str:
     """Return what is being done, and how long it will still take.
 
     >>> progress_words(Step(0.5, "predicting", 3.2))
@@ -214,38 +215,38 @@ def progress_words(step: Step | None) -> str:
     if step is None:
         return ""
     remaining = "" if step.remaining_s is None else tr(", about {seconds} s left", seconds=int(step.remaining_s) + 1)
-    at, steps = round(step.part * step.load_steps), step.load_steps
-    amount = tr("load step {step} of {steps}", step=at, steps=steps) if steps else f"{100 * step.part:.0f} %"
-    return f"{tr(step.words)}  {amount}{remaining}"
+    load_step, steps = round(step.fraction * step.load_steps), step.load_steps
+    amount = tr("load step {step} of {steps}", step=load_step, steps=steps) if steps else f"{100 * step.fraction:.0f} %"
+    return f"{tr(step.activity)}  {amount}{remaining}"
 
 
-def _name_of(of: StrokeFinding | PredictionFinding | AnswerFinding) -> str:
-    if of.trial is None:
-        return tr("stroke {number}", number=of.number) if isinstance(of, StrokeFinding) else tr("stroke –")
-    return f"{of.trial}  {of.experiment} {of.code if of.index is None else of.index}"
+def _name_of(finding: StrokeFinding | PredictionFinding | AnswerFinding) -> str:
+    if finding.trial is None:
+        return tr("stroke {number}", number=finding.number) if isinstance(finding, StrokeFinding) else tr("stroke –")
+    return f"{finding.trial}  {finding.experiment} {finding.code if finding.index is None else finding.index}"
 
 
 def _flaws(stroke: StrokeFinding) -> str:
     return ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws)
 
 
-def _value(of: StrokeFinding | PredictionFinding, name: str, form: str, factor: float = 1.0) -> str:
+def _value(finding: StrokeFinding | PredictionFinding, name: str, form: str, factor: float = 1.0) -> str:
     """Return a number of a finding in a form, or why there is none."""
-    value: float | None = getattr(of, name)
-    return form.format(factor * value) if value is not None else f"–  {of.reasons.get(name, '')}".rstrip()
+    value: float | None = getattr(finding, name)
+    return form.format(factor * value) if value is not None else f"–  {finding.reasons.get(name, '')}".rstrip()
 
 
-def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
-    low, high = s.mu_dynamic_interval or (None, None)
-    tau = None if s.tau_max is None else 1000.0 * s.tau_max
+def _friction_line(stroke: StrokeFinding) -> tuple[str, ...]:
+    low, high = stroke.mu_dynamic_interval or (None, None)
+    tau = None if stroke.tau_max is None else 1000.0 * stroke.tau_max
     return (
-        tr("stroke {number}", number=s.number) if s.trial is None else str(s.trial),
-        f"{s.experiment} {s.code if s.index is None else s.index}".strip() or "–",
-        quantity(s.mu_dynamic, 3),
+        tr("stroke {number}", number=stroke.number) if stroke.trial is None else str(stroke.trial),
+        f"{stroke.experiment} {stroke.code if stroke.index is None else stroke.index}".strip() or "–",
+        quantity(stroke.mu_dynamic, 3),
         "–" if low is None else tr("{low:.3f} to {high:.3f}", low=low, high=high),
-        *(quantity(*pair) for pair in ((s.mu_max, 3), (tau, 1), (s.speed, 1), (s.normal_force, 2))),
-        "–" if s.direction is None else tr(_WAYS[s.direction]),
-        _flaws(s),
+        *(quantity(*pair) for pair in ((stroke.mu_max, 3), (tau, 1), (stroke.speed, 1), (stroke.normal_force, 2))),
+        "–" if stroke.direction is None else tr(_DIRECTIONS[stroke.direction]),
+        _flaws(stroke),
     )
 
 
@@ -253,9 +254,9 @@ def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
 class Link:
     """One element of the way: what it says, where it leads, and more of it for who asks."""
 
-    words: str
-    place: Place
-    more: str = ""
+    text: str
+    target: Target
+    detail: str = ""
 
 
 def lineage(state: AnalystState) -> tuple[Link, ...]:
@@ -268,17 +269,17 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         links.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
     prediction, stroke = row.prediction, row.stroke
     if prediction is not None and prediction.sed is not None:
-        links.append(Link(sed_words(state.report, prediction), "prediction", tr("averaged over the ending")))
+        links.append(Link(sed_text(state.report, prediction), "prediction", tr("averaged over the ending")))
     if stroke is None:
         return tuple(links)
     links.append(_friction(stroke, prediction))
     if stroke.steady is not None:
-        words = tr("steady window {begin:.3f} to {end:.3f} s", begin=stroke.steady[0], end=stroke.steady[1])
-        links.append(Link(words, "window", tr("of stroke {number}, device's clock", number=stroke.number)))
-    words, more = tr("raw readings"), tr("counts, sequence and device counter, as they were recorded")
+        text = tr("steady window {begin:.3f} to {end:.3f} s", begin=stroke.steady[0], end=stroke.steady[1])
+        links.append(Link(text, "window", tr("of stroke {number}, device's clock", number=stroke.number)))
+    text, detail = tr("raw readings"), tr("counts, sequence and device counter, as they were recorded")
     if state.excerpt is not None and state.excerpt.stroke == stroke.number:
-        words, more = tr("readings: {count}", count=len(state.excerpt.readings.block)), state.excerpt.readings.place
-    return (*links, Link(words, "readings", more))
+        text, detail = tr("readings: {count}", count=len(state.excerpt.readings.block)), state.excerpt.readings.location
+    return (*links, Link(text, "readings", detail))
 
 
 def _friction(stroke: StrokeFinding, prediction: PredictionFinding | None) -> Link:
@@ -286,5 +287,5 @@ def _friction(stroke: StrokeFinding, prediction: PredictionFinding | None) -> Li
         tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
         rule = tr("the model was given the {rule}", rule=tr(prediction.mu_rule))
         return Link(f"µ {prediction.mu:.3f}{tau}", "friction", rule)
-    why = stroke.reasons.get("mu_dynamic", "") if stroke.mu_dynamic is None else tr("mean over the steady window")
-    return Link(f"µ {quantity(stroke.mu_dynamic, 3)}", "friction", why)
+    reason = stroke.reasons.get("mu_dynamic", "") if stroke.mu_dynamic is None else tr("mean over the steady window")
+    return Link(f"µ {quantity(stroke.mu_dynamic, 3)}", "friction", reason)

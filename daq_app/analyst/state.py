@@ -23,10 +23,10 @@ Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a pre
 class Step(Struct, frozen=True):
     """Work goes on."""
 
-    part: float  # of all of it, 0 to 1
-    words: str
+    fraction: float  # of all of it, 0 to 1
+    activity: str
     remaining_s: float | None = None  # about how long it will still take [s]; None: not known
-    load_steps: int = 0  # of which `part` are done; 0: it is not done in load steps
+    load_steps: int = 0  # of which `fraction` are done; 0: it is not done in load steps
 
 
 class ReportReady(Struct, frozen=True):
@@ -57,7 +57,7 @@ class FingerHistory(Struct, frozen=True, eq=False):
 
     key: Key
     film: Film
-    why: str = ""  # why it ends before a settled state; "" where it has one
+    reason: str = ""  # why it ends before a settled state; "" where it has one
 
 
 class Excerpt(Struct, frozen=True, eq=False):
@@ -110,15 +110,15 @@ class Move(Struct, frozen=True):
     stroke: int  # its number
     edge: Edge
     time: float  # [s, device time]
-    by: str  # a code, never a name
-    why: str
+    author: str  # a code, never a name
+    reason: str
 
 
 class Undo(Struct, frozen=True):
-    """The last decision is taken back, or with `again` the last taking back."""
+    """The last decision is taken back, or with `redo` the last taking back."""
 
-    by: str
-    again: bool = False
+    author: str
+    redo: bool = False
 
 
 class Respond(Struct, frozen=True):
@@ -154,7 +154,7 @@ class Compare(Struct, frozen=True):
 class Write(Struct, frozen=True):
     """Asks for a file: "report", one of `sessions.exchange.FORMATS`, or "picture NAME" of what `pictures` names."""
 
-    what: str
+    document: str
     path: str
 
 
@@ -190,7 +190,7 @@ class AnalystState:
     pictures: Mapping[str, SessionPicture] = field(default_factory=dict[str, SessionPicture])  # of this version
     film: FingerHistory | None = None  # the last that was asked for
     excerpt: Excerpt | None = None  # likewise
-    other: OtherSession | None = None
+    comparison: OtherSession | None = None
     step: Step | None = OPENING  # None: nothing is being done
     outcome: str = ""  # how the last work ended
     halted: bool = False  # somebody stopped the model's answers
@@ -229,7 +229,7 @@ def fold(state: AnalystState, message: Message) -> AnalystState:
         case Respond(response):
             return replace(state, response=response)
         case OtherSession():
-            return replace(state, other=message, outcome="")
+            return replace(state, comparison=message, outcome="")
         case Step() | Idle() | Done() | Problem() | Cancelled():
             return _fold_progress(state, message)
         case _:
@@ -247,8 +247,9 @@ def _fold_progress(state: AnalystState, message: Step | Idle | Done | Problem | 
         case Problem(sentence):
             return replace(state, step=None, outcome=sentence)
         case Cancelled():
-            rest = "" if state.report is None else tr(" What was done before is kept.")
-            return replace(state, step=None, outcome=tr("Stopped.{kept}", kept=rest), halted=state.stage != "predicted")
+            remark = "" if state.report is None else tr(" What was done before is kept.")
+            outcome = tr("Stopped.{kept}", kept=remark)
+            return replace(state, step=None, outcome=outcome, halted=state.stage != "predicted")
 
 
 def _on_request(state: AnalystState, request: Ask) -> AnalystState:
@@ -256,8 +257,8 @@ def _on_request(state: AnalystState, request: Ask) -> AnalystState:
         case Choose(row):
             row = max(0, min(row, len(rows(state)) - 1))
             return state if row == state.row else replace(state, row=row, outcome="")  # which was of the one before
-        case Write(what, path):
-            return replace(state, step=Step(0.0, tr("writing {what} to {path}", what=what, path=path)), outcome="")
+        case Write(document, path):
+            return replace(state, step=Step(0.0, tr("writing {what} to {path}", what=document, path=path)), outcome="")
         case GoOn():
             return replace(state, step=Step(0.0, tr("predicting")), outcome="", halted=False)
         case Stop():
@@ -276,14 +277,18 @@ def rows(state: AnalystState) -> tuple[Row, ...]:
     report = state.report
     if report is None:
         return ()
-    by_stroke = {p.stroke: p for p in report.predictions if p.stroke is not None}
-    answers = {one.trial: one for one in report.answers}
-    table = [Row(s.trial, s, by_stroke.get(s.number), answers.get(s.trial or 0)) for s in report.strokes]
-    for p in report.predictions:
-        if p.stroke is None:
-            later = (at for at, row in enumerate(table) if (row.trial or 0) > (p.trial or 0))
-            table.insert(next(later, len(table)), Row(p.trial, None, p, answers.get(p.trial or 0)))
-    return tuple(table or (Row(one.trial, None, None, one) for one in report.answers))
+    by_stroke = {prediction.stroke: prediction for prediction in report.predictions if prediction.stroke is not None}
+    answers = {answer.trial: answer for answer in report.answers}
+    table = [
+        Row(stroke.trial, stroke, by_stroke.get(stroke.number), answers.get(stroke.trial or 0))
+        for stroke in report.strokes
+    ]
+    for prediction in report.predictions:
+        if prediction.stroke is None:
+            later = (index for index, row in enumerate(table) if (row.trial or 0) > (prediction.trial or 0))
+            answer = answers.get(prediction.trial or 0)
+            table.insert(next(later, len(table)), Row(prediction.trial, None, prediction, answer))
+    return tuple(table or (Row(answer.trial, None, None, answer) for answer in report.answers))
 
 
 def selected_row(state: AnalystState) -> Row | None:
@@ -294,27 +299,27 @@ def selected_row(state: AnalystState) -> Row | None:
 
 def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
     """Take a report; answers to strokes that did not change since stay until they are given anew."""
-    report, before = message.report, state.report
+    report, previous = message.report, state.report
     fingers = state.fingers
-    if message.stage == "analysed" and before is not None:
-        same = {_model_input(stroke) for stroke in report.strokes} & {_model_input(stroke) for stroke in before.strokes}
-        numbers = {number for number, _ in same}
-        predictions = tuple(p for p in before.predictions if p.stroke in numbers)
+    if message.stage == "analysed" and previous is not None:
+        unchanged = {*map(_model_input, report.strokes)} & {*map(_model_input, previous.strokes)}
+        numbers = {number for number, _ in unchanged}
+        predictions = tuple(prediction for prediction in previous.predictions if prediction.stroke in numbers)
         report = replace(report, predictions=predictions)
         fingers = {key: finger for key, finger in fingers.items() if key[1] in numbers}
     version, history = state.version + 1, message.history
-    after = replace(
+    new_state = replace(
         state, stage=message.stage, report=report, history=history, version=version, fingers=fingers, pictures={}
     )
-    return _at_the_same_row(state, after)
+    return _keep_row(state, new_state)
 
 
-def _at_the_same_row(before: AnalystState, after: AnalystState) -> AnalystState:
+def _keep_row(previous: AnalystState, state: AnalystState) -> AnalystState:
     """Return the state after with the row that was chosen before, wherever it stands now."""
-    row, keys = selected_row(before), [row.key for row in rows(after)]
+    row, keys = selected_row(previous), [row.key for row in rows(state)]
     if row is not None and row.key in keys:
-        return replace(after, row=keys.index(row.key))
-    return replace(after, row=max(0, min(before.row, len(keys) - 1)))
+        return replace(state, row=keys.index(row.key))
+    return replace(state, row=max(0, min(previous.row, len(keys) - 1)))
 
 
 def _model_input(stroke: StrokeFinding) -> tuple[int, object]:
@@ -327,9 +332,10 @@ def _fold_answer(state: AnalystState, answer: TrialAnswer) -> AnalystState:
     report, finding = state.report, answer.finding
     if report is None:
         return state
-    rest = tuple(p for p in report.predictions if (p.trial, p.stroke) != (finding.trial, finding.stroke))
-    fingers = {key: finger for key, finger in state.fingers.items() if key != (finding.trial, finding.stroke)}
+    key = finding.trial, finding.stroke
+    predictions = [other for other in report.predictions if (other.trial, other.stroke) != key]
+    fingers = {present: finger for present, finger in state.fingers.items() if present != key}
     if answer.finger is not None:
-        fingers[finding.trial, finding.stroke] = answer.finger
-    after = replace(state, report=replace(report, predictions=(*rest, finding)), fingers=fingers)
-    return _at_the_same_row(state, after)
+        fingers[key] = answer.finger
+    new_state = replace(state, report=replace(report, predictions=(*predictions, finding)), fingers=fingers)
+    return _keep_row(state, new_state)

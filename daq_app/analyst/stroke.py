@@ -22,14 +22,14 @@ EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"
 _PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
 EDGE_DISTANCE = 0.02  # edges keep so far from each other [s]
 EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # a key moves an edge by so much [s]
-WHAT: dict[Edge, str] = {"onset": "onset", "lift": "lift", "steady begin": "steady", "steady end": "steady"}
+EDGE_DECISIONS: dict[Edge, str] = {"onset": "onset", "steady begin": "steady", "steady end": "steady", "lift": "lift"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawReadings:
     """n readings and where they lie."""
 
-    place: str  # file, data set and rows
+    location: str  # file, data set and rows
     unit: str  # of the raw numbers
     block: ReadingBlock
     normal: Array  # (n,) unfiltered, `zero` taken off [N]
@@ -42,24 +42,24 @@ class RawFile:
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._whole: ReadingBlock | None = None  # of a recording without trials
-        self._before: dict[tuple[int, int], int] | None = None  # rows before the block that begins so
+        self._all_readings: ReadingBlock | None = None  # of a recording without trials
+        self._first_rows: dict[tuple[int, int], int] | None = None  # rows before the block that begins so
 
     def around(self, stroke: StrokeFinding) -> RawReadings:
         """Return the readings of the take that holds a stroke, or of a recording without trials those around it."""
         block = self._block(stroke)
-        return _with_forces(self._recording, stroke, block, self._place(block))
+        return _with_forces(self._recording, stroke, block, self._location(block))
 
     def _block(self, stroke: StrokeFinding) -> ReadingBlock:
         if stroke.trial is not None:
             return self._recording.readings(stroke.trial)
-        if self._whole is None:
-            self._whole = self._recording.readings()
+        if self._all_readings is None:
+            self._all_readings = self._recording.readings()
         begin = -np.inf if stroke.onset is None else stroke.onset - AROUND
         end = np.inf if stroke.lift is None else stroke.lift + AROUND
-        return self._whole.between(*np.searchsorted(self._whole.time, [begin, end]).tolist())
+        return self._all_readings.between(*np.searchsorted(self._all_readings.time, [begin, end]).tolist())
 
-    def _place(self, block: ReadingBlock) -> str:
+    def _location(self, block: ReadingBlock) -> str:
         """Return file and data set of readings, with the rows they have there."""
         folder = self._recording.folder
         if not len(block):
@@ -71,29 +71,29 @@ class RawFile:
 
     def _row(self, sequence: int, received_ns: int) -> int | None:
         """Return the row of a reading; None where its block is damaged or gone."""
-        if self._before is None:
-            self._before, count = {}, 0
+        if self._first_rows is None:
+            self._first_rows, count = {}, 0
             for block in self._recording.blocks():
-                self._before[int(block.sequence[0]), int(block.received_ns[0])] = count
+                self._first_rows[int(block.sequence[0]), int(block.received_ns[0])] = count
                 count += len(block)
         for block in self._recording.blocks(span=(received_ns, received_ns + 1)):
             matches = np.flatnonzero((block.sequence == sequence) & (block.received_ns == received_ns))
             if len(matches):
-                return self._before[int(block.sequence[0]), int(block.received_ns[0])] + int(matches[0])
+                return self._first_rows[int(block.sequence[0]), int(block.received_ns[0])] + int(matches[0])
         return None
 
 
-def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBlock, place: str) -> RawReadings:
+def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBlock, location: str) -> RawReadings:
     """Return readings with the forces that they are, the mean of what came before contact taken off."""
     assert recording.info is not None  # there is a stroke, so there is a transducer
-    calibration, end = recording.info.calibration, -np.inf if stroke.onset is None else stroke.onset
-    before = np.flatnonzero((block.time < end) & (block.status == 0))
-    free = before[block.time[before] > block.time[before].max(initial=-np.inf) - MOST_FOR_ZERO]
+    calibration, contact = recording.info.calibration, -np.inf if stroke.onset is None else stroke.onset
+    rows_before = np.flatnonzero((block.time < contact) & (block.status == 0))
+    free = rows_before[block.time[rows_before] > block.time[rows_before].max(initial=-np.inf) - MOST_FOR_ZERO]
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
-    words = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
+    zero_text = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
     tangential = np.hypot(wrench[:, 0], wrench[:, 1])
-    return RawReadings(place, calibration.raw_unit, block, -wrench[:, 2], tangential, words)
+    return RawReadings(location, calibration.raw_unit, block, -wrench[:, 2], tangential, zero_text)
 
 
 class History(Struct, frozen=True):
@@ -104,7 +104,7 @@ class History(Struct, frozen=True):
 
 
 @dataclass(frozen=True, slots=True)
-class PlacedEdge:
+class EdgePosition:
     """One edge of a stroke and where it lies."""
 
     edge: Edge
@@ -113,7 +113,7 @@ class PlacedEdge:
     decision: str  # who decided it and why; "" where the analysis found it
 
 
-def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
+def edges_of(stroke: StrokeFinding) -> tuple[EdgePosition, ...]:
     """Return the edges in order of time; of a stroke without a steady window where one could lie."""
     trace = stroke.trace
     if stroke.onset is None and trace is None:
@@ -123,40 +123,45 @@ def edges_of(stroke: StrokeFinding) -> tuple[PlacedEdge, ...]:
     steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
     times = dict(zip(EDGES, (begin, *steady, end), strict=True))
     present = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
-    return tuple(PlacedEdge(e, times[e], present[WHAT[e]], stroke.decided.get(WHAT[e], "")) for e in EDGES)
+    return tuple(
+        EdgePosition(edge, times[edge], present[target], stroke.decided.get(target, ""))
+        for edge, target in EDGE_DECISIONS.items()
+    )
 
 
-def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:
+def clamp_edge(stroke: StrokeFinding, edge: Edge, time: float) -> float:
     """Return the instant nearest to `time` [s] at which an edge may lie: between its neighbours."""
-    times = {one.edge: one.time for one in edges_of(stroke)}
-    at = EDGES.index(edge)
-    low = times[EDGES[at - 1]] + EDGE_DISTANCE if at > 0 else float("-inf")
-    high = times[EDGES[at + 1]] - EDGE_DISTANCE if at + 1 < len(EDGES) else float("inf")
+    times = {position.edge: position.time for position in edges_of(stroke)}
+    index = EDGES.index(edge)
+    low = times[EDGES[index - 1]] + EDGE_DISTANCE if index > 0 else float("-inf")
+    high = times[EDGES[index + 1]] - EDGE_DISTANCE if index + 1 < len(EDGES) else float("inf")
     return min(max(time, low), high)
 
 
-def decision_of(stroke: StrokeFinding, edge: Edge, time: float, by: str, why: str) -> Decision:
+def decision_of(stroke: StrokeFinding, edge: Edge, time: float, author: str, reason: str) -> Decision:
     """Return the decision that moves an edge."""
-    what, new = WHAT[edge], within(stroke, edge, time)
-    old = {"onset": stroke.onset, "lift": stroke.lift, "steady": stroke.steady}[what]
-    times = {one.edge: one.time for one in edges_of(stroke)} | {edge: new}
-    value = (times["steady begin"], times["steady end"]) if what == "steady" else new
-    return Decision(by, why, what, stroke.trial, stroke.within, old, value)
+    target, new_time = EDGE_DECISIONS[edge], clamp_edge(stroke, edge, time)
+    old_value = {"onset": stroke.onset, "lift": stroke.lift, "steady": stroke.steady}[target]
+    times = {position.edge: position.time for position in edges_of(stroke)} | {edge: new_time}
+    value = (times["steady begin"], times["steady end"]) if target == "steady" else new_time
+    return Decision(author, reason, target, stroke.trial, stroke.within, old_value, value)
 
 
-def reversal(decisions: Decisions, by: str, *, again: bool) -> Decision | None:
-    """Return the line that undoes the last decision in force, or `again` takes the last undoing back; None: nothing."""
-    lines = _undone(decisions) if again else _standing(decisions)
-    why = "redone in the window" if again else "undone in the window"
-    return Decision(by, why, undoes=lines[-1].number) if lines else None
+def reversal(decisions: Decisions, author: str, *, redo: bool) -> Decision | None:
+    """Return the line that undoes the last decision in force, or `redo` takes the last undoing back; None: nothing."""
+    lines = _undone(decisions) if redo else _standing(decisions)
+    reason = "redone in the window" if redo else "undone in the window"
+    return Decision(author, reason, undoes=lines[-1].number) if lines else None
 
 
 def history(decisions: Decisions) -> History:
     """Return which decisions can be undone, and which redone."""
     undone = [effective_decision(decisions, line) for line in reversed(_undone(decisions))]
-    return History(
-        *(tuple(f"{one.what} of {one.target_text}" for one in lines) for lines in (_standing(decisions), undone))
+    undoable, redoable = (
+        tuple(f"{decision.what} of {decision.target_text}" for decision in lines)
+        for lines in (_standing(decisions), undone)
     )
+    return History(undoable, redoable)
 
 
 def _standing(decisions: Decisions) -> list[Decision]:
@@ -171,7 +176,7 @@ def _undone(decisions: Decisions) -> list[Decision]:
 
 def effective_decision(decisions: Decisions, line: Decision) -> Decision:
     """Return the decision that a line undoes or redoes, however often it was undone and redone before."""
-    by_number = {one.number: one for one in decisions.lines}
+    by_number = {decision.number: decision for decision in decisions.lines}
     while line.undoes is not None:
         line = by_number[line.undoes]
     return line

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports, film_words, name_and_errors
-from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Parts
-from daq_app.analyst.session_words import picture_errors, sed_words
+from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports, film_text, name_and_errors
+from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, FrameMesh, Instant
+from daq_app.analyst.session_words import picture_errors, sed_text
 from daq_app.analyst.stroke import RawFile, decision_of, effective_decision, history, reversal
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.console import is_ours
@@ -38,7 +38,7 @@ from solver.response.fields import Fields, Sketch, Still, fields_of, path_until_
 if TYPE_CHECKING:
     from sessions.report.figures import Panel
 
-Say = Callable[[m.Reply], None]
+Send = Callable[[m.Reply], None]
 Progress = Callable[[float], bool]
 Urgent = Callable[[], bool]  # whether what is being done must be left for something else
 _MOST = 150  # states of a way that did not settle, which may be long
@@ -48,16 +48,16 @@ AT_ONCE = 8  # states that are drawn between two reports of progress
 class Work:
     """A session, opened and analysed; the model's answers follow when `go_on` is called."""
 
-    def __init__(self, folder: Path, say: Say, urgent: Urgent = lambda: False) -> None:
+    def __init__(self, folder: Path, send: Send, urgent: Urgent = lambda: False) -> None:
         """Open and analyse it, and say what is found."""
-        self._say, self._urgent = say, urgent
-        say(m.Step(0.0, tr("opening")))
+        self._send, self._urgent = send, urgent
+        send(m.Step(0.0, tr("opening")))
         self._recording = _open_recording(folder)
         self._raw = RawFile(self._recording)
         self._row = 0
-        self._ways: dict[m.Key, tuple[TrialPrediction, SolutionPath | None]] = {}  # no way at finite strain
+        self._load_paths: dict[m.Key, tuple[TrialPrediction, SolutionPath | None]] = {}  # no way at finite strain
         self._sketches: dict[int, Sketch] = {}
-        self._other: Report | None = None  # that is compared
+        self._comparison: Report | None = None  # that is compared
         self._history: m.FingerHistory | None = None  # the last history
         self._analyse()
 
@@ -72,7 +72,7 @@ class Work:
         plan, first = self._recording.plan, self._first()
         self._prediction = predict(self._analysis, plan, options, progress, self._take_answer, first)
         self._report = findings(self._recording, self._analysis, self._prediction)
-        self._say(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
+        self._send(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
 
     def do(self, request: m.Ask) -> None:
         """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
@@ -81,59 +81,60 @@ class Work:
                 self._row = row
             case m.Move():
                 self._move(request)
-            case m.Undo(by, again):
-                self._undo(by, again=again)
+            case m.Undo(author, redo):
+                self._undo(author, redo=redo)
             case m.Draw(name):
                 self._draw(name)
             case m.ShowHistory(key):
                 self._film(key)
             case m.ShowReadings(stroke):
-                self._say(m.Excerpt(stroke, self._raw.around(self._report.strokes[stroke - 1])))
+                self._send(m.Excerpt(stroke, self._raw.around(self._report.strokes[stroke - 1])))
             case m.Compare(folder):
                 self._compare(Path(folder))
             case m.Write():
-                self._say(m.Done(tr("Written: {path}", path=self._write(request))))
+                self._send(m.Done(tr("Written: {path}", path=self._write(request))))
             case _:
                 pass
 
-    def progress_listener(self, words: str, load_steps: int = 0) -> Callable[[float], bool]:
+    def progress_listener(self, activity: str, load_steps: int = 0) -> Callable[[float], bool]:
         """Return a listener to progress that reports the part done and the time left, and stops for urgent requests."""
         start = last_report = time.monotonic()
 
-        def report_part(part: float) -> bool:
+        def report_part(fraction: float) -> bool:
             nonlocal last_report
             now = time.monotonic()
             if now - last_report > 0.05:
                 last_report, elapsed_s = now, now - start
-                remaining_s = elapsed_s * (1.0 - part) / part if part > 0.05 and elapsed_s > 1.0 else None
-                self._say(m.Step(part, words, remaining_s, load_steps))
+                remaining_s = elapsed_s * (1.0 - fraction) / fraction if fraction > 0.05 and elapsed_s > 1.0 else None
+                self._send(m.Step(fraction, activity, remaining_s, load_steps))
             return not self._urgent()
 
         return report_part
 
     def _analyse(self) -> None:
-        self._say(m.Step(0.0, tr("analysing")))
+        self._send(m.Step(0.0, tr("analysing")))
         self._analysis = analyse(self._recording, stored_settings(self._recording))
         self._prediction = None
         self._report = findings(self._recording, self._analysis)
-        self._say(m.ReportReady("analysed", self._report, history(read(self._recording.folder))))
+        self._send(m.ReportReady("analysed", self._report, history(read(self._recording.folder))))
 
     def _move(self, request: m.Move) -> None:
         stroke = self._report.strokes[request.stroke - 1]
-        record = append(self._recording, decision_of(stroke, request.edge, request.time, request.by, request.why))
+        decision = decision_of(stroke, request.edge, request.time, request.author, request.reason)
+        record = append(self._recording, decision)
         self._analyse()
-        self._say(m.Done(tr("Recorded: {sentence}", sentence=record.sentence)))
+        self._send(m.Done(tr("Recorded: {sentence}", sentence=record.sentence)))
 
-    def _undo(self, by: str, *, again: bool) -> None:
+    def _undo(self, author: str, *, redo: bool) -> None:
         decisions = read(self._recording.folder)
-        line = reversal(decisions, by, again=again)
+        line = reversal(decisions, author, redo=redo)
         if line is None:
-            raise NothingToShow(tr("There is nothing to redo.") if again else tr("There is no decision to undo."))
+            raise NothingToShow(tr("There is nothing to redo.") if redo else tr("There is no decision to undo."))
         record = append(self._recording, line)
         self._analyse()
-        act, sentence = tr("Redone") if again else tr("Undone"), effective_decision(decisions, line).sentence
-        words = tr("{act}, as decision {number}: {sentence}", act=act, number=record.number, sentence=sentence)
-        self._say(m.Done(words))
+        act, sentence = tr("Redone") if redo else tr("Undone"), effective_decision(decisions, line).sentence
+        message = tr("{act}, as decision {number}: {sentence}", act=act, number=record.number, sentence=sentence)
+        self._send(m.Done(message))
 
     def _first(self) -> int | None:
         strokes = self._report.strokes
@@ -145,17 +146,17 @@ class Work:
         main = [trial.number for block in plan.blocks if block.phase == "main" for trial in block.trials]
         return main.index(stroke.trial) if stroke.trial in main else None
 
-    def _take_answer(self, _number: int, row: TrialPrediction, way: SolutionPath | None) -> None:
+    def _take_answer(self, _number: int, row: TrialPrediction, load_path: SolutionPath | None) -> None:
         finding = finding_of(row)
-        self._ways[finding.trial, finding.stroke] = row, way
-        self._say(m.TrialAnswer(finding, self._finger(row.prediction)))
+        self._load_paths[finding.trial, finding.stroke] = row, load_path
+        self._send(m.TrialAnswer(finding, self._finger(row.prediction)))
 
     def _finger(self, prediction: Prediction | None) -> Finger | None:
         if prediction is None:
             return None
         sketch = self._sketch(prediction.mesh, prediction.scene)
         frame = _frame(fields_of(prediction, sketch), prediction.skin, prediction.row.sed)
-        return Finger(_parts(sketch), frame, prediction.row.arc)
+        return Finger(_frame_mesh(sketch), frame, prediction.row.arc)
 
     def _sketch(self, mesh: Mesh, scene: Scene) -> Sketch:
         if id(mesh) not in self._sketches:
@@ -163,9 +164,9 @@ class Work:
         return self._sketches[id(mesh)]
 
     def _draw(self, name: str) -> None:
-        self._say(m.Step(0.0, tr("drawing")))
+        self._send(m.Step(0.0, tr("drawing")))
         panel, png = self._panel(name)
-        self._say(m.SessionPicture(name, "" if panel is None else panel.title, png))
+        self._send(m.SessionPicture(name, "" if panel is None else panel.title, png))
 
     def _panel(self, name: str, note: str = "") -> "tuple[Panel | None, bytes]":
         """Return a picture, its `note` under it, and its PNG; `session_pictures` names those of the session."""
@@ -173,40 +174,40 @@ class Work:
         from sessions.report.figures.finger import common_levels, finger_panels
         from sessions.report.figures.style import in_pixels, look
 
-        what, _, of = name.partition(" ")
+        picture_kind, _, subject = name.partition(" ")
         report, panel = self._report, None
         with in_pixels(note) as pixels:
-            if what in ("finger", "contact"):
+            if picture_kind in ("finger", "contact"):
                 every = self._fields()
-                if (field := self._field(of, every)) is not None:
+                if (field := self._field(subject, every)) is not None:
                     with look(simulated=report.simulated):
                         levels = common_levels(tuple(every.values()) or (field,))
-                        panel = finger_panels(field, levels)[what == "contact"]
-            elif what == "compared":
+                        panel = finger_panels(field, levels)[picture_kind == "contact"]
+            elif picture_kind == "compared":
                 panel = self._comparison_panel()
-            elif what == "stroke":
-                only = tuple(s for s in report.strokes if s.number == int(of))
+            elif picture_kind == "stroke":
+                only = tuple(stroke for stroke in report.strokes if stroke.number == int(subject))
                 panel = picture(replace(report, strokes=only), "friction")
             else:
-                panel = picture(report, what, of or None)
+                panel = picture(report, picture_kind, subject or None)
         return panel, b"" if panel is None else pixels[panel.name]
 
     def _note(self, name: str) -> str:
         """Return what a picture that is written says under it: the condition and the errors of its SEDs."""
-        what, _, of = name.partition(" ")
-        if what in ("finger", "contact"):
-            stroke, _, step = of.partition(" ")
-            answers = (finding_of(row) for (_, number), (row, _) in self._ways.items() if number == int(stroke))
-            sentences = (sed_words(self._report, answer) for answer in answers if answer.sed is not None)
-            words = film_words(self._history, int(step)) if step else next(sentences, "")
-            return f"{words}. {tr(FIELD_ERRORS)}"
-        if what == "compared":
-            return "\n".join(name_and_errors(one) for one in (self._report, self._other) if one is not None)
+        picture_kind, _, subject = name.partition(" ")
+        if picture_kind in ("finger", "contact"):
+            stroke, _, step = subject.partition(" ")
+            answers = (finding_of(row) for (_, number), (row, _) in self._load_paths.items() if number == int(stroke))
+            sentences = (sed_text(self._report, answer) for answer in answers if answer.sed is not None)
+            caption = film_text(self._history, int(step)) if step else next(sentences, "")
+            return f"{caption}. {tr(FIELD_ERRORS)}"
+        if picture_kind == "compared":
+            return "\n".join(map(name_and_errors, filter(None, (self._report, self._comparison))))
         return picture_errors(self._report, name)
 
-    def _field(self, of: str, every: Mapping[int, Field]) -> Field | None:
+    def _field(self, subject: str, every: Mapping[int, Field]) -> Field | None:
         """Return the finger of a stroke, settled, or at a step of the history that was drawn last."""
-        stroke, _, step = of.partition(" ")
+        stroke, _, step = subject.partition(" ")
         if not step:
             return every.get(int(stroke))
         film = self._history
@@ -221,63 +222,63 @@ class Work:
         from sessions.report.figures.relation import comparison_panel
         from sessions.report.figures.style import look
 
-        if (other := self._other) is None:
+        if (comparison := self._comparison) is None:
             return None
-        names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
+        names, simulated = (self._report.session, comparison.session), self._report.simulated or comparison.simulated
         with look(simulated=simulated):
-            return comparison_panel(MEAN_PANELS, names, compare_reports(self._report, other))
+            return comparison_panel(MEAN_PANELS, names, compare_reports(self._report, comparison))
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
-        pairs = ((stroke, field_of(row.block or "", row)) for (_, stroke), (row, _) in self._ways.items())
+        pairs = ((stroke, field_of(row.block or "", row)) for (_, stroke), (row, _) in self._load_paths.items())
         return {stroke: field for stroke, field in pairs if field is not None and stroke is not None}
 
     def _film(self, key: m.Key) -> None:
-        entry = self._ways.get(key)
+        entry = self._load_paths.get(key)
         if entry is None:
             raise NothingToShow(tr("The model has no way to show for this trial: it was not solved."))
-        prediction, way = entry
-        if way is None:
+        prediction, load_path = entry
+        if load_path is None:
             raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))
-        if way.march is None and (prediction.prediction is not None or way.scene.materials.relax):
+        if load_path.march is None and (prediction.prediction is not None or load_path.scene.materials.relax):
             raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
-        sketch, why = self._sketch(way.finger.geometry.mesh, way.scene), ""
-        progress = self.progress_listener(tr("drawing the history"), len(way.march or ()))
-        if way.march is not None:
-            film = film_of(way, way.march, sketch, progress)
+        sketch, reason = self._sketch(load_path.finger.geometry.mesh, load_path.scene), ""
+        progress = self.progress_listener(tr("drawing the history"), len(load_path.march or ()))
+        if load_path.march is not None:
+            film = film_of(load_path, load_path.march, sketch, progress)
         else:
-            film, stop = lost_film(way, sketch, progress)
-            why = prediction.reasons.get("sed", "")
-            why = tr("{first} Followed from first touch: {why}", first=why, why=stop) if stop else why
-        self._history = m.FingerHistory(key, film, why)
-        self._say(self._history)
+            film, stop = lost_film(load_path, sketch, progress)
+            reason = prediction.reasons.get("sed", "")
+            reason = tr("{first} Followed from first touch: {why}", first=reason, why=stop) if stop else reason
+        self._history = m.FingerHistory(key, film, reason)
+        self._send(self._history)
 
     def _compare(self, folder: Path) -> None:
-        self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))
+        self._send(m.Step(0.0, tr("opening {name}", name=folder.name)))
         recording = _open_recording(folder)
         analysis = analyse(recording, stored_settings(recording))
         progress = self.progress_listener(tr("predicting {name}", name=folder.name))
         fingers: dict[m.Key, Finger] = {}
 
-        def take_answer(_number: int, row: TrialPrediction, _way: SolutionPath | None) -> None:
+        def take_answer(_number: int, row: TrialPrediction, _load_path: SolutionPath | None) -> None:
             if (finger := self._finger(row.prediction)) is not None:
                 finding = finding_of(row)
                 fingers[finding.trial, finding.stroke] = finger
 
         prediction = predict(analysis, recording.plan, _options(recording), progress=progress, watch=take_answer)
-        self._other = findings(recording, analysis, prediction)
-        self._say(m.OtherSession(str(folder), self._other, fingers))
+        self._comparison = findings(recording, analysis, prediction)
+        self._send(m.OtherSession(str(folder), self._comparison, fingers))
 
     def _write(self, request: m.Write) -> str:
         """Write the report, a picture or an export, and return where it is."""
         path = Path(request.path)
-        if request.what.startswith("picture "):
-            return self._write_picture(request.what.removeprefix("picture "), path)
-        self._say(m.Step(0.0, tr("writing {what}", what=request.what)))
+        if request.document.startswith("picture "):
+            return self._write_picture(request.document.removeprefix("picture "), path)
+        self._send(m.Step(0.0, tr("writing {what}", what=request.document)))
         if self._prediction is None:
             self.go_on()
         assert self._prediction is not None  # it was just made
-        if request.what == "report":
+        if request.document == "report":
             from sessions.report import pages
 
             progress = self.progress_listener(tr("carrying the uncertainty of friction through"))
@@ -288,25 +289,25 @@ class Work:
         made_by = {"made_by": software_versions()}
         documents = made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
         source = ExportSource(self._recording, *documents)
-        progress = self.progress_listener(tr("writing {what}", what=request.what))
+        progress = self.progress_listener(tr("writing {what}", what=request.document))
 
-        def report_part(part: float) -> None:
-            if not progress(part):
+        def report_part(fraction: float) -> None:
+            if not progress(fraction):
                 raise Cancelled
 
-        return str(export(source, request.what, path, report_part))
+        return str(export(source, request.document, path, report_part))
 
     def _write_picture(self, name: str, path: Path) -> str:
         from sessions.report.pages import panel_csv, swap_in
 
-        self._say(m.Step(0.0, tr("writing {name}", name=path.name)))
+        self._send(m.Step(0.0, tr("writing {name}", name=path.name)))
         note = self._note(name)
         panel, png = self._panel(name, note)
         if panel is None:
             raise NothingToShow(tr("There are no numbers for this picture."))
         if (suffix := path.suffix.lower()) in (".svg", ".csv"):
-            head = " · ".join(filter(None, (self._report.head, note)))
-            swap_in(path, panel.svg if suffix == ".svg" else panel_csv(panel, head))
+            heading = " · ".join(filter(None, (self._report.head, note)))
+            swap_in(path, panel.svg if suffix == ".svg" else panel_csv(panel, heading))
         else:
             write_whole(path, png)
         return str(path)
@@ -336,36 +337,36 @@ def sentence_of(error: Exception) -> str:
     return str(error) if is_ours(error) else f"{type(error).__name__}: {error}"
 
 
-def _parts(sketch: Sketch) -> Parts:
-    return Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
+def _frame_mesh(sketch: Sketch) -> FrameMesh:
+    return FrameMesh(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
 
 
-def film_of(way: SolutionPath, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
+def film_of(load_path: SolutionPath, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
     """Return the states of a way. Raises Cancelled where `progress` returns False."""
     pictures: list[Still] = []
     for begin in range(0, len(instants), AT_ONCE):
-        pictures += stills(way.finger, instants[begin : begin + AT_ONCE], sketch)
+        pictures += stills(load_path.finger, instants[begin : begin + AT_ONCE], sketch)
         if not progress(min(1.0, (begin + AT_ONCE) / len(instants))):
             raise Cancelled
     frames = tuple(_frame(still.fields, still.skin, still.row) for still in pictures)
-    return Film(_parts(sketch), frames, tuple(_instant(still) for still in pictures), ROW)
+    return Film(_frame_mesh(sketch), frames, tuple(_instant(still) for still in pictures), ROW)
 
 
-def lost_film(way: SolutionPath, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
+def lost_film(load_path: SolutionPath, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
     """Return the states up to where a solve that has no answer came, and what stopped it there."""
-    instants, failure = path_until_failure(way.scene, way.finger, progress)
+    instants, failure = path_until_failure(load_path.scene, load_path.finger, progress)
     every = max(1, -(-len(instants) // _MOST))
-    film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, progress)
+    film = film_of(load_path, [*instants[:-1:every], instants[-1]], sketch, progress)
     if failure is None:
         return film, ""
-    lost = place_of_least_stretch(way.finger, instants[-1].state, instants[-1].depth)
+    lost = place_of_least_stretch(load_path.finger, instants[-1].state, instants[-1].depth)
     return replace(film, lost=lost), str(failure.in_a_sentence())
 
 
-def field_at(experiment: str, index: int, film: Film, at: int) -> Field:
+def field_at(experiment: str, index: int, film: Film, step: int) -> Field:
     """Return one state of a film as the figures of a report draw it."""
-    frame = film.frames[at]
-    fields = Fields(frame.nodes, film.parts.triangles, frame.values, frame.outlines, frame.patch)
+    frame = film.frames[step]
+    fields = Fields(frame.nodes, film.mesh.triangles, frame.values, frame.outlines, frame.patch)
     return Field(experiment, index, fields, frame.contact)
 
 
@@ -374,6 +375,6 @@ def _frame(fields: Fields, skin: Skin, row: Array) -> Frame:
 
 
 def _instant(still: Still) -> Instant:
-    at, states = still.instant, still.skin.state
+    instant, states = still.instant, still.skin.state
     sticking, slipping = states.count("stick"), states.count("slip") + states.count("cap")
-    return Instant(at.time, at.depth, at.travel, still.sed, sticking, slipping)
+    return Instant(instant.time, instant.depth, instant.travel, still.sed, sticking, slipping)

@@ -55,7 +55,7 @@ def analyse_session(
     says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
     somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
-    before = _read_or_empty(recording, ANALYSIS)
+    previous = _read_or_empty(recording, ANALYSIS)
     if gain_error is None:
         gain_error = gain_error_set(recording.folder)
     else:
@@ -63,7 +63,7 @@ def analyse_session(
             set_gain_error(recording.folder, gain_error)
         except RecordingError as error:
             console.note(f"not kept: {error}")
-    settings = settings_of(before)
+    settings = settings_of(previous)
     bootstrap_seed = settings.bootstrap_seed if seed is None else seed
     analysis = analyse(
         recording, AnalysisSettings(area=area or settings.area, gain_error=gain_error, bootstrap_seed=bootstrap_seed)
@@ -79,22 +79,22 @@ def stored_settings(recording: Recording) -> AnalysisSettings:
 
 def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | None:
     """Say that the kept prediction has another law of the area, calibration error or seed; None where it has not."""
-    before = _read_or_empty(recording, PREDICTION)
-    if not before:
+    previous = _read_or_empty(recording, PREDICTION)
+    if not previous:
         return None
-    settings = settings_of(before)
-    other = ["another law of the contact area"] if settings.area != now.area else []
-    other += ["another calibration error"] if settings.gain_error != now.gain_error else []
-    other += ["another seed of the intervals"] if settings.bootstrap_seed != now.bootstrap_seed else []
-    if not other:
+    settings = settings_of(previous)
+    reasons = ["another law of the contact area"] if settings.area != now.area else []
+    reasons += ["another calibration error"] if settings.gain_error != now.gain_error else []
+    reasons += ["another seed of the intervals"] if settings.bootstrap_seed != now.bootstrap_seed else []
+    if not reasons:
         return None
-    return f"{PREDICTION} was made with {' and '.join(other)}: 'daq-app predict' makes it anew"
+    return f"{PREDICTION} was made with {' and '.join(reasons)}: 'daq-app predict' makes it anew"
 
 
 def stored_options(recording: Recording) -> PredictionOptions | None:
     """Return the options of the prediction that was kept before; None where there is none that can be read."""
-    before = _read_or_empty(recording, PREDICTION)
-    return from_table(before["options"], PredictionOptions, PREDICTION) if "options" in before else None
+    previous = _read_or_empty(recording, PREDICTION)
+    return from_table(previous["options"], PredictionOptions, PREDICTION) if "options" in previous else None
 
 
 def stored_afferent(recording: Recording) -> AfferentSettings | None:
@@ -125,8 +125,9 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
         sentence = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
         raise RecordingError(sentence) from damaged
     except (ValueError, AttributeError, TypeError) as damaged:
-        why = damaged if isinstance(damaged, ValueError) else "its parts are not of the kinds that this program writes"
-        raise RecordingError(f"{folder / name} is damaged ({why}); 'daq-app {verb}' makes it anew") from damaged
+        usual = "its parts are not of the kinds that this program writes"
+        reason = damaged if isinstance(damaged, ValueError) else usual
+        raise RecordingError(f"{folder / name} is damaged ({reason}); 'daq-app {verb}' makes it anew") from damaged
     return document
 
 
@@ -151,9 +152,9 @@ def predict_session(
     What else was kept before and is not asked for again is named. Raises as `predict` does.
     """
     prediction = _predict(analysis, recording.plan, options, console.reporter("predicting"))
-    before = _read_or_empty(recording, PREDICTION)
-    document = _with_firing(prediction, afferent or _afferent_of(before))
-    lost = _no_longer(before, prediction.options)
+    previous = _read_or_empty(recording, PREDICTION)
+    document = _with_firing(prediction, afferent or _afferent_of(previous))
+    lost = _dropped_parts(previous, prediction.options)
     if _store(recording, PREDICTION, document, console) and lost:
         console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
     return prediction
@@ -164,12 +165,12 @@ def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | Non
     return {**prediction.to_dict(), **firing}
 
 
-def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
+def _dropped_parts(previous: Mapping[str, Any], now: PredictionOptions) -> list[str]:
     """Name what a stored prediction was asked for and another is not, with the words that ask for it."""
-    options = from_table(before.get("options", {}), PredictionOptions, PREDICTION)
+    options = from_table(previous.get("options", {}), PredictionOptions, PREDICTION)
     rank = ("none", "small", "both").index
     lost = ["intervals of the SED (--intervals)"] if options.intervals and not now.intervals else []
-    if before and rank(options.variants) > rank(now.variants):
+    if previous and rank(options.variants) > rank(now.variants):
         lost.append(f"the variants side by side (--variants {options.variants})")
     return lost
 
@@ -205,15 +206,15 @@ def _predict(
     analysis: Analysis, plan: SessionPlan, options: PredictionOptions, progress: Progress
 ) -> SessionPrediction:
     """Return the prediction with all that its options ask for beside it."""
-    parts = 1 + options.intervals + (options.variants != "none")
+    stages = 1 + options.intervals + (options.variants != "none")
 
-    def part(number: int) -> Progress | None:
-        return part_of(progress, number / parts, (number + 1) / parts)
+    def stage_progress(number: int) -> Progress | None:
+        return part_of(progress, number / stages, (number + 1) / stages)
 
-    prediction = predict(analysis, plan, options, part(0))
+    prediction = predict(analysis, plan, options, stage_progress(0))
     if options.intervals:
-        prediction = with_intervals(analysis, prediction, progress=part(1))
-    return with_alternatives(prediction, part(parts - 1), analysis)
+        prediction = with_intervals(analysis, prediction, progress=stage_progress(1))
+    return with_alternatives(prediction, stage_progress(stages - 1), analysis)
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
@@ -221,7 +222,7 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
     settings, intervals = analysis.bootstrap, analysis.intervals
     if bootstrap is not None and bootstrap != settings:
         settings = bootstrap
-        intervals = tuple(stroke_intervals(one, at, settings) for at, one in enumerate(analysis.strokes))
+        intervals = tuple(stroke_intervals(stroke, index, settings) for index, stroke in enumerate(analysis.strokes))
     return {**analysis.to_dict(), "bootstrap": intervals_document(settings, intervals)}
 
 
@@ -272,7 +273,7 @@ def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
             raise StudyError(
                 f"{subject} has no visit with forces in {path}: run one with --device, or give another code"
             )
-        return OpenVisit(visit, tuple(one for one in sessions if one is not visit), unreadable)
+        return OpenVisit(visit, tuple(session for session in sessions if session is not visit), unreadable)
     recording = reveal(Recording.open(path))
     if subject not in (None, recording.plan.subject):
         raise WrongValue(f"--subject {subject} is not allowed: {path} is a session of {recording.plan.subject}")

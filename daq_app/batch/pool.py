@@ -46,7 +46,7 @@ Answer = dict[str, Any] | str  # what a session brings, or why it brings nothing
 class Lost:
     """A job was not done."""
 
-    why: str
+    reason: str
 
 
 def content_of(session: Path) -> dict[str, bytes]:
@@ -91,9 +91,9 @@ def cluster_client(address: str) -> Generator[Any]:
         raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a sentence below says what it logs as errors
     security: Any = library.Security()  # certificates as Dask's own configuration names them, for tls:// addresses
-    kind = asyncio.run(_identity(library, address, security))
-    if kind != "Scheduler":
-        raise SchedulerError(f"{address} is the address of a Dask {kind.lower()}: give that of its scheduler")
+    server_type = asyncio.run(_identity(library, address, security))
+    if server_type != "Scheduler":
+        raise SchedulerError(f"{address} is the address of a Dask {server_type.lower()}: give that of its scheduler")
     client: Any = library.Client(address, timeout=_ANSWERS, set_as_default=False, security=security)
     try:
         yield client
@@ -168,14 +168,14 @@ def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> N
             refuse_unlike(cast("dict[str, str]", versions), address, f"the worker {worker}")
 
 
-def refuse_unlike(versions: Mapping[str, Any], address: str, who: str) -> None:
+def refuse_unlike(versions: Mapping[str, Any], address: str, worker_name: str) -> None:
     """Raise SchedulerError for what was computed by other versions: one study holds the numbers of one program."""
-    here = software_versions()
-    differ = [name for name in NUMBERS_BY if versions.get(name) != here.get(name)]
+    present = software_versions()
+    differ = [name for name in NUMBERS_BY if versions.get(name) != present.get(name)]
     if differ:
-        other = ", ".join(f"{name} {versions.get(name)} (here {here.get(name)})" for name in differ)
+        unlike = ", ".join(f"{name} {versions.get(name)} (here {present.get(name)})" for name in differ)
         raise SchedulerError(
-            f"{address}: {who} computes with {other}; give every worker the versions that are here and "
+            f"{address}: {worker_name} computes with {unlike}; give every worker the versions that are here and "
             "run this again: what is done is kept"
         )
 
@@ -187,9 +187,9 @@ async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: 
         async with asyncio.timeout(_ANSWERS), library.rpc(address, timeout=_ANSWERS, connection_args=options) as server:
             return str((await server.identity())["type"])
     except Exception as error:  # any program may listen there and answer anything
-        why = " ".join(str(error).split()) or f"nothing within {_ANSWERS:.0f} s"
+        reason = " ".join(str(error).split()) or f"nothing within {_ANSWERS:.0f} s"
         raise SchedulerError(
-            f"{address}: no Dask scheduler answers there ({why}); start one, or give no address"
+            f"{address}: no Dask scheduler answers there ({reason}); start one, or give no address"
         ) from error
 
 
@@ -232,9 +232,9 @@ class Shelf:
             self._folder.mkdir(parents=True, exist_ok=True)
             write_whole(self.file(key), text.encode() + b"\n")
         except OSError as error:
-            why = f"{self._folder} cannot be written ({error.strerror}): {remedy(error, new=True)}"
+            refusal = f"{self._folder} cannot be written ({error.strerror}): {remedy(error, new=True)}"
             raise RecordingError(
-                f"{why}, or give another by --out, and run this again: what is done is kept"
+                f"{refusal}, or give another by --out, and run this again: what is done is kept"
             ) from error
 
 
@@ -256,21 +256,21 @@ def visits(
     What is on the shelf is not computed again. Raises SchedulerError, RecordingError for a shelf that takes nothing.
     """
     keys, failures = _keys(folders, shelf)
-    console.note(*(f"{name}: {why}" for name, why in failures))
+    console.note(*(f"{name}: {reason}" for name, reason in failures))
     by_folder = {folder: shelf.load(key) for folder, key in keys.items()}
     results = [visit for visit in by_folder.values() if visit is not None]
-    rest = [folder for folder, visit in by_folder.items() if visit is None]
-    for folder in rest:
+    remaining = [folder for folder, visit in by_folder.items() if visit is None]
+    for folder in remaining:
         if shelf.file(keys[folder]).exists():
             console.note(f"{folder.name}: {shelf.file(keys[folder])} is damaged; the session is computed anew")
     if results:
         console.note(f"{len(results)} of {len(folders)} sessions were computed before and are taken as they are")
-    key_of = {folder.name: keys[folder] for folder in rest}
+    key_of = {folder.name: keys[folder] for folder in remaining}
     start = time.monotonic()
-    if rest:
-        console.progress(0.0, f"0 of {len(rest)} sessions")
-    jobs = {folder.name: (folder, options) for folder in rest}
-    address = scheduler if rest else None  # no scheduler is asked where all is computed
+    if remaining:
+        console.progress(0.0, f"0 of {len(remaining)} sessions")
+    jobs = {folder.name: (folder, options) for folder in remaining}
+    address = scheduler if remaining else None  # no scheduler is asked where all is computed
     answers = (
         by_processes(compute_visit, jobs, workers)
         if address is None
@@ -279,17 +279,18 @@ def visits(
     try:
         for count, (name, answer) in enumerate(answers, 1):
             if isinstance(answer, str | Lost):
-                why = answer if isinstance(answer, str) else answer.why
-                failures.append((name, why))
-                console.note(f"{name}: {why}".replace(f"{name}/", f"{jobs[name][0]}/"))  # paths from the current folder
+                reason = answer if isinstance(answer, str) else answer.reason
+                failures.append((name, reason))
+                # Paths are told from the current folder.
+                console.note(f"{name}: {reason}".replace(f"{name}/", f"{jobs[name][0]}/"))
             else:
                 if address is not None:
                     refuse_unlike(answer["made_by"], address, "a worker")
                 shelf.keep(key_of[name], answer)
                 results.append(as_type(answer, Visit))
-            remaining_s = (time.monotonic() - start) / count * (len(rest) - count)
-            words = "" if console.at_terminal else f", {remaining_s:.0f} s left"
-            console.progress(0.95 * count / len(rest), f"{count} of {len(rest)} sessions{words}")
+            remaining_s = (time.monotonic() - start) / count * (len(remaining) - count)
+            time_text = "" if console.at_terminal else f", {remaining_s:.0f} s left"
+            console.progress(0.95 * count / len(remaining), f"{count} of {len(remaining)} sessions{time_text}")
     except KeyboardInterrupt:
         console.note(
             f"{len(results)} of {len(folders)} sessions are computed and kept; the next run goes on from there"
@@ -312,13 +313,13 @@ def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[
 
 def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A | Lost]]:
     """Yield each job's name and what `work` makes of it, from `workers` processes here, or as many as cores."""
-    rest = dict(jobs)
+    remaining = dict(jobs)
     try:
-        for name, answer in _in_pool(work, dict(rest), workers) if rest else ():
-            del rest[name]
+        for name, answer in _in_pool(work, dict(remaining), workers) if remaining else ():
+            del remaining[name]
             yield name, answer
     except BrokenProcessPool:  # a worker died, and nobody knows over which job: each gets a worker of its own
-        for name, arguments in rest.items():
+        for name, arguments in remaining.items():
             try:
                 yield from _in_pool(work, {name: arguments}, 1)
             except BrokenProcessPool:

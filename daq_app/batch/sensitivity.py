@@ -61,8 +61,8 @@ class TooFewAnswers(Exception):
 
 def usual_design(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return the design around a scene; what the scene leaves out is not varied."""
-    own = {name: _value(scene, name) for name in USUAL}
-    design = {name: (USUAL[name][0] * value, USUAL[name][1] * value) for name, value in own.items() if value}
+    values = {name: _value(scene, name) for name in USUAL}
+    design = {name: (USUAL[name][0] * value, USUAL[name][1] * value) for name, value in values.items() if value}
     angle = scene.finger.contact_angle
     design[ANGLE] = (max(angle - ANGLE_SPAN, 10.0), min(angle + ANGLE_SPAN, 90.0))
     nu = scene.materials.fat.nu
@@ -81,26 +81,27 @@ def constant_numbers(scene: Scene, design: Design) -> tuple[str, ...]:
     return tuple(name for name in [*numbers, "finger.bone_centre", "receptor.depth"] if name not in design)
 
 
-def check_design(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tuple[float, float]]:
+def check_design(design: Mapping[str, Any], scene: Scene, file: str) -> dict[str, tuple[float, float]]:
     """Return a design read from a file. Raises SettingsError for a key or a range that cannot be varied."""
     ranges: dict[str, tuple[float, float]] = {}
     for name, span in design.items():
         if _value(scene, name) is None:
-            raise SettingsError(f"{where}: {name} is no number of this scene; a dotted key such as friction.mu is one")
-        ends: object = span
+            raise SettingsError(f"{file}: {name} is no number of this scene; a dotted key such as friction.mu is one")
+        limits: object = span
         pair: list[Any] = cast("list[Any]", span) if isinstance(span, list) else []
-        numbers = [float(end) for end in pair if isinstance(end, int | float) and abs(end) <= sys.float_info.max]
+        most = sys.float_info.max
+        numbers = [float(limit) for limit in pair if isinstance(limit, int | float) and abs(limit) <= most]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
             form = "[least, greatest], least below greatest"
-            raise SettingsError(f"{where}: {name} = {toml_value(ends)} is not allowed: {form}")
+            raise SettingsError(f"{file}: {name} = {toml_value(limits)} is not allowed: {form}")
         try:
-            for end in numbers:
-                with_values(scene, {name: end})
+            for limit in numbers:
+                with_values(scene, {name: limit})
         except SceneError as error:
-            raise SettingsError(f"{where}: {error}") from error
+            raise SettingsError(f"{file}: {error}") from error
         ranges[name] = (numbers[0], numbers[1])
     if len(ranges) < 2:
-        raise SettingsError(f"{where}: a design needs two numbers at least")
+        raise SettingsError(f"{file}: a design needs two numbers at least")
     return ranges
 
 
@@ -168,18 +169,18 @@ def _problem(design: Design) -> dict[str, Any]:
 def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
     """Return what to doubt in the indices of a design of so many samples: one-sided ranges, impossible shares."""
     sentences: list[str] = []
-    one_sided = [one.name for one in indices if one.one_sided]
+    one_sided = [index.name for index in indices if index.one_sided]
     if one_sided:
         sentences.append(
             f"Varied to one side of the scene's own value only: {', '.join(one_sided)}; their shares, and those of all "
             "others, are of these ranges."
         )
-    wrong = [one for one in indices if one.impossible]
+    wrong = [index.name for index in indices if index.impossible]
     if wrong:
-        widest = max(max(one.first_error, one.total_error) for one in indices)
+        widest = max(max(index.first_error, index.total_error) for index in indices)
         enough = 2 ** math.ceil(math.log2(max(samples * (widest / _NARROW) ** 2, 2.0 * samples)))
         sentences.append(
-            f"Noise of too few samples: {', '.join(one.name for one in wrong)} (a share below 0 or above 1, or alone "
+            f"Noise of too few samples: {', '.join(wrong)} (a share below 0 or above 1, or alone "
             f"above that with others). As intervals narrow with the root of the samples, about {enough} would bring "
             f"each to ±{_NARROW:g}."
         )
@@ -187,23 +188,23 @@ def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
 
 
 def _one_sided(scene: Scene, name: str, span: tuple[float, float]) -> bool:
-    own = _value(scene, name)
-    return own is not None and not span[0] < own < span[1]
+    value = _value(scene, name)
+    return value is not None and not span[0] < value < span[1]
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     """Return the scene with the values at dotted keys. Raises SceneError where one is out of its range."""
     branches: dict[str, dict[str, float]] = {}
-    own: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     for name, value in values.items():
-        first, _, rest = name.partition(".")
-        if rest:
-            branches.setdefault(first, {})[rest] = value
+        first, _, subkey = name.partition(".")
+        if subkey:
+            branches.setdefault(first, {})[subkey] = value
         else:
-            own[first] = value
+            changes[first] = value
     for name, inside in branches.items():
-        own[name] = with_values(getattr(scene, name), inside)
-    return replace(scene, **own)
+        changes[name] = with_values(getattr(scene, name), inside)
+    return replace(scene, **changes)
 
 
 def _sed_of(scene: Scene) -> float:

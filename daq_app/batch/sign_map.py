@@ -75,14 +75,14 @@ def published_finger(kinematics: Kinematics = "small") -> Scene:
 def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
     """Return fingers that differ from the published one in one thing, by what that is."""
     base = published_finger(kinematics)
-    other: Kinematics = "finite" if kinematics == "small" else "small"
+    other_strain: Kinematics = "finite" if kinematics == "small" else "small"
 
     def finger(**changes: float) -> Trial:
         return Trial(replace(base, finger=replace(base.finger, **changes)))
 
     return {
         "as published": Trial(base),
-        f"{other} strain": Trial(published_finger(other)),
+        f"{other_strain} strain": Trial(published_finger(other_strain)),
         f"pressed by {_FORCE:g} N/mm": Trial(base, Press(force=_FORCE)),
         "receptor 1 mm proximal": Trial(base, arcs=(-1.0,)),
         "receptor 0.25 mm proximal": Trial(base, arcs=(-0.25,)),
@@ -110,7 +110,7 @@ def sample_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
 
 
 def _finger(sample: Mapping[str, float], base: Scene) -> Trial:
-    radius, epidermis, dermis, bone, angle, *stiff, nu, place, depth, press = sample.values()
+    radius, epidermis, dermis, bone, angle, *stiff, nu, position, depth, press = sample.values()
     finger = base.finger
     scaled = replace(
         finger,
@@ -118,21 +118,21 @@ def _finger(sample: Mapping[str, float], base: Scene) -> Trial:
         epidermis=epidermis * radius,
         dermis=dermis * radius,
         bone_radius=bone * radius,
-        bone_centre=tuple(part * radius / finger.tip_radius for part in finger.bone_centre),
+        bone_centre=tuple(coordinate * radius / finger.tip_radius for coordinate in finger.bone_centre),
         shaft_length=finger.shaft_length * radius / finger.tip_radius,
         contact_angle=angle,
     )
-    other = _scale_stiffness(base, dict(zip(("epidermis", "dermis", "fat"), stiff, strict=True)))
-    fat = replace(other.materials.fat, nu=nu)
+    scaled_scene = _scale_stiffness(base, dict(zip(("epidermis", "dermis", "fat"), stiff, strict=True)))
+    fat = replace(scaled_scene.materials.fat, nu=nu)
     half = base.receptor.ending[0] / 2.0
-    within = half + depth * ((epidermis + dermis) * radius - 2.0 * half)
+    receptor_depth = half + depth * ((epidermis + dermis) * radius - 2.0 * half)
     scene = replace(
-        other,
+        scaled_scene,
         finger=scaled,
-        materials=replace(other.materials, fat=fat),
-        receptor=Receptor(depth=within, ending=base.receptor.ending),
+        materials=replace(scaled_scene.materials, fat=fat),
+        receptor=Receptor(depth=receptor_depth, ending=base.receptor.ending),
     )
-    return Trial(scene, Press(depth=press), (place,))
+    return Trial(scene, Press(depth=press), (position,))
 
 
 def _scale_stiffness(scene: Scene, factors: Mapping[str, float]) -> Scene:
@@ -147,7 +147,7 @@ def finger_answer(trial: Trial) -> Answer | str:
     if isinstance(by_quantity, str):
         return by_quantity
     return {
-        name: [[_plain(one.with_index) for one in slopes], [_plain(one.change) for one in slopes]]
+        name: [[_plain(slope.with_index) for slope in slopes], [_plain(slope.change) for slope in slopes]]
         for name, slopes in by_quantity.items()
     }
 
@@ -170,17 +170,18 @@ def answers_of(
     versions = software_versions()
     keys = [trial.key(versions) for trial in trials]
     by_key = _load_answers(keep)
-    rest = [number for number, key in enumerate(keys) if key not in by_key]
-    count = len(trials) - len(rest)
-    if rest:
-        jobs = {keys[number]: (trials[number],) for number in rest}
+    remaining = [number for number, key in enumerate(keys) if key not in by_key]
+    count = len(trials) - len(remaining)
+    if remaining:
+        jobs = {keys[number]: (trials[number],) for number in remaining}
         far = scheduler is not None
         answers = by_cluster(finger_answer, jobs, scheduler) if far else by_processes(finger_answer, jobs, workers)
         log = nullcontext() if keep is None else keep.open("a", encoding="utf-8", buffering=1)
         with log as file, closing(answers):
             for key, answer in answers:
                 if isinstance(answer, Lost):
-                    raise TooFewAnswers(f"a finger has no answer: {answer.why}; run this again, with --keep from there")
+                    advice = "run this again, with --keep from there"
+                    raise TooFewAnswers(f"a finger has no answer: {answer.reason}; {advice}")
                 by_key[key] = answer
                 if file is not None:
                     file.write("\n" + json.dumps({"key": key, "answer": answer}))
@@ -197,8 +198,8 @@ def _load_answers(keep: Path | None) -> dict[str, Any]:
     answers: dict[str, Any] = {}
     for line in content.splitlines():
         with suppress(ValueError, KeyError):
-            one = json_object(line)
-            answers[one["key"]] = one["answer"]
+            entry = json_object(line)
+            answers[entry["key"]] = entry["answer"]
     return answers
 
 
@@ -227,8 +228,8 @@ def share(outcomes: Array) -> tuple[float, float, float] | None:
     finite = outcomes[np.isfinite(outcomes)]
     if not len(finite):
         return None
-    ends = stats.binomtest(int(finite.sum()), len(finite)).proportion_ci(method="wilson")
-    return float(finite.mean()), float(ends.low), float(ends.high)
+    interval = stats.binomtest(int(finite.sum()), len(finite)).proportion_ci(method="wilson")
+    return float(finite.mean()), float(interval.low), float(interval.high)
 
 
 def shares_by_thirds(outcomes: Array, values: Array) -> list[tuple[float, float, float | None]]:
@@ -238,10 +239,10 @@ def shares_by_thirds(outcomes: Array, values: Array) -> list[tuple[float, float,
     [(0.0, 1.0, 1.0), (1.0, 2.0, None), (2.0, 3.0, 0.0)]
     """
     low, high = float(values.min()), float(values.max())
-    ends = [low + third * (high - low) / 3.0 for third in range(4)]
-    place = np.clip(np.searchsorted(ends, values, side="left") - 1, 0, 2)
-    shares = [share(outcomes[place == third]) for third in range(3)]
-    return [(*pair, None if share is None else share[0]) for pair, share in zip(pairwise(ends), shares, strict=True)]
+    edges = [low + third * (high - low) / 3.0 for third in range(4)]
+    third_of = np.clip(np.searchsorted(edges, values, side="left") - 1, 0, 2)
+    shares = [share(outcomes[third_of == third]) for third in range(3)]
+    return [(*pair, None if share is None else share[0]) for pair, share in zip(pairwise(edges), shares, strict=True)]
 
 
 def slope_indices(
@@ -252,9 +253,9 @@ def slope_indices(
     A block of the design with a finger without an answer is left out whole.
     """
     block = len(DESIGN) + 2
-    changes = [None if isinstance(one, str) else one[series][1][0][quantity] for one in answers]
+    changes = [None if isinstance(answer, str) else answer[series][1][0][quantity] for answer in answers]
     values = np.array(changes, np.float64).reshape(-1, block)  # nan for None
-    whole = values[np.isfinite(values).all(axis=1)]
-    if len(whole) < 2:
+    complete_blocks = values[np.isfinite(values).all(axis=1)]
+    if len(complete_blocks) < 2:
         return (), 0
-    return sobol_indices(DESIGN, whole.ravel(), seed, lambda _: False), whole.size
+    return sobol_indices(DESIGN, complete_blocks.ravel(), seed, lambda _: False), complete_blocks.size

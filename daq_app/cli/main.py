@@ -16,8 +16,8 @@ from daq_app.console import (
     Console,
     Parser,
     RecordingKept,
+    accept_any_text,
     is_ours,
-    takes_all,
 )
 
 _HELP = frozenset({"-h", "--help"})
@@ -65,7 +65,7 @@ def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code. Never raises, save for a broken interpreter."""
     debug = "--debug" in arguments
     try:
-        takes_all(sys.stdin, sys.stdout, sys.stderr)
+        accept_any_text(sys.stdin, sys.stdout, sys.stderr)
         return _dispatch(arguments)
     except KeyboardInterrupt as stop:
         return _report(str(stop) or "stopped", FLAWED if isinstance(stop, RecordingKept) else STOPPED)
@@ -81,7 +81,7 @@ def _dispatch(arguments: list[str]) -> int:
     if not arguments:
         Console(as_json=False).note(_overview().format_help().rstrip())
         return WRONG
-    name, *rest = arguments
+    name, *verb_arguments = arguments
     if name in _HELP:
         _overview().print_help()
         return DONE
@@ -94,10 +94,10 @@ def _dispatch(arguments: list[str]) -> int:
         return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
     verb = verb_module(name)
     parser = parser_of(name, verb)
-    if _HELP & {*rest}:
+    if _HELP & {*verb_arguments}:
         parser.print_help()
         return DONE
-    options = parser.parse_args(_join_values(rest))
+    options = parser.parse_args(_join_values(verb_arguments))
     return verb.run(options, Console(as_json=options.json))
 
 
@@ -108,14 +108,14 @@ def _join_values(arguments: list[str]) -> list[str]:
     ['a.csv', '--normal=-z', '--axes=-,t']
     """
     for name in {"--normal", "--axes"} & {*arguments[:-1]}:
-        at = arguments.index(name)
-        arguments = [*arguments[:at], f"{name}={arguments[at + 1]}", *arguments[at + 2 :]]
+        index = arguments.index(name)
+        arguments = [*arguments[:index], f"{name}={arguments[index + 1]}", *arguments[index + 2 :]]
     return arguments
 
 
 def _overview() -> argparse.ArgumentParser:
     width = max(map(len, VERBS))
-    verbs = "\n".join(f"  {name:<{width}}  {does}" for name, does in VERBS.items())
+    verbs = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in VERBS.items())
     return Parser(
         prog="daq-app",
         usage="daq-app VERB [options]",
@@ -153,7 +153,7 @@ def _failure(error: Exception) -> tuple[str, int]:
     sentence = " ".join(str(error).split())
     if len(sentence) > _LONGEST:  # a damaged file put the middle into it
         sentence = f"{sentence[: _LONGEST // 2]} … {sentence[-_LONGEST // 2 :]}"
-    if any(f"{kind.__module__}.{kind.__qualname__}" in _WRONG for kind in type(error).__mro__):
+    if any(f"{base.__module__}.{base.__qualname__}" in _WRONG for base in type(error).__mro__):
         return sentence, WRONG
     if sentence and is_ours(error):
         return sentence, FAILED

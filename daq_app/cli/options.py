@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from daq_app.console import WrongValue, behind_a_point
+from daq_app.console import WrongValue, point_advice
 from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
 from sessions.plan.protocols.protocol import HEIGHTS
@@ -18,25 +18,25 @@ from solver.quantities import NAMES, SED
 LARGEST_STUDY_SEED = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large
 
 
-def within(
-    name: str, kind: type[int] | type[float], least: float, greatest: float, words: str = "", per: int = 1
+def number_in_range(
+    name: str, number_type: type[int] | type[float], least: float, greatest: float, allowed: str = "", per: int = 1
 ) -> Callable[[str], float]:
     """Return the `type` of an option for argparse: a number that raises WrongValue where it is not allowed.
 
-    `words` say what is allowed where the least and the greatest value do not. What is typed is `per` times the value.
+    `allowed` say what is allowed where the least and the greatest value do not. What is typed is `per` times the value.
     """
-    ends = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
-    usual = f"a whole number from {ends}" if kind is int else ends
+    limits = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
+    usual = f"a whole number from {limits}" if number_type is int else limits
 
     def parse(text: str) -> float:
         try:
-            value = kind(text)
+            value = number_type(text)
         except ValueError:
             value, label = math.nan, repr(text)
         else:
-            label = str(value) if kind is int else f"{value:g}"
+            label = str(value) if number_type is int else f"{value:g}"
         if not least <= value <= greatest:
-            raise WrongValue(f"{name} {label} is not allowed: {words or usual}{behind_a_point(text)}")
+            raise WrongValue(f"{name} {label} is not allowed: {allowed or usual}{point_advice(text)}")
         return value if per == 1 else value / per
 
     return parse
@@ -45,15 +45,16 @@ def within(
 def add_number(
     parser: argparse.ArgumentParser,
     name: str,
-    kind: type[int] | type[float],
+    number_type: type[int] | type[float],
     span: tuple[float, float],
     meaning: str,
     default: float | None = None,
     metavar: str | None = None,
-    words: str = "",
+    allowed: str = "",
 ) -> None:
-    """Declare an option that takes a number in a span; `words` say which where the ends do not."""
-    parser.add_argument(name, type=within(name, kind, *span, words), default=default, metavar=metavar, help=meaning)
+    """Declare an option that takes a number in a span; `allowed` say which where the ends do not."""
+    parse = number_in_range(name, number_type, *span, allowed)
+    parser.add_argument(name, type=parse, default=default, metavar=metavar, help=meaning)
 
 
 def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
@@ -72,13 +73,13 @@ def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str,
     """Return the numbers of an option given as NAME=VALUE, by name. Raises WrongValue with the example."""
     numbers: dict[str, float] = {}
     for text in texts:
-        key, _, value = (part.strip() for part in text.partition("="))
+        key, _, value = (piece.strip() for piece in text.partition("="))
         try:
             number = float(value)
         except ValueError:
             number = math.nan
         if not key or not math.isfinite(number):
-            raise WrongValue(f"{option} {text} is not allowed: NAME=VALUE, such as {example}{behind_a_point(value)}")
+            raise WrongValue(f"{option} {text} is not allowed: NAME=VALUE, such as {example}{point_advice(value)}")
         if key in numbers:
             raise WrongValue(f"{option} {key} is given twice")
         numbers[key] = number
@@ -114,11 +115,11 @@ _SHARED: Mapping[str, dict[str, Any]] = {
     "tau": {"choices": ["computed", "as-printed"], "default": "computed"},
     "paths": {"nargs": "?", "const": "small", "choices": _STRAINS, "default": "none", "metavar": "finite"},
     "variants": {"choices": ["none", "small", "both"], "default": "small"},
-    "height": {"type": within("--height", float, *HEIGHTS, _HEIGHTS), "metavar": "MM"},
-    "simulate_subject": {"type": within("--simulate-subject", int, 0, LARGEST), "metavar": "SEED"},
+    "height": {"type": number_in_range("--height", float, *HEIGHTS, _HEIGHTS), "metavar": "MM"},
+    "simulate_subject": {"type": number_in_range("--simulate-subject", int, 0, LARGEST), "metavar": "SEED"},
     "headless": {"action": "store_true", "help": "no window: answers at the terminal, or simulated"},
     "workers": {
-        "type": within("--workers", int, 1, 1024), "metavar": "N",
+        "type": number_in_range("--workers", int, 1, 1024), "metavar": "N",
         "help": "processes on this computer (as many as cores)",
     },
     "scheduler": {
@@ -133,9 +134,9 @@ def add_shared(parser: argparse.ArgumentParser, *names: str, **uses: str) -> Non
     """Declare options that several verbs have; `uses` say what some of them mean in this one."""
     for name in (*names, *uses):
         options = [f"--{name.replace('_', '-')}", *_BEFORE.get(name, ())]
-        how: dict[str, Any] = {"help": "{}"} | _SHARED[name]
-        how["help"] = how["help"].format(uses.get(name))
-        parser.add_argument(*options, **how)
+        settings: dict[str, Any] = {"help": "{}"} | _SHARED[name]
+        settings["help"] = settings["help"].format(uses.get(name))
+        parser.add_argument(*options, **settings)
 
 
 _FINGER = ("tip_radius", "width", "contact_angle")
@@ -162,15 +163,15 @@ def body_of(options: argparse.Namespace) -> Body:
     )
 
 
-def own_sentence(plan: SessionPlan) -> str | None:
+def measures_sentence(plan: SessionPlan) -> str | None:
     """Return what is the subject's own in a plan, for whoever runs the session; None where nothing is."""
     lengths = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
-    parts = [f"{name} {length:g} mm" for name, length in lengths.items() if length is not None]
+    facts = [f"{name} {length:g} mm" for name, length in lengths.items() if length is not None]
     if plan.contact_angle_origin == "measured":
-        parts.append(f"contact angle {plan.contact_angle:g} degrees")
-    own = [block for block in plan.blocks if block.indentation_origin == "measured"]
-    parts += [f"depth of {block.name} {block.indentation:g} mm" for block in own]
-    return f"{plan.subject}'s own: {', '.join(parts)}" if parts else None
+        facts.append(f"contact angle {plan.contact_angle:g} degrees")
+    blocks = [block for block in plan.blocks if block.indentation_origin == "measured"]
+    facts += [f"depth of {block.name} {block.indentation:g} mm" for block in blocks]
+    return f"{plan.subject}'s own: {', '.join(facts)}" if facts else None
 
 
 AS_BEFORE = "as the session was analysed before, or else fixed"
@@ -188,7 +189,7 @@ def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) ->
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration-error, typed in per cent: the standard uncertainty of each axis' gain [-]."""
     meaning = "standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)"
-    parse = within("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
+    parse = number_in_range("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)", per=100)
     parser.add_argument("--calibration-error", type=parse, metavar="PERCENT", help=meaning)
 
 

@@ -9,12 +9,12 @@ from sessions.report.tables.session import tables
 def table_texts(report: Report, *sections: str) -> list[str]:
     """Return the tables of some sections of a report as text."""
     by_section = tables(report)
-    return [_as_text(one) for name in sections for one in by_section[name]]
+    return [_as_text(section_table) for name in sections for section_table in by_section[name]]
 
 
 def _as_text(report_table: Table) -> str:
     """Return a table with its caption, each number over its interval, and the notes that its marks stand for."""
-    head = [
+    header = [
         f"{column.name} [{column.unit}]" if column.unit.strip("1") else column.name for column in report_table.columns
     ]
     rows: list[list[str]] = []
@@ -24,8 +24,8 @@ def _as_text(report_table: Table) -> str:
         for cells in group.rows:
             rows.append([f"{cell.text} {cell.mark}".rstrip() for cell in cells])
             rows += [[cell.interval for cell in cells]] if any(cell.interval for cell in cells) else []
-    first, *lines = table(rows, head=head).split("\n")
-    for at, name in reversed(headings):
-        lines.insert(at, f"{name}:")
+    first, *lines = table(rows, header=header).split("\n")
+    for index, name in reversed(headings):
+        lines.insert(index, f"{name}:")
     notes = (f"{mark}: {sentence}".removeprefix(": ") for mark, sentence in report_table.notes)
     return "\n".join(("", report_table.caption, first, *lines, *notes))

@@ -74,8 +74,8 @@ class Terminal:
 
     def follow(self, state: str) -> None:
         """Say that the session is paused, once it is."""
-        before, self._paused = self._paused, state == "paused"
-        if self._paused and not before:
+        was_paused, self._paused = self._paused, state == "paused"
+        if self._paused and not was_paused:
             self._print(PAUSED)
 
     def _prompt_of(self, command: steps.Command) -> Prompt | None:
@@ -83,9 +83,9 @@ class Terminal:
             case steps.AskBegin():
                 return Prompt("Press Enter to begin.", steps.Begin())
             case steps.AskMount(trial):
-                kind = "Trial" if trial.phase == "main" else trial.phase.capitalize() + " trial"
+                name = "Trial" if trial.phase == "main" else trial.phase.capitalize() + " trial"
                 code = trial.stimulus.code
-                return Prompt(f"{kind} {trial.number}: mount {code}, then press Enter.", steps.StimulusMounted(code))
+                return Prompt(f"{name} {trial.number}: mount {code}, then press Enter.", steps.StimulusMounted(code))
             case steps.AskStroke(trial, allowed):
                 often = "once" if allowed == 1 else f"up to {allowed} times"
                 stroke = f"Stroke {often}, {_WAYS[trial.direction]}."
@@ -95,14 +95,14 @@ class Terminal:
                     else Prompt(f"{stroke} Press Enter when it is done.", steps.StrokeDone())
                 )
             case steps.AskScore(_, (low, high), question=question):
-                words = f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
-                return Prompt(words, answer=lambda number: steps.Scored(number, input_device=KEYBOARD))
+                text = f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
+                return Prompt(text, answer=lambda number: steps.Scored(number, input_device=KEYBOARD))
             case steps.AskNumber(_, question):
-                words = f"{question} A number above 0, on the subject's own scale:"
-                return Prompt(words, answer=lambda number: steps.MagnitudeEstimate(number, input_device=KEYBOARD))
+                text = f"{question} A number above 0, on the subject's own scale:"
+                return Prompt(text, answer=lambda number: steps.MagnitudeEstimate(number, input_device=KEYBOARD))
             case steps.AskChoice(first, second, question):
-                which = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
-                return Prompt(f"{question} {which}", answer=_choice)
+                choices = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
+                return Prompt(f"{question} {choices}", answer=_choice)
             case steps.AskRest(duration):
                 long = "" if duration is None else f" It goes on by itself after {duration:g} s."
                 return Prompt(f"The subject rests. Press Enter to go on.{long}", steps.Resume())
@@ -117,17 +117,17 @@ class Terminal:
         return tuple(event for event in events if event is not None)
 
     def _parse(self, line: str) -> steps.Event | None:
-        word, _, rest = line.partition(" ")
+        word, _, text = line.partition(" ")
         orders: dict[str, steps.Event] = {
-            "redo": steps.Redo(rest),
+            "redo": steps.Redo(text),
             "undo": steps.UndoRedo(),
-            "skip": steps.Skip(rest),
-            "abort": steps.Abort(rest),
-            "note": steps.Note(rest),
+            "skip": steps.Skip(text),
+            "abort": steps.Abort(text),
+            "note": steps.Note(text),
             "pause": steps.Pause(),
             "resume": steps.Resume(),
         }
-        if word == "abort" and not rest.strip():  # it seals the session, and nothing goes on after that
+        if word == "abort" and not text.strip():  # it seals the session, and nothing goes on after that
             self._print("say why: abort needs a reason")
             return None
         if word in orders:
@@ -290,9 +290,9 @@ class _Attendance:
         if self._terminal is not None:
             self._terminal.follow(status.state)
         elif self._start is not None:
-            part = 0.0 if status.trial is None else (status.trial - 1) / status.trials
-            who = self._start.plan.subject
-            self._console.progress(part, f"{who}: {status.state}, {status.safe.readings} readings safe")
+            fraction = 0.0 if status.trial is None else (status.trial - 1) / status.trials
+            subject = self._start.plan.subject
+            self._console.progress(fraction, f"{subject}: {status.state}, {status.safe.readings} readings safe")
 
 
 def _raise_failure(report: m.Report) -> None:

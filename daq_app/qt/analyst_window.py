@@ -7,19 +7,11 @@ from typing import Any
 
 from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeEvent
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QLabel,
-    QMainWindow,
-    QProgressBar,
-    QSizePolicy,
-    QTabWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QLabel, QMainWindow, QProgressBar, QSizePolicy, QTabWidget, QWidget
 
 from daq_app.analyst import state as m
 from daq_app.analyst.process import Analyst
-from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_words, words_of
+from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_text, row_text
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
@@ -31,9 +23,9 @@ from daq_app.qt.parts import (
     hbox,
     label,
     row_list,
-    say,
     scroll_area,
     set_horizontal,
+    set_text,
     vbox,
 )
 from daq_app.qt.plots import ZoomedPlot, pg
@@ -57,6 +49,7 @@ class LineageLabel(QLabel):
     def __init__(self) -> None:
         super().__init__()
         self._links: tuple[Link, ...] = ()
+        self._details: dict[str, str] = {}  # by the target of each link
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -64,16 +57,16 @@ class LineageLabel(QLabel):
         self.setTextInteractionFlags(flags.LinksAccessibleByMouse | flags.LinksAccessibleByKeyboard)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.linkActivated.connect(self.followed.emit)
-        self.linkHovered.connect(self._tell)
+        self.linkHovered.connect(lambda target: self.setToolTip(self._details.get(target, "")))
         self.setAccessibleName(tr("from the number back to its readings"))
 
     def show_links(self, links: tuple[Link, ...]) -> None:
         if links == self._links:
             return
-        self._links = links
+        self._links, self._details = links, {link.target: link.detail for link in links}
         self._show()
-        whole = " → ".join(link.words for link in links)
-        self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=whole))
+        text = " → ".join(link.text for link in links)
+        self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=text))
 
     def changeEvent(self, event: QEvent) -> None:
         """Write the links in the colour of another theme."""
@@ -83,11 +76,8 @@ class LineageLabel(QLabel):
 
     def _show(self) -> None:
         style = f"color: {theme_of(self).act}"
-        elements = (f'<a href="{link.place}" style="{style}">{escape(link.words)}</a>' for link in self._links)
+        elements = (f'<a href="{link.target}" style="{style}">{escape(link.text)}</a>' for link in self._links)
         self.setText(" &nbsp;→&nbsp; ".join(elements))
-
-    def _tell(self, place: str) -> None:
-        self.setToolTip(next((link.more for link in self._links if link.place == place), ""))
 
 
 class AnalystWindow(QMainWindow):
@@ -102,13 +92,13 @@ class AnalystWindow(QMainWindow):
         self.tokens = tokens
         self._work = work or Analyst(folder)
         self.keys = KeysPage(self, ANALYST_KEYS)
-        self._head = label("", "simulated")
-        self.way = LineageLabel()
-        self.way.followed.connect(self._follow)
-        self._words = WrappedLabel("quiet", keeps_room=True)
+        self._simulation_label = label("", "simulated")
+        self.lineage = LineageLabel()
+        self.lineage.followed.connect(self._follow)
+        self._progress_label = WrappedLabel("quiet", keeps_room=True)
         self.trials = TrialsColumn(tokens, self.ask, self.take)
         self.stroke = StrokeColumn(tokens, self.ask, self._replay_next)
-        self.model = ModelColumn(tokens, self.ask, self._choose_comparison, self._words.show_text)
+        self.model = ModelColumn(tokens, self.ask, self._choose_comparison, self._progress_label.show_text)
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
@@ -211,21 +201,21 @@ class AnalystWindow(QMainWindow):
             self.ask(m.Write("report", name))
 
     def write_export(self) -> None:
-        what = self.format.currentText()
-        name, _ = QFileDialog.getSaveFileName(self, tr("New folder"), f"{self.state.folder.name}-{what}")
+        export_format = self.format.currentText()
+        name, _ = QFileDialog.getSaveFileName(self, tr("New folder"), f"{self.state.folder.name}-{export_format}")
         if name:
-            self.ask(m.Write(what, name))
+            self.ask(m.Write(export_format, name))
 
     def _choose_comparison(self) -> None:
         name = QFileDialog.getExistingDirectory(self, tr("Session to compare with"), str(self.state.folder.parent))
         if name:
             self.ask(m.Compare(name))
 
-    def _follow(self, place: str) -> None:
-        self._pages.setCurrentIndex({"session": 2, "prediction": 2, "trial": 0}.get(place, 1))
-        match place:
+    def _follow(self, target: str) -> None:
+        self._pages.setCurrentIndex({"session": 2, "prediction": 2, "trial": 0}.get(target, 1))
+        match target:
             case "session" | "prediction":
-                self.model.tabs.setCurrentIndex(SESSION if place == "session" else FINGER)
+                self.model.tabs.setCurrentIndex(SESSION if target == "session" else FINGER)
                 self.model.tabs.setFocus()
             case "trial":
                 self.trials.list.setFocus()
@@ -246,17 +236,17 @@ class AnalystWindow(QMainWindow):
         state = self.state
         busy = state.step is not None
         self.progress.setVisible(busy)
-        self.progress.setValue(0 if state.step is None else round(100 * state.step.part))
-        self._words.show_text(progress_words(state.step) or state.outcome)
+        self.progress.setValue(0 if state.step is None else round(100 * state.step.fraction))
+        self._progress_label.show_text(progress_text(state.step) or state.outcome)
         self.stop.setEnabled(busy)
         self.go_on.setVisible(state.halted and not busy)
         for widget in (self.report, self.export):
             widget.setEnabled(not busy and state.report is not None)
-        head = "" if state.report is None else state.report.head
-        self._head.setVisible(bool(head))
-        self._head.setText(tr("SIMULATED"))
-        self._head.setToolTip(head)
-        self.way.show_links(lineage(state))
+        note = "" if state.report is None else state.report.head
+        self._simulation_label.setVisible(bool(note))
+        self._simulation_label.setText(tr("SIMULATED"))
+        self._simulation_label.setToolTip(note)
+        self.lineage.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
             column.show_state(state)
         QTimer.singleShot(0, self, self._place_columns)  # once the layouts inside of the columns have followed
@@ -277,7 +267,7 @@ class AnalystWindow(QMainWindow):
             else:
                 self._row.addWidget(panel, stretch)
                 panel.show()
-        if narrow and self.state.other is not None:  # what has just come stays in sight
+        if narrow and self.state.comparison is not None:  # what has just come stays in sight
             self._pages.setCurrentIndex(2)
 
     def _lay_out(self) -> QWidget:
@@ -288,10 +278,10 @@ class AnalystWindow(QMainWindow):
         window.setObjectName("window")
         window.setMinimumSize(*_LEAST)  # the columns find room in less than they would like
         acts = self.stop, self.go_on, self.report, self.format, self.export
-        head, status = hbox((self.way, 1), self._head), hbox((self._words, 1), self.progress)
+        header, status = hbox((self.lineage, 1), self._simulation_label), hbox((self._progress_label, 1), self.progress)
         self._foot = hbox((status, 1), hbox(1, *acts))
-        head.setAlignment(self._head, Qt.AlignmentFlag.AlignTop)
-        vbox(head, (self._panes, 1), (self._pages, 1), self._foot, on=window, margins=GRID)
+        header.setAlignment(self._simulation_label, Qt.AlignmentFlag.AlignTop)
+        vbox(header, (self._panes, 1), (self._pages, 1), self._foot, on=window, margins=GRID)
         return window
 
 
@@ -322,32 +312,36 @@ class TrialsColumn(QWidget):
         vbox(label(tr("Trials"), "section"), (self.list, 3), self._below, self.responses, self.errors, *plot, on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        lines = tuple(words_of(row) for row in rows(state))
+        lines = tuple(row_text(row) for row in rows(state))
         self.list.blockSignals(True)
         if len(lines) != self.list.count():
             self.list.clear()
             self.list.addItems(lines)
-        for at, row in enumerate(rows(state)):
-            item, marks = self.list.item(at), marks_of(row)
-            item.setText(lines[at])
+        for index, row in enumerate(rows(state)):
+            item, marks = self.list.item(index), marks_of(row)
+            item.setText(lines[index])
             item.setToolTip(marks)
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{lines[at]} {marks}".rstrip())
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{lines[index]} {marks}".rstrip())
         self.list.setCurrentRow(state.row if selected_row(state) is not None else -1)
         self.list.blockSignals(False)
         self.errors.show_text(greatest_errors(state.report, state.response))
         marks = {True: {"size": 18, "symbol": "s"}, False: {"size": 11, "symbol": "o"}}
         alike = {"brush": MODEL, "pen": pg.mkPen(QColor(self._tokens.text))}
-        spots = [{"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state)]
-        self.points.setData([spot | alike for spot in spots])
+        spots = [
+            {"pos": (point.score, point.response), "data": point.row} | marks[point.row == state.row] | alike
+            for point in points(state)
+        ]
+        self.points.setData(spots)
         self.relation.setVisible(bool(spots))
         self.none.setVisible(not spots)
         empty = state.report is not None and not lines
         for widget in (self.list, self._below, self.responses):
             widget.setHidden(empty)
-        words = tr("No trial has both a score and an answer of the model.")
+        text = tr("No trial has both a score and an answer of the model.")
         if state.stage != "predicted" and state.step is not None:
-            words = tr("The model has not answered yet.")
-        say(self.none, tr("This session has no stroke. Its answers are kept: Export… writes them.") if empty else words)
+            text = tr("The model has not answered yet.")
+        no_stroke = tr("This session has no stroke. Its answers are kept: Export… writes them.")
+        set_text(self.none, no_stroke if empty else text)
 
     def _choose(self, row: int) -> None:
         if row >= 0:

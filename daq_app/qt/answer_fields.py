@@ -38,10 +38,10 @@ _NUMBER = QRegularExpression(
     rf"\d{{0,9}}([{POINTS}]\d{{0,9}})?", QRegularExpression.PatternOption.UseUnicodePropertiesOption
 )  # what can be typed of one
 _LARGE = 36  # type of the number [device-independent pixels]
-_WORDS = 24  # type of the buttons
+_BUTTON_TYPE = 24  # type of the buttons
 _WIDE, HIGH = 220, 96  # a button, at least
 FULL = 5.0  # of the bar [N]
-OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
+AVERAGING_TIME = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
 
 
 class ScoreLine(QAbstractSlider):
@@ -58,10 +58,10 @@ class ScoreLine(QAbstractSlider):
         self._now = now
         self._pixels_per_mm = 96 / 25.4
         self.answer = Answer()
-        self._ends = ("", "")
+        self._end_labels = ("", "")
         self._ticks = 0
         self.setRange(0, 100)
-        self._words: Translate = str
+        self._translate: Translate = str
         self._name()
         self.valueChanged.connect(self._move)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -70,9 +70,9 @@ class ScoreLine(QAbstractSlider):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._resize()
 
-    def speak(self, words: Translate) -> None:
+    def speak(self, translate: Translate) -> None:
         """Be named in another language to screen readers."""
-        self._words = words
+        self._translate = translate
         self._name()
 
     def set_pixels_per_mm(self, pixels: float) -> None:
@@ -85,15 +85,15 @@ class ScoreLine(QAbstractSlider):
     def answered(self) -> bool:
         return self.answer.score is not None
 
-    def begin(self, ends: tuple[str, str], ticks: int = 0) -> None:
+    def begin(self, end_labels: tuple[str, str], ticks: int = 0) -> None:
         """Begin another answer, with an empty line between these ends, and ticks where a protocol asks for them."""
-        self._ends, self._ticks = ends, ticks
+        self._end_labels, self._ticks = end_labels, ticks
         self._take(Answer())
 
     def answer_event(self, hand: Hand | None) -> Scored:
         return self.answer.release().judgement(hand)
 
-    def place_of(self, position: float) -> QPointF:
+    def point_at(self, position: float) -> QPointF:
         """Return where a position from 0 to 100 lies in the widget."""
         line, along = self._line(), position / 100.0
         return QPointF(line.left() + (1.0 - along if self.isRightToLeft() else along) * line.width(), line.center().y())
@@ -146,21 +146,21 @@ class ScoreLine(QAbstractSlider):
         for x in (line.left(), line.right()):
             painter.drawLine(QPointF(x, middle - 2 * mm), QPointF(x, middle + 2 * mm))
         for number in range(1, self._ticks + 1):
-            at = self.place_of(100.0 * number / (self._ticks + 1))
-            painter.drawLine(at - QPointF(0, mm), at + QPointF(0, mm))
+            point = self.point_at(100.0 * number / (self._ticks + 1))
+            painter.drawLine(point - QPointF(0, mm), point + QPointF(0, mm))
         score = self.answer.positions[-1][1] if self.answer.positions else None
         if score is not None:
-            at = self.place_of(score)
+            point = self.point_at(score)
             painter.setPen(QPen(QColor(t.act), max(1.0 * mm, 3.0), Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-            painter.drawLine(at - QPointF(0, MARK / 2 * mm), at + QPointF(0, MARK / 2 * mm))
+            painter.drawLine(point - QPointF(0, MARK / 2 * mm), point + QPointF(0, MARK / 2 * mm))
 
-    def _touch(self, event: QTouchEvent, at: QPointF) -> None:
-        now, place = self._now(), self._position(at)
+    def _touch(self, event: QTouchEvent, point: QPointF) -> None:
+        now, position = self._now(), self._position(point)
         match event.type():
             case QEvent.Type.TouchBegin:
-                self._take(self.answer.press(now, place, "touch"))
+                self._take(self.answer.press(now, position, "touch"))
             case QEvent.Type.TouchUpdate:
-                self._take(self.answer.drag(now, place, "touch"))
+                self._take(self.answer.drag(now, position, "touch"))
             case _:
                 self._take(self.answer.release())
 
@@ -180,18 +180,18 @@ class ScoreLine(QAbstractSlider):
 
     def _name(self) -> None:
         """Say to screen readers what the line is, and where the answer lies."""
-        (low, high), score = self._ends, self.answer.score
-        self.setAccessibleName(self._words(Text.LINE).format(low=low, high=high))
-        where = self._words(Text.UNANSWERED if score is None else Text.ANSWERED)
-        self.setAccessibleDescription(where if score is None else where.format(score=f"{score:.0f}"))
+        (low, high), score = self._end_labels, self.answer.score
+        self.setAccessibleName(self._translate(Text.LINE).format(low=low, high=high))
+        state = self._translate(Text.UNANSWERED if score is None else Text.ANSWERED)
+        self.setAccessibleDescription(state if score is None else state.format(score=f"{score:.0f}"))
 
     def _line(self) -> QRectF:
         width = LENGTH * self._pixels_per_mm
         return QRectF((self.width() - width) / 2, 0, width, self.height())
 
-    def _position(self, at: QPointF) -> float:
+    def _position(self, point: QPointF) -> float:
         line = self._line()
-        along = 100.0 * (at.x() - line.left()) / line.width()
+        along = 100.0 * (point.x() - line.left()) / line.width()
         return 100.0 - along if self.isRightToLeft() else along
 
     def _resize(self) -> None:
@@ -201,10 +201,10 @@ class ScoreLine(QAbstractSlider):
 
 
 def _device(event: QMouseEvent) -> Device:
-    kind = event.pointingDevice().type()
-    if kind == QInputDevice.DeviceType.Stylus:
+    device_type = event.pointingDevice().type()
+    if device_type == QInputDevice.DeviceType.Stylus:
         return "pen"
-    return "touch" if kind == QInputDevice.DeviceType.TouchScreen else "mouse"
+    return "touch" if device_type == QInputDevice.DeviceType.TouchScreen else "mouse"
 
 
 class _Field(QWidget):
@@ -271,17 +271,17 @@ class ChoiceOfTwo(_Field):
     def begin(self) -> None:
         self._take(Choice())
 
-    def set_words(self, first: str, second: str) -> None:
-        for choice, words in ((self.first, first), (self.second, second)):
-            choice.setText(words)
-            choice.setAccessibleName(words)
+    def set_texts(self, first: str, second: str) -> None:
+        for choice, text in ((self.first, first), (self.second, second)):
+            choice.setText(text)
+            choice.setAccessibleName(text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
-        back, on = Qt.Key.Key_Left, Qt.Key.Key_Right
+        backward, forward = Qt.Key.Key_Left, Qt.Key.Key_Right
         if self.isRightToLeft():
-            back, on = on, back
-        keys: dict[int, Which] = {Qt.Key.Key_1: "first", back: "first", Qt.Key.Key_2: "second", on: "second"}
+            backward, forward = forward, backward
+        keys: dict[int, Which] = {Qt.Key.Key_1: "first", backward: "first", Qt.Key.Key_2: "second", forward: "second"}
         if event.key() in keys:
             self._take(self.answer.choose(self.now(), keys[event.key()], "keyboard"))
         else:
@@ -293,16 +293,14 @@ class ChoiceOfTwo(_Field):
             self._pointer = _device(event)
         return False
 
-    def _button(self, words: str, which: Which) -> QPushButton:
-        choice = button(
-            words, words, lambda: self._take(self.answer.choose(self.now(), which, self._pointer)), "choice"
-        )
+    def _button(self, text: str, value: Which) -> QPushButton:
+        choice = button(text, text, lambda: self._take(self.answer.choose(self.now(), value, self._pointer)), "choice")
         choice.installEventFilter(self)
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.
         size = f"min-width: {px(_WIDE)}px; min-height: {px(HIGH)}px;"
-        choice.setStyleSheet(f"font-size: {px(_WORDS)}px; {size}")
+        choice.setStyleSheet(f"font-size: {px(_BUTTON_TYPE)}px; {size}")
         return choice
 
     def _take(self, answer: Choice) -> None:
@@ -317,7 +315,7 @@ def newest_force(trace: LiveTrace) -> float:
     newest = trace.newest
     if newest is None:
         return 0.0
-    _, values = trace.between(newest - OVER, np.nextafter(newest, np.inf))
+    _, values = trace.between(newest - AVERAGING_TIME, np.nextafter(newest, np.inf))
     normal = values[CHANNELS.index("N")]
     finite = normal[np.isfinite(normal)]
     return float(finite.mean()) if len(finite) else 0.0

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QComboBox, QPushButton, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp
-from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, label_grid, regrade, say, scroll_area, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, label_grid, scroll_area, set_text, vbox
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS
@@ -31,7 +31,7 @@ class BenchPanel(Panel):
         self._send = send
         self._view: BenchView | None = None
         self._lamp = Lamp(tr("transducer"))
-        self._lamp_words = label(tr("not connected"), wrap=True)
+        self._lamp_label = label(tr("not connected"), wrap=True)
         self._fields = {name: label("–", wrap=True) for name in _FIELDS}
         self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
         self._life = {name: label("–", wrap=True) for name in HEALTH_NAMES}
@@ -50,33 +50,32 @@ class BenchPanel(Panel):
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
         name = tr("acknowledge overloads: begin to watch anew")
         self.acknowledge = button(tr("Acknowledge A"), name, lambda: send(AcknowledgeOverloads()))
-        self._search_words = label("", "quiet", wrap=True)
+        self._search_label = label("", "quiet", wrap=True)
         vbox(self._build(), on=self, margins=2)
 
     def show_view(self, view: BenchView) -> None:
-        before, self._view = self._view, view
-        if view == before:
+        previous, self._view = self._view, view
+        if view == previous:
             return
-        self._lamp.show_grade(view.lamp, view.lamp_words)
-        say(self._lamp_words, view.lamp_words)
-        regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
-        say(self._name, view.name)
+        self._lamp.show_grade(view.lamp, view.lamp_text)
+        set_text(self._lamp_label, view.lamp_text, grade=view.lamp if view.lamp in ("wrong", "look") else "")
+        set_text(self._name, view.name)
         for name, widget in self._fields.items():
-            say(widget, getattr(view, name), tr(SPOKEN_NAMES.get(name, name)))
+            set_text(widget, getattr(view, name), tr(SPOKEN_NAMES.get(name, name)))
         for name, text in view.life:
-            say(self._life[name], text, tr(name))
+            set_text(self._life[name], text, tr(name))
         for name, text in view.counters:
             if name in self._counters:
-                say(self._counters[name], text, tr(name))
-                regrade(self._counters[name], "look" if name != "lag" and text != "0" else "")
+                grade = "look" if name != "lag" and text != "0" else ""
+                set_text(self._counters[name], text, tr(name), grade)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
-        if before is None or before.devices != view.devices:
+        if previous is None or previous.devices != view.devices:
             self._show_devices(view)
         self.search.setText(tr("Searching") if view.searching else tr("Search"))
         self.search.setEnabled(not view.searching)
-        say(self._search_words, view.search_words)
-        self._search_words.setVisible(bool(view.search_words))
+        set_text(self._search_label, view.search_text)
+        self._search_label.setVisible(bool(view.search_text))
         show_connecting(self.connect_button, view)
         self._choice.setEnabled(view.lamp == "off")
         self.tare.setEnabled(view.can_tare)
@@ -98,18 +97,18 @@ class BenchPanel(Panel):
 
     def _selected_uri(self) -> str:
         text = self._choice.currentText().strip()
-        at = self._choice.findText(text)
-        return text if at < 0 else str(self._choice.itemData(at))
+        index = self._choice.findText(text)
+        return text if index < 0 else str(self._choice.itemData(index))
 
     def _show_devices(self, view: BenchView) -> None:
         typed = self._selected_uri()
         self._choice.clear()
-        for uri, words in view.devices:
-            self._choice.addItem(words, uri)
+        for uri, description in view.devices:
+            self._choice.addItem(description, uri)
         address = view.uri or typed or "sim:"
-        at = self._choice.findData(address)
-        self._choice.setCurrentIndex(at)
-        if at < 0:
+        index = self._choice.findData(address)
+        self._choice.setCurrentIndex(index)
+        if index < 0:
             self._choice.setEditText(address)
         self._show_begin()
 
@@ -121,10 +120,10 @@ class BenchPanel(Panel):
         inside, fields = QWidget(), self._fields
         vbox(
             self._name,
-            hbox(vbox(self._lamp, 1), (self._lamp_words, 1)),
+            hbox(vbox(self._lamp, 1), (self._lamp_label, 1)),
             self._choice,
             hbox((self.connect_button, 1), (self.search, 1)),
-            self._search_words,
+            self._search_label,
             label_grid((tr(name), fields[name]) for name in ("serial", "calibration", "rate")),
             label(tr("Load: share of the rated range, most since acknowledged, noise"), "section", wrap=True),
             vbox(*self._bars.values(), spacing=0),
@@ -158,13 +157,13 @@ class BenchStrip(Panel):
         self._lamp = Lamp(tr("transducer"))
         self._bars = {name: LoadBar(name) for name in LOADS}
         self.setFixedWidth(px(150))
-        self._words = label("", "quiet", wrap=True)
-        whole, lamp = button(tr("Bench  B"), tr("show the bench"), expand), hbox(self._lamp, (self._words, 1))
-        vbox(whole, lamp, *self._bars.values(), 1, on=self, margins=GRID)
+        self._status_label = label("", "quiet", wrap=True)
+        lamp = hbox(self._lamp, (self._status_label, 1))
+        vbox(button(tr("Bench  B"), tr("show the bench"), expand), lamp, *self._bars.values(), 1, on=self, margins=GRID)
 
     def show_view(self, view: BenchView) -> None:
-        self._lamp.show_grade(view.lamp, view.lamp_words)
-        say(self._words, view.lamp_words)
+        self._lamp.show_grade(view.lamp, view.lamp_text)
+        set_text(self._status_label, view.lamp_text)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
 
@@ -176,7 +175,7 @@ class LoadBar(QWidget):
 
     def __init__(self, name: str) -> None:
         super().__init__()
-        self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
+        self._bar = Bar(name, 0.0, 0.0, overloaded=False, noise="")
         self.setAccessibleName(tr("load on {name}", name=tr(name)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(px(2.75 * GRID))
@@ -190,7 +189,7 @@ class LoadBar(QWidget):
         self._bar = bar
         now = tr("not known") if bar.share is None else tr("{share:.0f} % of the rated load", share=100 * bar.share)
         peak = "" if bar.peak is None else tr(", at most {peak:.0f} %", peak=100 * bar.peak)
-        state = tr(", OVERLOAD") if bar.over else ""
+        state = tr(", OVERLOAD") if bar.overloaded else ""
         noise = tr(", noise {noise}", noise=bar.noise) if bar.noise else ""
         self.setAccessibleName(tr("load on {name}: {words}", name=tr(bar.name), words=f"{now}{peak}{state}{noise}"))
         self.setToolTip(self.accessibleName())
@@ -202,7 +201,7 @@ class LoadBar(QWidget):
         left, right = px(self.NAME), px(self.NOISE)
         if self.width() < left + right + 40:
             right = 0
-        colour = QColor(t.wrong if bar.over else t.text)
+        colour = QColor(t.wrong if bar.overloaded else t.text)
         painter.setPen(colour)
         name = QRectF(0, 0, left - 4, self.height())
         painter.drawText(name, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, tr(bar.name))
@@ -215,10 +214,10 @@ class LoadBar(QWidget):
             level.setWidth(level.width() * min(bar.share, 1.0))
             painter.fillRect(level, QColor(t.wrong if bar.share >= 1 else t.quiet))
         if bar.peak is not None:
-            at = track.left() + track.width() * min(bar.peak, 1.0)
-            painter.fillRect(QRectF(at - 1.5, track.top() - 3, 3, track.height() + 6), colour)
+            x = track.left() + track.width() * min(bar.peak, 1.0)
+            painter.fillRect(QRectF(x - 1.5, track.top() - 3, 3, track.height() + 6), colour)
         if right:
-            painter.setPen(QColor(t.wrong if bar.over else t.quiet))
-            words = tr("OVERLOAD") if bar.over else bar.noise
-            place = QRectF(self.width() - right + 4, 0, right - 4, self.height())
-            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)
+            painter.setPen(QColor(t.wrong if bar.overloaded else t.quiet))
+            text = tr("OVERLOAD") if bar.overloaded else bar.noise
+            box = QRectF(self.width() - right + 4, 0, right - 4, self.height())
+            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, text)

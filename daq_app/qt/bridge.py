@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
-from daq_app.window.live_feed import LiveFeed, together
+from daq_app.window.live_feed import LiveFeed, merge_live
 from daq_app.window.live_model import Settle
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.state import (
@@ -80,7 +80,7 @@ class Bridge(QObject):
 
     @property
     def recording(self) -> bool:
-        return self.state.session is not None and not self.state.session.over
+        return self.state.session is not None and not self.state.session.is_over
 
     def connecting(self, uri: str) -> None:
         """Know that the recorder was asked to connect a transducer already."""
@@ -127,7 +127,7 @@ class Bridge(QObject):
         if now - self._ticked >= _TICK:
             self._ticked = now
             self._fold(Tick(now))
-        for report in together(self._client.poll()):
+        for report in merge_live(self._client.poll()):
             try:
                 self._take(report)
             except Exception as error:  # noqa: BLE001  what one report cannot be used for must not cost the others
@@ -162,17 +162,17 @@ class Bridge(QObject):
                 self.model.follow(plan)
             case _:
                 pass
-        before = self.state.bench.peak.over
+        overloads = self.state.bench.peak.overloads
         self._fold(report)
         self._judge.follow(report, self.feed)
         bench = self.state.bench
-        if bench.info is not None and (isinstance(report, m.Device | m.Tared) or bench.peak.over != before):
+        if bench.info is not None and (isinstance(report, m.Device | m.Tared) or bench.peak.overloads != overloads):
             serial = bench.info.serial
             self._look_up(lambda: LifeKnown(serial, life_of(serial)))  # from a file that grows for years
 
-    def _look_up(self, what: Callable[[], Message]) -> None:
+    def _look_up(self, read: Callable[[], Message]) -> None:
         """Look something up in a thread, which does not hold up the window."""
-        threading.Thread(target=lambda: self._from_threads.put(what()), daemon=True).start()
+        threading.Thread(target=lambda: self._from_threads.put(read()), daemon=True).start()
 
     def _settle(self, judgement: Judged) -> None:
         session, stroke, friction = self.state.session, judgement.quality.stroke, judgement.quality.friction
@@ -195,6 +195,6 @@ class Bridge(QObject):
     def _frame(self) -> Frame:
         """Return how the transducer lies to the face: as the session states it, or the bench knows it."""
         session = self.state.session
-        if session is not None and not session.over:
+        if session is not None and not session.is_over:
             return session.plan.frame
         return self.state.bench.frame or Frame()

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, Signal
@@ -10,7 +11,7 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.bench_panel import show_connecting
-from daq_app.qt.parts import Panel, button, choice, field, fill, hbox, label, regrade, say, vbox
+from daq_app.qt.parts import Panel, button, choice, field, fill, hbox, label, regrade, set_text, vbox
 from daq_app.qt.preferences import Millimetres, name_of
 from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs
@@ -32,27 +33,26 @@ class CardFrame(Panel):
         self._name = name
         self._card: Card | None = None
         self._mark = label("○")
-        self.words = label("", "quiet", wrap=True)
+        self.message = label("", "quiet", wrap=True)
         self.body = QVBoxLayout()
         self.body.setSpacing(4)
-        head = hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID)
-        vbox(head, self.words, self.body, on=self, margins=GRID, spacing=4)
+        header = hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID)
+        vbox(header, self.message, self.body, on=self, margins=GRID, spacing=4)
 
     def show_card(self, card: Card) -> None:
         """Show whether the card is ready, and its line; nobody is blamed before Start was asked for."""
         if card == self._card:
             return
         self._card = card
-        say(self._mark, "✓" if card.ready else "○")
-        say(self.words, card.words)
-        self.words.setVisible(bool(card.words))
+        set_text(self._mark, "✓" if card.ready else "○")
+        set_text(self.message, card.text, grade="")
+        self.message.setVisible(bool(card.text))
         state = tr("ready") if card.ready else tr("not ready")
-        self.setAccessibleName(f"{tr(self._name)}: {state}. {card.words}".strip())
-        regrade(self.words, "")
+        self.setAccessibleName(f"{tr(self._name)}: {state}. {card.text}".strip())
 
     def insist(self) -> None:
         """Mark the line as what keeps the session from beginning."""
-        regrade(self.words, "wrong")
+        regrade(self.message, "wrong")
 
 
 class CutShort(Panel):
@@ -66,11 +66,11 @@ class CutShort(Panel):
         self._items: tuple[UnfinishedSession, ...] = ()
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
-        self._sessions.currentTextChanged.connect(self._show_choice)
-        self._words = label("", wrap=True)  # whole, however narrow the list is
+        self._description = label("", wrap=True)  # whole, however narrow the list is
+        self._sessions.currentTextChanged.connect(partial(set_text, self._description))
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resume)
         heading = label(tr("▲ Sessions that were cut short"), wrap=True)
-        fill(QVBoxLayout(self), heading, self._sessions, self._words, self.go_on)
+        fill(QVBoxLayout(self), heading, self._sessions, self._description, self.go_on)
         self._new_list.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
         self.show_sessions(())
 
@@ -89,14 +89,11 @@ class CutShort(Panel):
             self._items = sessions
             self._sessions.clear()
             for session in sessions:
-                self._sessions.addItem(session.words, str(session.folder))
-                at = self._sessions.count() - 1
-                self._sessions.setItemData(at, str(session.folder), Qt.ItemDataRole.ToolTipRole)
+                self._sessions.addItem(session.description, str(session.folder))
+                index = self._sessions.count() - 1
+                self._sessions.setItemData(index, str(session.folder), Qt.ItemDataRole.ToolTipRole)
         self._sessions.setVisible(len(sessions) > 1)
         self.setVisible(bool(sessions))
-
-    def _show_choice(self, words: str) -> None:
-        say(self._words, words)
 
     def _resume(self) -> None:
         if folder := self._sessions.currentData():
@@ -110,12 +107,12 @@ class TransducerRow(QWidget):
         super().__init__()
         self.connect_button = button(tr("Connect"), tr("connect the transducer"), lambda: act("connect"))
         self.zero = button(tr("Zero  T"), tr("measure the zero of the transducer"), lambda: act("tare"))
-        self.words = label("", "quiet", wrap=True)
-        vbox(hbox((self.connect_button, 1), (self.zero, 1)), self.words, on=self, spacing=GRID // 2)
+        self.summary = label("", "quiet", wrap=True)
+        vbox(hbox((self.connect_button, 1), (self.zero, 1)), self.summary, on=self, spacing=GRID // 2)
 
     def show_view(self, view: BenchView) -> None:
         """Show which transducer it is, its zero, noise and life, and what can be done with it."""
-        say(self.words, bench_summary(view))
+        set_text(self.summary, bench_summary(view))
         show_connecting(self.connect_button, view)
         self.zero.setEnabled(view.can_tare)
 
@@ -127,7 +124,7 @@ class ScreenFields(QWidget):
         """Show nothing yet; `act` does what a button stands for, `form` is read when something has changed."""
         super().__init__()
         self._form = form
-        self.words = ""  # the length of the line, and characters that no font here has
+        self.status = ""  # the length of the line, and characters that no font here has
         self.problem = ""  # why the subject's page is on no tablet, where it should be
         self._line_words = ""
         self._size = QSize(1000, 640)  # of the subject's window
@@ -147,12 +144,12 @@ class ScreenFields(QWidget):
     def show_line(self, scale: Millimetres, size: QSize) -> None:
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
         self._size = size
-        self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=scale.words)
+        self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=scale.origin)
         self.show_form()
 
-    def show_tablet(self, words: str, problem: str, picture: bytes) -> None:
+    def show_tablet(self, status: str, problem: str, picture: bytes) -> None:
         """Say how the tablet is reached; why no session can begin; its address for a camera (PNG, or empty)."""
-        self._line_words, self.problem = words, problem
+        self._line_words, self.problem = status, problem
         pixmap = QPixmap()
         pixmap.loadFromData(picture)
         self.camera.setPixmap(pixmap)
@@ -164,7 +161,7 @@ class ScreenFields(QWidget):
     def offer_languages(self) -> None:
         """Offer the languages of the form's protocol, and choose the one that was wished for where it is among them."""
         codes, _ = subject_texts(self._form())
-        if list(codes) != [self.language.itemData(at) for at in range(self.language.count())]:
+        if list(codes) != [self.language.itemData(index) for index in range(self.language.count())]:
             if self.language.findData(self._wish) >= 0:
                 self._wish = self.language.currentData()
             self.language.clear()
@@ -176,10 +173,10 @@ class ScreenFields(QWidget):
         """Show the page of the form, and say which of its characters no font here has."""
         form = self._form()
         self.thumbnail.show_form(form, self._size)
-        self.words = self._line_words
+        self.status = self._line_words
         if not self._new_code.isHidden():
             return  # the tablet has fonts of its own
         _, texts = subject_texts(form)
-        words = translator(form.language or ENGLISH)
-        if lost := missing_glyphs([*texts, *map(words, SubjectText)], self.font()):
-            self.words += " " + tr("No font here draws {lost}: install one that does.", lost=lost)
+        translate = translator(form.language or ENGLISH)
+        if lost := missing_glyphs([*texts, *map(translate, SubjectText)], self.font()):
+            self.status += " " + tr("No font here draws {lost}: install one that does.", lost=lost)

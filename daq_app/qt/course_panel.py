@@ -8,7 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
 from daq_app.qt.keys import KEYS
-from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, say, stack_pages, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, set_text, stack_pages, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, px
@@ -19,7 +19,7 @@ from sessions.run import steps
 
 MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # that take a text
 ACTS = ("skip", "redo", "pause", "note", "no answer", "end")  # that have a button
-_WORDS = {name: key.words for key in KEYS for name in (key.key, key.act)}
+_DESCRIPTIONS = {name: key.description for key in KEYS for name in (key.key, key.act)}
 _ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
 
 
@@ -31,9 +31,9 @@ class CoursePanel(Panel):
         self._send = send
         self._view: CourseView | None = None
         self._act = ""
-        self._question_words = ""  # the question that stands over the line
+        self._question_text = ""  # the question that stands over the line
         self.plan = row_list(tr("plan: trials done, in hand and coming"))
-        self.buttons = {act: button("", tr(_WORDS[act]), partial(self.ask, act), "small") for act in ACTS}
+        self.buttons = {act: button("", tr(_DESCRIPTIONS[act]), partial(self.ask, act), "small") for act in ACTS}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
@@ -41,44 +41,45 @@ class CoursePanel(Panel):
         grid = QGridLayout(acts)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(GRID)
-        for at, widget in enumerate(self.buttons.values()):
-            grid.addWidget(widget, at // columns, at % columns)
+        for index, widget in enumerate(self.buttons.values()):
+            grid.addWidget(widget, index // columns, index % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         self._bottom = stack_pages(acts, self._entry_row())
         self._timer = label("", "quiet")
         self.mirror = Mirror()
         self._roomy = px(_ROOMY, most=1.4)
-        head = hbox((label(tr("Plan"), "section"), 1), self._timer)
-        around = (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
-        vbox(head, (self.plan, 1), self.mirror, self._bottom, on=self, margins=around, spacing=GRID)
+        header = hbox((label(tr("Plan"), "section"), 1), self._timer)
+        margins = (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
+        vbox(header, (self.plan, 1), self.mirror, self._bottom, on=self, margins=margins, spacing=GRID)
 
     @property
     def asking(self) -> bool:
         return self._bottom.currentIndex() == 1
 
     def show_view(self, view: CourseView) -> None:
-        before, self._view = self._view, view
+        previous, self._view = self._view, view
         wait = tr("waiting {timer}", timer=view.timer) if view.timer else ""
-        say(self._timer, wait, tr("Time since this was asked:"))
-        if before is None or before.rows != view.rows:
+        set_text(self._timer, wait, tr("Time since this was asked:"))
+        if previous is None or previous.rows != view.rows:
             self._show_rows(view.rows)
         for name, widget in self.buttons.items():
             entry = view.buttons[name]
-            if before is None or entry != before.buttons[name]:
+            if previous is None or entry != previous.buttons[name]:
                 widget.setText(f"{entry.label} {tr(entry.key)}".strip())
-                widget.setAccessibleName(f"{entry.label}: {tr(_WORDS.get(entry.key, _WORDS['no answer']))}")
+                meaning = tr(_DESCRIPTIONS.get(entry.key, _DESCRIPTIONS["no answer"]))
+                widget.setAccessibleName(f"{entry.label}: {meaning}")
                 widget.setEnabled(entry.enabled)
 
-    def ask(self, what: str) -> None:
+    def ask(self, act: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
-        if self._view is None or not (entry := self._view.buttons[what]).enabled:
+        if self._view is None or not (entry := self._view.buttons[act]).enabled:
             return
         if entry.sends is not None:
             self._send(entry.sends)
             return
-        self._act = what
-        self._question_words = entry.question
-        say(self._question, entry.question)
+        self._act = act
+        self._question_text = entry.question
+        set_text(self._question, entry.question)
         self.line.setAccessibleName(entry.question)
         self.line.clear()
         self._bottom.setCurrentIndex(1)
@@ -93,12 +94,12 @@ class CoursePanel(Panel):
     def _keep(self) -> None:
         text = self.line.text().strip()
         if not text:
-            say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._question_words))
+            set_text(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._question_text))
             return
         question = "" if self._view is None else self._view.buttons[self._act].question
-        if question and question != self._question_words:  # it would discard another trial than was meant
-            self._question_words = question
-            say(self._question, tr("The session has gone on meanwhile. {question}", question=question))
+        if question and question != self._question_text:  # it would discard another trial than was meant
+            self._question_text = question
+            set_text(self._question, tr("The session has gone on meanwhile. {question}", question=question))
             return
         self.leave()
         self._send(MESSAGES[self._act](text))
@@ -113,8 +114,8 @@ class CoursePanel(Panel):
     def _show_rows(self, rows: tuple[PlanRow, ...]) -> None:
         while self.plan.count() > len(rows):
             self.plan.takeItem(self.plan.count() - 1)
-        for at, row in enumerate(rows):
-            item = self.plan.item(at)
+        for index, row in enumerate(rows):
+            item = self.plan.item(index)
             if item is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None beyond the last
                 item = QListWidgetItem()
                 self.plan.addItem(item)

@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
-from daq_app.analyst.frame import FIELD_CHOICES, Frame, Line, Parts, View, probe_words
+from daq_app.analyst.frame import FIELD_CHOICES, Frame, FrameMesh, Line, View, probe_text
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.plots import name_axis, pg, style_axis
 from daq_app.qt.tokens import SMALL, Tokens, font, px
@@ -18,7 +18,7 @@ _HELP = tr_noop(
     "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
     "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
 )
-NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
+NO_MESH = FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
 SHADES = 64
 ZOOM = 1.25  # of a key [-]: three of them double the picture
 _STEP = 0.1  # of the picture's width that an arrow key moves it
@@ -45,14 +45,14 @@ class Sight(QObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self.part: QRectF | None = None  # [mm]; None: all of it
+        self.region: QRectF | None = None  # [mm]; None: all of it
         self.line: Line | None = None
         self.draws_line = False  # the mouse draws a line in place of moving the picture
-        self.words: tuple[str, ...] = ("",)  # over each finger
+        self.captions: tuple[str, ...] = ("",)  # over each finger
 
-    def look_at(self, part: QRectF | None) -> None:
+    def look_at(self, region: QRectF | None) -> None:
         """Show a part of the finger [mm]; None shows all of it."""
-        self.part = part
+        self.region = region
         self.changed.emit()
 
     def set_line(self, line: Line | None) -> None:
@@ -72,12 +72,12 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.sight = sight or Sight()
         self._tokens, self._font = tokens, font(SMALL)
         self.frame: Frame | None = None
-        self._parts = NO_PARTS
+        self._mesh = NO_MESH
         self.look = Look(FIELD_CHOICES[0], (0.0, 1.0))
-        self._words = ""
+        self._caption = ""
         self._fits: tuple[Frame, ...] = ()  # all of them are seen before anybody moves or zooms
         self._pointer: QPointF | None = None
-        self._shades = {signed: _shades(*what) for signed, what in MAPS.items()}
+        self._shades = {signed: _shades(*colour_map) for signed, colour_map in MAPS.items()}
         self.setBackground(tokens.surface)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self._least = px(_LEAST)
@@ -88,61 +88,61 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._box, self._bar = _Box(self.sight), self._colour_bar()
         self.ci.addItem(self._box, 0, 0)
         self.ci.addItem(self._bar, 1, 0)
-        self._box.sigResized.connect(self._place)
-        self.sight.changed.connect(self._place)
-        self._place()
+        self._box.sigResized.connect(self._fit_region)
+        self.sight.changed.connect(self._fit_region)
+        self._fit_region()
 
     def show_frame(
-        self, frame: Frame | None, parts: Parts, words: str, look: Look, linked: tuple[Frame, ...] = ()
+        self, frame: Frame | None, mesh: FrameMesh, caption: str, look: Look, linked: tuple[Frame, ...] = ()
     ) -> None:
         """Show a state, and how; what was moved or zoomed stays so. Frames that are `linked` with it fit in too."""
         fits = linked or (() if frame is None else (frame,))
-        if frame is self.frame and fits == self._fits and (words, look) == (self._words, self.look):
+        if frame is self.frame and fits == self._fits and (caption, look) == (self._caption, self.look):
             return
         if look.near != self.look.near:
-            self.sight.part = None
-        self.frame, self._parts, self._words, self.look, self._fits = frame, parts, words, look, fits
-        self.setAccessibleName(words or tr("finger of the model: none"))
+            self.sight.region = None
+        self.frame, self._mesh, self._caption, self.look, self._fits = frame, mesh, caption, look, fits
+        self.setAccessibleName(caption or tr("finger of the model: none"))
         low, high = look.range
         self._bar.rounding = (high - low) / 100.0
         self._bar.setColorMap(pg.ColorMap(np.linspace(0.0, 1.0, SHADES), self._shades[look.field.signed]))
         self._bar.setLevels(look.range)
         self._bar.setVisible(frame is not None)
-        self._place()
+        self._fit_region()
         self._probe()
 
     def view(self) -> View:
         """Return where places of the finger lie on the canvas."""
-        part, here = self._box.viewRect(), self._plot_rect()
-        middle, per_mm = part.center(), here.width() / part.width()
-        return View(middle.x(), middle.y(), here.center().x(), here.center().y(), per_mm)
+        region, plot_box = self._box.viewRect(), self._plot_rect()
+        middle, per_mm = region.center(), plot_box.width() / region.width()
+        return View(middle.x(), middle.y(), plot_box.center().x(), plot_box.center().y(), per_mm)
 
-    def words_at(self, place: tuple[float, float]) -> str:
+    def readout_at(self, position: tuple[float, float]) -> str:
         """Return what is at a place [mm]; "" without a finger."""
-        return "" if self.frame is None else probe_words(self.frame, self._parts, self.look.field, *place)
+        return "" if self.frame is None else probe_text(self.frame, self._mesh, self.look.field, *position)
 
-    def draw(self, painter: QPainter, head: str) -> None:
-        """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it, and end."""
-        above = self.size_with(head).height() - self.height()
+    def draw(self, painter: QPainter, heading: str) -> None:
+        """Draw what is shown on paper of the window's colour, with a `heading` such as SIMULATED over it, and end."""
+        above = self.size_with(heading).height() - self.height()
         painter.fillRect(QRectF(0, 0, self.width(), above), QColor(self._tokens.surface))
         painter.setFont(self._font)
         painter.setPen(QColor(self._tokens.look))
-        painter.drawText(QRectF(4, 0, self.width() - 8, above), int(Qt.TextFlag.TextWordWrap), head)
+        painter.drawText(QRectF(4, 0, self.width() - 8, above), int(Qt.TextFlag.TextWordWrap), heading)
         self.render(painter, QRectF(0, above, self.width(), self.height()), self.rect())
         painter.end()
 
-    def size_with(self, head: str) -> QSize:
-        return self.size() + QSize(0, ceil(self._height_of(head)))
+    def size_with(self, heading: str) -> QSize:
+        return self.size() + QSize(0, ceil(self._height_of(heading)))
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         painter.setFont(self._font)
         if self.frame is not None:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame, self._parts)
+            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame, self._mesh)
             picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
         painter.setPen(QColor(self._tokens.quiet))
-        words = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
-        painter.drawText(words, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._words)
+        caption_box = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
+        painter.drawText(caption_box, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._caption)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw a ring around all of it while it has the keyboard."""
@@ -190,38 +190,39 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def _move_end(self, key: Qt.Key, *, begins: bool) -> None:
         """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
-        part = self._box.viewRect()
-        line = self.sight.line or ((part.center().x(), part.center().y()),) * 2
-        across, up = (END_STEP * step * part.width() for step in _ARROWS[key])
+        region = self._box.viewRect()
+        line = self.sight.line or ((region.center().x(), region.center().y()),) * 2
+        dx, dy = (END_STEP * step * region.width() for step in _ARROWS[key])
         x, y = line[0 if begins else 1]
-        end = (x + across, y + up)
-        self.sight.set_line((end, line[1]) if begins else (line[0], end))
+        moved_end = (x + dx, y + dy)
+        self.sight.set_line((moved_end, line[1]) if begins else (line[0], moved_end))
 
     def _probe(self) -> None:
-        at = self._pointer
-        inside = at is not None and self.frame is not None and self._plot_rect().contains(at)
-        self.sight.pointed.emit(self.view().place(at.x(), at.y()) if inside and at is not None else None)
+        pointer, position = self._pointer, None
+        if pointer is not None and self.frame is not None and self._plot_rect().contains(pointer):
+            position = self.view().from_screen(pointer.x(), pointer.y())
+        self.sight.pointed.emit(position)
 
-    def _place(self) -> None:
+    def _fit_region(self) -> None:
         """Show the part that is looked at, or all of it at the foot of the box."""
         above, line = self._above(), QFontMetricsF(self._font).height()
         least = self._least * (1 if self.look.lost is None else 2)  # a marked place must differ from others
         self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two stand beside each other
         self.ci.layout.setContentsMargins(0.0, above, 0.0, 0.0)
         axis: Any = self._bar.getAxis("bottom")
-        words = QFontMetricsF(self._font).horizontalAdvance(self.look.field.axis)
-        name_axis(axis, self.look.field.axis if words < self.width() else f"[{self.look.field.unit}]")
-        part, here = self.sight.part, self._box.rect()
-        if part is None and self._fits and here.height() > 1.0:
+        width = QFontMetricsF(self._font).horizontalAdvance(self.look.field.axis)
+        name_axis(axis, self.look.field.axis if width < self.width() else f"[{self.look.field.unit}]")
+        region, box = self.sight.region, self._box.rect()
+        if region is None and self._fits and box.height() > 1.0:
             boxes = np.array([whole_box(frame, self.look) for frame in self._fits])
             left, below = boxes.min(axis=0)[[0, 2]].tolist()
             right, high = boxes.max(axis=0)[[1, 3]].tolist()
-            room = max(here.height() - line - 2.0, 1.0)  # over a line of words under the tractions
-            view = View.fit((left, right, below, high), 0.0, 0.0, here.width(), room)
-            x0, x1, y0, y1 = view.visible(0.0, 0.0, here.width(), here.height())
-            part = QRectF(x0, y0, x1 - x0, y1 - y0)
-        if part is not None:
-            self._box.setRange(part, padding=0.0)
+            room = max(box.height() - line - 2.0, 1.0)  # over a line of words under the tractions
+            view = View.fit((left, right, below, high), 0.0, 0.0, box.width(), room)
+            x0, x1, y0, y1 = view.visible(0.0, 0.0, box.width(), box.height())
+            region = QRectF(x0, y0, x1 - x0, y1 - y0)
+        if region is not None:
+            self._box.setRange(region, padding=0.0)
         self.viewport().update()
 
     def _plot_rect(self) -> QRectF:
@@ -229,12 +230,12 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def _above(self) -> float:
         """Return the height of the words [pixel], the same over every finger."""
-        return max(LEAST_LINES * QFontMetricsF(self._font).height(), *map(self._height_of, self.sight.words))
+        return max(LEAST_LINES * QFontMetricsF(self._font).height(), *map(self._height_of, self.sight.captions))
 
-    def _height_of(self, words: str) -> float:
+    def _height_of(self, text: str) -> float:
         """Return the height of words that are as wide as the canvas [pixel]."""
         box = QRectF(0.0, 0.0, self.width() - 8.0, 1.0)
-        return QFontMetricsF(self._font).boundingRect(box, int(Qt.TextFlag.TextWordWrap), words).height()
+        return QFontMetricsF(self._font).boundingRect(box, int(Qt.TextFlag.TextWordWrap), text).height()
 
     def _colour_bar(self) -> Any:  # noqa: ANN401  pyqtgraph has no types
         pens = {"pen": self._tokens.text, "hoverPen": self._tokens.act, "hoverBrush": f"{self._tokens.act}80"}
@@ -255,28 +256,28 @@ class _Box(pg.ViewBox):
         self._sight = sight
         self.draws = False  # what is dragged is the end of a line
         self.setLimits(minXRange=NEAREST, maxXRange=_FARTHEST)
-        self.sigRangeChangedManually.connect(self._tell)
+        self.sigRangeChangedManually.connect(self._share_region)
 
     def zoom(self, factor: float) -> None:
         """Show the finger `factor` times as large; its middle stays."""
         self.scaleBy((1.0 / factor, 1.0 / factor))
-        self._tell()
+        self._share_region()
 
-    def move(self, across: float, up: float) -> None:
+    def move(self, dx: float, dy: float) -> None:
         """Look further to the right and up, by parts of the width that is shown."""
         width = self.viewRect().width()
-        self.translateBy(x=across * width, y=up * width)
-        self._tell()
+        self.translateBy(x=dx * width, y=dy * width)
+        self._share_region()
 
     def mouseDragEvent(self, ev: Any, axis: int | None = None) -> None:  # noqa: ANN401  pyqtgraph has no types
         if not self.draws:
             pg.ViewBox.mouseDragEvent(self, ev, axis)
             return
         ev.accept()
-        begin, end = (self.mapToView(at) for at in (ev.buttonDownPos(), ev.pos()))
+        begin, end = (self.mapToView(point) for point in (ev.buttonDownPos(), ev.pos()))
         self._sight.set_line(((begin.x(), begin.y()), (end.x(), end.y())))
 
-    def _tell(self, *_: object) -> None:
+    def _share_region(self, *_: object) -> None:
         self._sight.look_at(QRectF(self.viewRect()))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
-from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, View, halve_triangles, visible
+from daq_app.analyst.frame import Box, FieldChoice, Frame, FrameMesh, Line, Range, View, halve_triangles, visible
 from daq_app.qt.painting import faces, paint_failed_solve, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
@@ -37,8 +37,8 @@ def whole_box(frame: Frame, look: Look) -> Box:
     if not look.near:
         x, y = frame.nodes[:, 0], frame.nodes[:, 1]
         return float(x.min()) - 0.5, float(x.max()) + 0.5, -TRACTIONS, float(y.max()) + 0.3
-    places: list[float] = frame.contact.x.tolist()
-    touching = [x for x, state in zip(places, frame.contact.state, strict=True) if state != "open"]
+    positions: list[float] = frame.contact.x.tolist()
+    touching = [x for x, state in zip(positions, frame.contact.state, strict=True) if state != "open"]
     middle = (min(touching) + max(touching)) / 2.0 if touching else 0.0
     half, above = _NEAR
     return middle - half, middle + half, -TRACTIONS, above
@@ -53,7 +53,7 @@ class FingerPainter:
     view: View
     box: QRectF
     frame: Frame
-    parts: Parts
+    mesh: FrameMesh
 
     def paint(self, look: Look, shades: list[QColor], line: Line | None) -> None:
         painter, ink, box = self.painter, QColor(self.tokens.text), self.box
@@ -82,13 +82,13 @@ class FingerPainter:
     def _paint_tissue(self, look: Look, shades: list[QColor]) -> None:
         frame, box = self.frame, self.box
         region = self.view.visible(box.left(), box.top(), box.width(), box.height())
-        nodes, values = frame.nodes, look.field.of(frame)
-        triangles = visible(nodes, self.parts.triangles, region)
+        nodes, values = frame.nodes, look.field.values_of(frame)
+        triangles = visible(nodes, self.mesh.triangles, region)
         if len(triangles) and box.width() * box.height() / len(triangles) > _COARSE:
             nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
-        part = (values[triangles].mean(axis=1) - low) / (high - low)
-        shade = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
+        fraction = (values[triangles].mean(axis=1) - low) / (high - low)
+        shade = (np.clip(np.nan_to_num(fraction), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
         self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         for number, path in faces(self.view.to_screen(nodes)[triangles], shade):
             self.painter.setPen(QPen(shades[number], 0))
@@ -100,7 +100,7 @@ class FingerPainter:
     def _paint_mesh(self) -> None:
         self.painter.setPen(QPen(sheer("black", 110), 0.6))
         points = self._to_screen(self.frame.nodes)
-        around: list[list[int]] = self.parts.elements.tolist()
+        around: list[list[int]] = self.mesh.elements.tolist()
         for element in around:
             if any(self.box.contains(points[node]) for node in element):
                 self.painter.drawPolygon([points[node] for node in element])
@@ -122,21 +122,21 @@ class FingerPainter:
 
     def _name_bone(self, bone: QPolygonF, middle: QPointF) -> None:
         """Write the bone's name where all of it lies on the bone: on the colours around it could not be read."""
-        words = tr("bone")
-        place = self.painter.fontMetrics().boundingRect(words).toRectF()
-        place.moveCenter(middle)
-        corners = (place.topLeft(), place.topRight(), place.bottomLeft(), place.bottomRight())
+        name = tr("bone")
+        box = self.painter.fontMetrics().boundingRect(name).toRectF()
+        box.moveCenter(middle)
+        corners = (box.topLeft(), box.topRight(), box.bottomLeft(), box.bottomRight())
         if all(bone.containsPoint(corner, Qt.FillRule.OddEvenFill) for corner in corners):
-            self.painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, words)
+            self.painter.drawText(box, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, name)
 
     def _paint_line(self, line: Line) -> None:
-        ends = self._to_screen(np.array(line))
-        self._in_two(QPolygonF(ends))
-        for name, end in zip("AB", ends, strict=True):
+        points = self._to_screen(np.array(line))
+        self._in_two(QPolygonF(points))
+        for name, point in zip("AB", points, strict=True):
             self.painter.setBrush(QColor("white"))
-            self.painter.drawEllipse(end, 8.0, 8.0)
+            self.painter.drawEllipse(point, 8.0, 8.0)
             self.painter.setBrush(Qt.BrushStyle.NoBrush)
-            self.painter.drawText(QRectF(end.x() - 9, end.y() - 9, 18, 18), Qt.AlignmentFlag.AlignCenter, name)
+            self.painter.drawText(QRectF(point.x() - 9, point.y() - 9, 18, 18), Qt.AlignmentFlag.AlignCenter, name)
 
     def _in_two(self, polygon: QPolygonF) -> None:
         """Draw a line black on white, to be seen on every colour."""
@@ -150,24 +150,25 @@ class FingerPainter:
         touching = [i for i, state in enumerate(contact.state) if state != "open"]
         if not touching:
             return
-        places: list[float] = self.view.to_screen(np.column_stack([contact.x, np.zeros(len(contact.x))]))[:, 0].tolist()
+        points = np.column_stack([contact.x, np.zeros(len(contact.x))])
+        positions: list[float] = self.view.to_screen(points)[:, 0].tolist()
         strongest = float(np.hypot(contact.pressure, contact.traction)[touching].max())
         painter.setPen(QPen(ink, 1.0))
         for i in touching[:: max(1, -(-len(touching) // _ARROWS))] if strongest > 0.0 else ():
             reach = self.view.per_mm * _LONGEST / strongest
-            tip = QPointF(places[i], ground + 2.0)
+            tip = QPointF(positions[i], ground + 2.0)
             tail = QPointF(tip.x() - reach * contact.traction[i], tip.y() + reach * contact.pressure[i])
             painter.drawLine(tail, tip)
             painter.drawLine(tip, QPointF(tip.x() - 2.5, tip.y() + 4.0))
             painter.drawLine(tip, QPointF(tip.x() + 2.5, tip.y() + 4.0))
         level = ground + self.view.per_mm * (_LONGEST + 0.3)
-        for state, run in itertools.groupby(zip(contact.state, places, strict=True), key=lambda one: one[0]):
+        for state, run in itertools.groupby(zip(contact.state, positions, strict=True), key=lambda entry: entry[0]):
             if state == "open":
                 continue
-            ends = [place for _, place in run]
+            stretch = [position for _, position in run]
             painter.setPen(QPen(ink, 3.0, STYLES[state], Qt.PenCapStyle.FlatCap))
-            painter.drawLine(QPointF(ends[0] - 1.5, level), QPointF(ends[-1] + 1.5, level))
-            words = tr(STATE_WORDS[state])
-            box = QRectF(ends[0], level + 2, ends[-1] - ends[0], painter.fontMetrics().height())
-            if box.width() > painter.fontMetrics().horizontalAdvance(words) and self.box.contains(box):
-                painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, words)
+            painter.drawLine(QPointF(stretch[0] - 1.5, level), QPointF(stretch[-1] + 1.5, level))
+            text = tr(STATE_WORDS[state])
+            box = QRectF(stretch[0], level + 2, stretch[-1] - stretch[0], painter.fontMetrics().height())
+            if box.width() > painter.fontMetrics().horizontalAdvance(text) and self.box.contains(box):
+                painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, text)

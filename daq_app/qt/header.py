@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QRe
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp, paint_arrow
-from daq_app.qt.parts import Panel, button, hbox, label, regrade, say, set_horizontal
+from daq_app.qt.parts import Panel, button, hbox, label, regrade, set_horizontal, set_text
 from daq_app.qt.preferences import name_of
 from daq_app.qt.tokens import GRID, SMALL, font, px, theme_of
 from daq_app.window.state import Message
@@ -38,29 +38,28 @@ class Header(QWidget):
         self._simulated = label(tr("SIMULATED"), "simulated")
         self._simulated.setVisible(False)
         self._lamp = Lamp(tr("recording"))
-        self._words = label(tr("not recording"), "title")
+        self._recording_label = label(tr("not recording"), "title")
         self._age = label("", "quiet")
         self._age.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         subject = hbox((self._heading, 3), (self._device, 2), self._language, spacing=GRID)
-        lamp = hbox(1, self._simulated, self._lamp, self._words, self._age, spacing=GRID)
+        lamp = hbox(1, self._simulated, self._lamp, self._recording_label, self._age, spacing=GRID)
         self._one_row = px(_ONE_ROW)
         self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
         longest = tr("saved {age:.1f} s ago", age=99.9)
         self._age.setFixedWidth(QFontMetrics(font(SMALL)).horizontalAdvance(f"{longest} "))
 
     def show_view(self, view: View) -> None:
-        say(self._heading, view.heading)
-        say(self._device, f"{view.bench.name}: {view.bench.lamp_words}")
-        say(self._language, name_of(view.subject.language), tr("language that the subject reads"))
+        set_text(self._heading, view.heading)
+        set_text(self._device, f"{view.bench.name}: {view.bench.lamp_text}")
+        set_text(self._language, name_of(view.subject.language), tr("language that the subject reads"))
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
         self._simulated.setAccessibleName(view.simulated or tr("nothing is simulated"))
-        self._lamp.show_grade(view.lamp.grade, view.lamp.words)
-        say(self._words, view.lamp.words)
+        self._lamp.show_grade(view.lamp.grade, view.lamp.text)
+        set_text(self._recording_label, view.lamp.text, grade="wrong" if view.lamp.grade == "wrong" else "")
         # All figures are as wide, but some lean beyond their place, which a label allows for.
-        self._words.setMinimumWidth(self._words.fontMetrics().horizontalAdvance(view.lamp.words) + 2)
-        regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
-        say(self._age, view.lamp.age)
+        self._recording_label.setMinimumWidth(self._recording_label.fontMetrics().horizontalAdvance(view.lamp.text) + 2)
+        set_text(self._age, view.lamp.age)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the lamp below the subject where the strip is too narrow for one row."""
@@ -79,11 +78,11 @@ class Notice(Panel):
         self._legible_until = 0.0  # of the monotonic clock
         self._topic: object = None
         self._step = ""
-        self._words = label("", wrap=True)
+        self._label = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
         self.set_collapsible(False)
-        hbox((self._words, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
+        hbox((self._label, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
     def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
         """Show a banner and a warning of this step of the session, or else the last message."""
@@ -93,13 +92,13 @@ class Notice(Panel):
         self._show(banner, notice)
 
     def _show(self, banner: Banner | None, notice: str) -> None:
-        before, self._banner = self._banner, banner
+        previous, self._banner = self._banner, banner
         grade = "" if banner is None else banner.grade
-        if grade == "wrong" and (before is None or before.grade != "wrong"):
+        if grade == "wrong" and (previous is None or previous.grade != "wrong"):
             QApplication.beep()  # nobody looks at the window all the time
-        words = self.warning or notice
-        text = f"{_MARKS[grade]} {banner.sentence} {self.warning}" if banner else words[:1].upper() + words[1:]
-        say(self._words, text.strip(), tr("Notice:"))
+        message = self.warning or notice
+        text = f"{_MARKS[grade]} {banner.sentence} {self.warning}" if banner else message[:1].upper() + message[1:]
+        set_text(self._label, text.strip(), tr("Notice:"))
         regrade(self, grade)
         self._button.setVisible(banner is not None and banner.sends is not None)
         self._button.setText("" if banner is None else banner.action)
@@ -111,7 +110,7 @@ class Notice(Panel):
         """Keep the line's place while it is empty; or give it up, where there is no room to keep."""
         self._collapsible = collapsible
         self.setMinimumHeight(0 if collapsible else px(52))
-        self.setVisible(not collapsible or bool(self._words.text()))
+        self.setVisible(not collapsible or bool(self._label.text()))
 
     def warn(self, sentence: str) -> None:
         """Answer somebody; a sentence stays long enough to be read, also where a simulated subject goes on at once."""
@@ -145,7 +144,7 @@ class ToDo(Panel):
         hbox(self._arrow, (self.sentence, 1), self._buttons, on=self, margins=room, spacing=2 * GRID)
 
     def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
-        say(self.sentence, sentence)
+        set_text(self.sentence, sentence)
         self._arrow.show_direction(direction)
         self._arrow.setVisible(direction != 0 or not self._small)
         if primary is not None:
@@ -166,8 +165,8 @@ class ToDo(Panel):
         """Use smaller type, and one button below the other, where there is little room."""
         if small != self._small:
             self._small = small
-            ways = QBoxLayout.Direction
-            self._buttons.setDirection(ways.BottomToTop if small else ways.LeftToRight)
+            directions = QBoxLayout.Direction
+            self._buttons.setDirection(directions.BottomToTop if small else directions.LeftToRight)
             regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)
             self.sentence.setMinimumHeight(_LEAST)
@@ -186,8 +185,8 @@ class Arrow(QWidget):
         """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
         if direction != self._direction:
             self._direction = direction
-            way = tr("stroke away from the subject") if direction > 0 else tr("stroke towards the subject")
-            self.setAccessibleName(way if direction else tr("no stroke asked for"))
+            name = tr("stroke away from the subject") if direction > 0 else tr("stroke towards the subject")
+            self.setAccessibleName(name if direction else tr("no stroke asked for"))
             self.setToolTip(self.accessibleName())
             self.update()
 

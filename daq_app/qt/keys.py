@@ -22,7 +22,7 @@ class Key:
 
     key: str
     act: str
-    words: str
+    description: str
 
 
 KEYS = (
@@ -91,7 +91,7 @@ def act_of(event: QKeyEvent) -> str | None:
         name = f"Ctrl+{name}"
     elif modifiers != Qt.KeyboardModifier.NoModifier:
         return None
-    return next((one.act for one in KEYS if one.key == name), None)
+    return next((key.act for key in KEYS if key.key == name), None)
 
 
 def name_of(event: QKeyEvent) -> str:
@@ -106,20 +106,20 @@ class KeysPage(Panel):
 
     def __init__(self, parent: QWidget, keys: tuple[Key, ...] = KEYS) -> None:
         super().__init__(tr("keys of this window"))
-        self._over, self._keys = parent, keys
+        self._window, self._keys = parent, keys
         self.setParent(parent)
         self.hide()
 
     def _fill(self) -> None:
-        head = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
-        rows, pairs = QWidget(), ((tr(one.key), label(tr(one.words), wrap=True)) for one in self._keys)
+        header = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
+        rows, pairs = QWidget(), ((tr(key.key), label(tr(key.description), wrap=True)) for key in self._keys)
         grid = label_grid(pairs, role="value")
         grid.setHorizontalSpacing(3 * GRID)
         self._rows = vbox(grid, on=rows, margins=(0, 0, GRID, 0))
         self._area = scroll_area(rows)
         self._area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
         margins = (2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID))
-        self._column = vbox(head, (self._area, 1), on=self, margins=margins, spacing=GRID)
+        self._column = vbox(header, (self._area, 1), on=self, margins=margins, spacing=GRID)
 
     def toggle(self) -> None:
         """Show the page over everything else, or hide it; it is filled when it is first seen."""
@@ -133,7 +133,7 @@ class KeysPage(Panel):
         """Take the middle of the window, as much as there is need for."""
         if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  it was never seen
             return
-        window = self._over.size()
+        window = self._window.size()
         size = QSize(px(_WIDTH), 0).boundedTo(window - QSize(4 * GRID, 4 * GRID))
         around = self._column.totalMinimumSize() - self._area.minimumSizeHint()
         keys = self._rows.totalHeightForWidth(size.width() - around.width())
@@ -188,22 +188,23 @@ class Keyboard(QObject):
         if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent) or self._subject.measuring:
             return False
         field, key = self.focused_field(), name_of(event)
-        whose = owner(key, self._subject.asks, typing=field is not None, from_subject=watched is not self._plan)
+        key_owner = owner(key, self._subject.asks, typing=field is not None, from_subject=watched is not self._plan)
         if watched is self._plan:  # a list would search for letters
-            return (whose == "answer" or act_of(event) is not None) and self.press(event)
-        if whose == "text" and field is not None:
+            return (key_owner == "answer" or act_of(event) is not None) and self.press(event)
+        if key_owner == "text" and field is not None:
             self._window.activateWindow()
             QApplication.sendEvent(field, event)
             return True
-        return watched is self._subject and whose == "course" and self.press(event)
+        return watched is self._subject and key_owner == "course" and self.press(event)
 
     def _pressed_twice(self, event: QKeyEvent) -> bool:
         """Say whether a key is the second press of the one that gave the answer, as the system counts presses."""
         soon = self._since_answer.isValid() and self._since_answer.elapsed() < QApplication.doubleClickInterval()
         return soon and event.key() == self._subject.answer_key
 
-    def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
-        if new is not None and new.window() is self._window and is_text_field(old) and self.focused_field() is None:
+    def _focus_changed(self, previous: QWidget | None, now: QWidget | None) -> None:
+        came_here = now is not None and now.window() is self._window
+        if came_here and is_text_field(previous) and self.focused_field() is None:
             self.free.emit()
 
     def _state_changed(self, state: Qt.ApplicationState) -> None:

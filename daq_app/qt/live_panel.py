@@ -9,12 +9,12 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from daq_app.qt.live_pictures import ContactMap, FingerView
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, set_horizontal, vbox
+from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, set_horizontal, set_text, vbox
 from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font, px
 from daq_app.window.course_state import PICTURE, Mark, picture_end
 from daq_app.window.live_feed import LiveFeed
-from daq_app.window.live_model import MODEL_CHANNELS, ModelTrace, model_words
+from daq_app.window.live_model import MODEL_CHANNELS, ModelTrace, model_text
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.live_trace import CHANNELS, PlotScale
 from daq_app.wording import quantity, tr, tr_noop
@@ -63,10 +63,10 @@ class LiveBar(QWidget):
         self.values: dict[str, QLabel] = {}
         self._captions: dict[str, QLabel] = {}
         self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold, checkable=True)
-        name, words = tr("live model at finite strain"), tr("Finite  M")
-        self.finite = button(words, name, lambda: finite(self.finite.isChecked()), checkable=True)
-        words = tr("Live model at small strain, or at finite strain where the forces are within its reach")
-        self.finite.setToolTip(words)
+        name, text = tr("live model at finite strain"), tr("Finite  M")
+        self.finite = button(text, name, lambda: finite(self.finite.isChecked()), checkable=True)
+        text = tr("Live model at small strain, or at finite strain where the forces are within its reach")
+        self.finite.setToolTip(text)
         self.length = choice(tr("stretch of time that is shown"), (f"{seconds} s" for seconds in _LENGTHS))
         self.length.activated.connect(lambda: length(_LENGTHS[self.length.currentIndex()]))
         self.length.setFixedWidth(px(84))
@@ -89,7 +89,7 @@ class LiveBar(QWidget):
             finite = finite[np.isfinite(finite)]
             text = quantity(float(finite.mean()) if len(finite) else None, *form)
             if text != self.values[channel].text():
-                say(self.values[channel], text)
+                set_text(self.values[channel], text)
                 self.values[channel].setAccessibleName(speech(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -99,7 +99,7 @@ class LiveBar(QWidget):
     def _fit(self) -> None:
         """Put the acts below the numbers where both find no room in a row, and the numbers in smaller type then."""
         if not self._short:
-            self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
+            self._acts = sum(push.sizeHint().width() + GRID for push in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
         self.show_words()
         set_horizontal(self._rows, self._in_a_row(self.width()))
@@ -145,7 +145,7 @@ class LiveBar(QWidget):
                 caption.setStyleSheet(f"border-bottom: 3px solid {_COLOURS[channel]};")
             self.values[channel], self._captions[channel] = value, caption
         # Where there is room, a caption stands nearer to its own number than to another.
-        spread = [part for channel, value in self.values.items() for part in (1, self._captions[channel], value)]
+        spread = [widget for channel, value in self.values.items() for widget in (1, self._captions[channel], value)]
         return hbox(*spread[1:], len(PICTURE), spacing=GRID)
 
 
@@ -226,11 +226,11 @@ class LivePanel(Panel):
             plot.show_axis(seconds)
         self.bar.length.setCurrentIndex(_LENGTHS.index(seconds))
 
-    def change_length(self, by: int) -> None:
+    def change_length(self, step: int) -> None:
         """Show the next longer (+1) or shorter (-1) stretch."""
-        at = _LENGTHS.index(self._seconds) + by
-        if 0 <= at < len(_LENGTHS):
-            self.show_seconds(_LENGTHS[at])
+        index = _LENGTHS.index(self._seconds) + step
+        if 0 <= index < len(_LENGTHS):
+            self.show_seconds(_LENGTHS[index])
 
     def show_finite(self, finite: bool) -> None:
         self.bar.finite.setChecked(finite)
@@ -247,16 +247,16 @@ class LivePanel(Panel):
         now = self._hold_time if self._hold_time is not None else newest
         if now is None or newest is None:
             now, marks = 0.0, ()
-        end = picture_end(marks, now)
-        visible_marks = tuple(mark for mark in marks if mark.stop >= end - self._seconds and mark.start <= now)
+        end_time = picture_end(marks, now)
+        visible_marks = tuple(mark for mark in marks if mark.stop >= end_time - self._seconds and mark.start <= now)
         hold = tr("held") if self._hold_time is not None else ""
-        frozen = newest is not None and end < newest
+        frozen = newest is not None and end_time < newest
         latest = tr("last reading") if silent else tr("now")
-        content = (trace, now, end, self._seconds, self._columns(), visible_marks, frozen, hold, latest)
+        content = (trace, now, end_time, self._seconds, self._columns(), visible_marks, frozen, hold, latest)
         if content != self._content:
             self._content = content
-            if end == newest or trace.holds(end - self._seconds):  # else the stroke stays as it was drawn last
-                self._show_until(self.plots[:3], end, visible_marks, clock)
+            if end_time == newest or trace.holds(end_time - self._seconds):  # else the stroke stays as it was drawn
+                self._show_until(self.plots[:3], end_time, visible_marks, clock)
             self._show_until(self.plots[3:], now, visible_marks, clock)
             for plot in self._column:
                 plot.show_axis(end=hold or (tr("lift + 1 s") if frozen else latest))
@@ -266,18 +266,18 @@ class LivePanel(Panel):
                 every = max(round(TRAIL * trace.rate / _POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
                 self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1, : 0 if silent else None].T)
-        self._draw_model(end, clock, still=end != newest, silent=silent)
+        self._draw_model(end_time, clock, still=end_time != newest, silent=silent)
         if clock - self._read_at >= READ_EVERY:
             self._read_at = clock
             _, values = trace.between(now - 0.1, np.nextafter(now, np.inf))
             self.bar.show_numbers(values[:, :0] if silent else values)
 
-    def _show_until(self, plots: Sequence[LivePlot], end: float, marks: tuple[Mark, ...], clock: float) -> None:
-        """Show the readings up to `end` [s, device time]."""
-        columns = self._feed.trace.columns(end - self._seconds, np.nextafter(end, np.inf), self._columns())
+    def _show_until(self, plots: Sequence[LivePlot], end_time: float, marks: tuple[Mark, ...], clock: float) -> None:
+        """Show the readings up to `end_time` [s, device time]."""
+        columns = self._feed.trace.columns(end_time - self._seconds, np.nextafter(end_time, np.inf), self._columns())
         for plot in plots:
             if plot.isVisible():
-                plot.show_columns(columns, end, marks, clock)
+                plot.show_columns(columns, end_time, marks, clock)
 
     def model_says(self) -> None:
         """Take what the model said since the last call."""
@@ -297,11 +297,11 @@ class LivePanel(Panel):
         if not self.finger.isVisible() or self._hold_time is not None:
             return
         model = self._model
-        words = model_words(model.provisional, model.settled, model.problem, silent=silent)
+        text = model_text(model.provisional, model.settled, model.problem, silent=silent)
         provisional = None if silent else model.provisional
         answer = model.settled if model.settled is not None and model.settled.picture is not None else provisional
         picture, row = (None, np.empty(0)) if answer is None else (answer.picture, answer.row)
-        self.finger.show_model(picture, row, words, clock)
+        self.finger.show_model(picture, row, text, clock)
 
     def _show_acts(self) -> None:
         """Show the acts where there are pictures that keep their least height beneath them; their keys always serve."""
@@ -333,6 +333,6 @@ class LivePanel(Panel):
         self.bar.hold.setChecked(self._hold_time is not None)  # of nothing no picture is held
         self.bar.show_words()
 
-    def _finite(self, on: bool) -> None:
-        settings().setValue(FINITE, "yes" if on else "no")
-        self.show_finite(on)
+    def _finite(self, finite: bool) -> None:
+        settings().setValue(FINITE, "yes" if finite else "no")
+        self.show_finite(finite)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from daq_app.analyst.frame import View
 from daq_app.qt.painting import PaintedWidget, blank, draw_line, faces, fine, lines, paint_arrow, paint_failed_solve
 from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
-from daq_app.window.live_model import ModelWords, Picture
+from daq_app.window.live_model import ModelText, Picture
 from daq_app.window.live_trace import PlotScale
 from daq_app.wording import tr
 from drivers.arrays import Array
@@ -19,7 +19,7 @@ _MARGIN = 4  # [pixels]
 TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 
 _VIEW_BOX = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
-_PART = 0.62  # of the height that the finger takes; the row has the rest
+_FINGER_SHARE = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = (
     "#fcfdbf", "#fde9aa", "#fed698", "#fec186", "#feae77", "#fd9a6a", "#fb8660", "#f7715c", "#f05f5d", "#e44f64",
@@ -39,7 +39,7 @@ class ContactMap(PaintedWidget):
         self._trail: Array = np.empty((0, 2))
         self._touching = False
         self._direction = 0
-        self._words = (tr("distal"), tr("10 mm grid"), tr("proximal"))
+        self._labels = (tr("distal"), tr("10 mm grid"), tr("proximal"))
         self.setMinimumSize(100, 60)
         self.setAccessibleName(tr("centre of pressure on the sample: nothing touches"))
 
@@ -57,8 +57,8 @@ class ContactMap(PaintedWidget):
             return
         self._trail = trail
         self._touching = touching
-        where = f"x {trail[-1, 0]:.0f}, y {trail[-1, 1]:.0f} mm" if touching else tr("nothing touches")
-        self.setAccessibleName(tr("centre of pressure on the sample: {where}", where=where))
+        position_text = f"x {trail[-1, 0]:.0f}, y {trail[-1, 1]:.0f} mm" if touching else tr("nothing touches")
+        self.setAccessibleName(tr("centre of pressure on the sample: {where}", where=position_text))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -79,16 +79,16 @@ class ContactMap(PaintedWidget):
             painter.drawEllipse(QPointF(x[-1], y[-1]), 6, 6)
 
     def _per_mm(self) -> float:
-        return min((self.height() - 2 * _MARGIN) / _ALONG, (self.width() - self._words_width() - 2 * _MARGIN) / ACROSS)
+        return min((self.height() - 2 * _MARGIN) / _ALONG, (self.width() - self._labels_width() - 2 * _MARGIN) / ACROSS)
 
-    def _words_width(self) -> float:
+    def _labels_width(self) -> float:
         """Return the width of the column of words at the right of the sample."""
         metrics = QFontMetricsF(font(SMALL))
-        return max(metrics.horizontalAdvance(words) for words in self._words) + 2 * _MARGIN
+        return max(metrics.horizontalAdvance(text) for text in self._labels) + 2 * _MARGIN
 
     def _middle(self) -> QPointF:
         """Return where the middle of the face is: that of the widget, or as far left as the words need."""
-        room = self.width() - self._words_width() - _MARGIN
+        room = self.width() - self._labels_width() - _MARGIN
         return QPointF(min(self.width() / 2, room - ACROSS * self._per_mm() / 2), self.height() / 2)
 
     def draw_ground(self) -> QPixmap:
@@ -110,10 +110,10 @@ class ContactMap(PaintedWidget):
         margin_box = QRectF(
             box.right() + 2 * _MARGIN, box.top(), self.width() - box.right() - 2 * _MARGIN, box.height()
         )
-        places = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
-        if box.height() >= len(places) * painter.fontMetrics().height():
-            for place, text in zip(places, self._words, strict=True):
-                painter.drawText(margin_box, Qt.AlignmentFlag.AlignLeft | place, text)
+        alignments = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
+        if box.height() >= len(alignments) * painter.fontMetrics().height():
+            for alignment, text in zip(alignments, self._labels, strict=True):
+                painter.drawText(margin_box, Qt.AlignmentFlag.AlignLeft | alignment, text)
         painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm
@@ -136,7 +136,7 @@ class FingerView(QWidget):
         super().__init__()
         self._picture: Picture | None = None
         self._row: Array = np.empty(0)
-        self._words = ModelWords("", "none")
+        self._text = ModelText("", "none")
         self._colours = PlotScale(0.0, 5.0, 5.0)  # [kPa]
         self._heights = PlotScale(0.0, 5.0, 5.0)  # [kPa]
         self._drawn_at = -1.0  # [s]
@@ -145,36 +145,36 @@ class FingerView(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(tr("finger as the model sees it"))
 
-    def show_model(self, picture: Picture | None, row: Array, words: ModelWords, clock: float) -> None:
+    def show_model(self, picture: Picture | None, row: Array, text: ModelText, clock: float) -> None:
         """Show a state; `row` (r,) [MPa] at `solver.prediction.ROW`, `clock` [s] is for the scales' patience."""
-        if words == self._words and (clock - self._drawn_at < EVERY or _alike(picture, self._picture)):
+        if text == self._text and (clock - self._drawn_at < EVERY or _alike(picture, self._picture)):
             return
         self._drawn_at = clock
-        self._picture, self._row, self._words = picture, 1000.0 * row, words
+        self._picture, self._row, self._text = picture, 1000.0 * row, text
         if picture is not None and len(picture.sed):
             self._colours = self._colours.following(0.0, 1000.0 * float(np.quantile(picture.sed, _TOP)), clock)
         finite = self._row[np.isfinite(self._row)]
         if len(finite):
             self._heights = self._heights.following(0.0, float(finite.max()), clock)
-        self.setAccessibleName(tr("finger as the model sees it: {words}", words=words.words))
-        self.setToolTip(words.words)
+        self.setAccessibleName(tr("finger as the model sees it: {words}", words=text.text))
+        self.setToolTip(text.text)
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter, t = QPainter(self), theme_of(self)
         painter.fillRect(self.rect(), QColor(t.surface))
-        painter.setFont(font(SMALL, bold=self._words.state in ("settled", "instead", "beyond")))
-        painter.setPen(QColor(t.look if self._words.state in ("instead", "beyond", "failed") else t.quiet))
+        painter.setFont(font(SMALL, bold=self._text.state in ("settled", "instead", "beyond")))
+        painter.setPen(QColor(t.look if self._text.state in ("instead", "beyond", "failed") else t.quiet))
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height())
-        height = painter.boundingRect(box, flags, self._words.words).height()
-        painter.drawText(box, flags, self._words.words)
+        height = painter.boundingRect(box, flags, self._text.text).height()
+        painter.drawText(box, flags, self._text.text)
         # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
         line = painter.fontMetrics().height()
         top = max(height, 3.0 * line) + 4
         painter.setFont(font(SMALL))
         room = self.height() - top
-        row = room * (1.0 - _PART) if room * (1.0 - _PART) >= ROW_LINES * line else 0.0
+        row = room * (1.0 - _FINGER_SHARE) if room * (1.0 - _FINGER_SHARE) >= ROW_LINES * line else 0.0
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if room - row >= line:
             self._paint_finger(painter, QRectF(0, top, self.width(), room - row))
@@ -193,7 +193,7 @@ class FingerView(QWidget):
         picture = self._picture
         if picture is not None:
             self._paint_faces(painter, picture, view.to_screen(picture.nodes))
-            style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
+            style = Qt.PenStyle.SolidLine if self._text.state == "settled" else Qt.PenStyle.DashLine
             painter.setPen(fine(t.text, style))
             draw_line(painter, *view.to_screen(picture.outline).T)
             if picture.lost is not None:
@@ -202,12 +202,12 @@ class FingerView(QWidget):
         painter.setPen(QColor(t.quiet))
         painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, tr("0 to {high:g} kPa", high=self._colours.high))
 
-    def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
-        part = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
-        shade = (part * (len(MAGMA) - 1)).astype(np.int64)
+    def _paint_faces(self, painter: QPainter, picture: Picture, points: Array) -> None:
+        fraction = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
+        shade = (fraction * (len(MAGMA) - 1)).astype(np.int64)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.setPen(Qt.PenStyle.NoPen)
-        for number, path in faces(places[picture.faces], shade):
+        for number, path in faces(points[picture.faces], shade):
             painter.setBrush(QColor(MAGMA[number]))
             painter.drawPath(path)
         painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -219,27 +219,27 @@ class FingerView(QWidget):
         painter.setPen(QColor(t.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, tr("  SED along the skin [kPa]"))
         painter.drawText(box.adjusted(0, 0, -6, 0), TOP_RIGHT, f"{self._heights.high:g}")
-        ends = (tr("  {row:g} mm proximal", row=-ROW[0]), tr("{row:g} mm distal", row=ROW[-1]))
-        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, ends[0])
-        painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
+        side, bottom = Qt.AlignmentFlag, Qt.AlignmentFlag.AlignBottom
+        painter.drawText(box, side.AlignLeft | bottom, tr("  {row:g} mm proximal", row=-ROW[0]))
+        painter.drawText(box.adjusted(0, 0, -6, 0), side.AlignRight | bottom, tr("{row:g} mm distal", row=ROW[-1]))
         painter.setPen(QPen(QColor(t.line), 1))
         painter.drawLine(plot.bottomLeft(), plot.bottomRight())
         across = (ROW - ROW[0]) / (ROW[-1] - ROW[0])
-        here = plot.left() + plot.width() * float(-ROW[0] / (ROW[-1] - ROW[0]))
+        middle = plot.left() + plot.width() * float(-ROW[0] / (ROW[-1] - ROW[0]))
         painter.setPen(QPen(QColor(t.quiet), 1, Qt.PenStyle.DotLine))
-        painter.drawLine(QPointF(here, plot.top()), QPointF(here, plot.bottom()))
+        painter.drawLine(QPointF(middle, plot.top()), QPointF(middle, plot.bottom()))
         if len(self._row) != len(ROW):
             return
         finite = np.isfinite(self._row)
         x = plot.left() + plot.width() * across[finite]
         y = plot.bottom() - plot.height() * self._row[finite] / self._heights.high
-        style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
+        style = Qt.PenStyle.SolidLine if self._text.state == "settled" else Qt.PenStyle.DashLine
         painter.setPen(fine(MODEL, style))
         draw_line(painter, x, y)
 
 
-def _alike(one: Picture | None, other: Picture | None) -> bool:
+def _alike(picture: Picture | None, previous: Picture | None) -> bool:
     """Say whether two pictures show the same: a finger that nothing touches is said anew sixty times a second."""
-    if one is None or other is None:
-        return one is other
-    return one is other or np.array_equal(one.outline, other.outline)
+    if picture is previous or picture is None or previous is None:
+        return picture is previous
+    return np.array_equal(picture.outline, previous.outline)

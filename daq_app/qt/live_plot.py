@@ -41,11 +41,7 @@ class LivePlot(PaintedWidget):
     """A plot whose time axis stands still: 0 is now."""
 
     def __init__(
-        self,
-        name: str,
-        curves: Sequence[Curve],
-        scale: PlotScale,
-        channels: Iterable[str] = CHANNELS,
+        self, name: str, curves: Sequence[Curve], scale: PlotScale, channels: Iterable[str] = CHANNELS
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
         super().__init__()
@@ -55,30 +51,30 @@ class LivePlot(PaintedWidget):
         self._scale = scale
         self._seconds: float = 10.0
         self._times_shown: bool = True
-        self._end: str = tr("now")  # what the right edge is
+        self._end_label: str = tr("now")  # what the right edge is
         self._now = 0.0
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
-        self._words = {kind: QStaticText(tr(kind)) for kind in tr_noop(("onset", "lift"))}
+        self._mark_texts = {kind: QStaticText(tr(kind)) for kind in tr_noop(("onset", "lift"))}
         self.setMinimumSize(40, px(_LEAST))
         self.setAccessibleName(tr("plot of {name}", name=self._name))
 
     def show_axis(self, seconds: float | None = None, *, times: bool | None = None, end: str | None = None) -> None:
         """Show the last so many seconds, with their numbers or without, and say which instant is at the right edge."""
-        before = self._seconds, self._times_shown, self._end
+        previous = self._seconds, self._times_shown, self._end_label
         self._seconds = self._seconds if seconds is None else seconds
         self._times_shown = self._times_shown if times is None else times
-        self._end = self._end if end is None else end
-        if before != (self._seconds, self._times_shown, self._end):
+        self._end_label = self._end_label if end is None else end
+        if previous != (self._seconds, self._times_shown, self._end_label):
             self.redraw()
 
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
         """Draw the columns with `now` [s, device time] at the right edge; `clock` [s] is for the scale's patience."""
         self._columns, self._now, self._marks = columns, now, tuple(marks)
         values = columns.values[list(self._rows)]
-        least, greatest = (float(end.reduce(values, axis=None, initial=np.nan)) for end in (np.fmin, np.fmax))
-        before, self._scale = self._scale, self._scale.following(least, greatest, clock)
-        if (before.low, before.high) != (self._scale.low, self._scale.high):
+        least, greatest = (float(extremum.reduce(values, axis=None, initial=np.nan)) for extremum in (np.fmin, np.fmax))
+        previous, self._scale = self._scale, self._scale.following(least, greatest, clock)
+        if (previous.low, previous.high) != (self._scale.low, self._scale.high):
             self.redraw()
         self.update()
 
@@ -144,17 +140,17 @@ class LivePlot(PaintedWidget):
     def _paint_times(self, painter: QPainter, inside: QRectF) -> None:
         metrics = QFontMetricsF(painter.font())
         widest = metrics.horizontalAdvance("−00 s ")
-        end = inside.right() - metrics.horizontalAdvance(f" {self._end}")  # its words may begin so far left
+        greatest_x = inside.right() - metrics.horizontalAdvance(f" {self._end_label}")  # where that label may begin
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
             painter.setPen(fine(self.theme.line))
             painter.drawLine(QPointF(x, inside.bottom()), QPointF(x, inside.bottom() - 4))
             if not self._times_shown:
                 continue
-            text = f"{_number(value)} s" if value else self._end
+            text = f"{_number(value)} s" if value else self._end_label
             width = metrics.horizontalAdvance(text)
             left = min(max(x - width / 2.0, inside.left() - 3), self.width() - width - 1)
-            if value and left + width > end:
+            if value and left + width > greatest_x:
                 continue
             painter.setPen(QColor(self.theme.quiet))
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
@@ -172,10 +168,10 @@ class LivePlot(PaintedWidget):
         curves = [curve for curve in self._curves if curve.named]
         several = len(curves) > 1
         unit = self._name[max(self._name.find("["), 0) :] if several else self._name
-        words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in curves)
-        room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(curves), 1)
+        names_width = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in curves)
+        room = (inside.width() - 6 - names_width - metrics.horizontalAdvance(unit)) / max(len(curves), 1)
         sample = max(min(SAMPLE * type_scale(), room), 0.0)
-        width = words + len(curves) * sample if several else 0.0
+        width = names_width + len(curves) * sample if several else 0.0
         ground = QRectF(x - 3, _TOP, width + metrics.horizontalAdvance(unit) + 6, metrics.height())
         painter.fillRect(ground, sheer(self.theme.surface, 200))
         for curve in curves if several else ():
@@ -183,11 +179,11 @@ class LivePlot(PaintedWidget):
             if curve.dashed:
                 pen.setDashPattern([1.6, 1.2])
             painter.setPen(pen)
-            end, middle = x + sample, baseline - metrics.xHeight() / 2.0
-            painter.drawLine(QPointF(x, middle), QPointF(end, middle))
+            line_end, middle = x + sample, baseline - metrics.xHeight() / 2.0
+            painter.drawLine(QPointF(x, middle), QPointF(line_end, middle))
             painter.setPen(QColor(self.theme.quiet))
-            painter.drawText(QPointF(end + 4, baseline), tr(curve.channel))
-            x = end + 4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ")
+            painter.drawText(QPointF(line_end + 4, baseline), tr(curve.channel))
+            x = line_end + 4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ")
         painter.setPen(QColor(self.theme.quiet))
         painter.drawText(QPointF(x, baseline), unit)
         painter.end()
@@ -200,7 +196,7 @@ class LivePlot(PaintedWidget):
         line = painter.fontMetrics().height()
         free = inside.left()  # from where on no words stand yet
         for mark in self._marks:
-            start, stop = (inside.right() + (at - self._now) * across for at in (mark.start, mark.stop))
+            start, stop = (inside.right() + (time - self._now) * across for time in (mark.start, mark.stop))
             if mark.kind == "steady":
                 window = QRectF(start, inside.top(), stop - start, inside.height())
                 painter.fillRect(window, sheer(self.theme.act, 36))
@@ -211,12 +207,12 @@ class LivePlot(PaintedWidget):
             onset = mark.kind == "onset"
             painter.setPen(fine(self.theme.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
-            words = self._words[mark.kind]
+            text = self._mark_texts[mark.kind]
             if inside.bottom() - _TOP >= 5 * line:  # a lower plot has no room for words; the ones above it say them
-                width = words.size().width()
+                width = text.size().width()
                 left = start - width - 3 if onset else start + 3
                 if free <= left <= inside.right() - width:
-                    painter.drawStaticText(QPointF(left, _TOP + line), words)
+                    painter.drawStaticText(QPointF(left, _TOP + line), text)
                     free = left + width
 
     def _colour(self, name: str) -> str:

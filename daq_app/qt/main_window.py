@@ -106,7 +106,7 @@ class MainWindow(QMainWindow):
         else:
             self.course.show_view(course)
             self.to_do.show_what(course.headline, course.primary, course.direction)
-        self.to_do.second.setVisible(self.rooms.over)
+        self.to_do.second.setVisible(self.rooms.session_over)
         self.rooms.show_state()
         self.side.show_view(view)
 
@@ -127,7 +127,7 @@ class MainWindow(QMainWindow):
         return {
             "primary": self._primary,
             "undo": self._undo,
-            "new": lambda: self.rooms.over and self.go_to("prepare"),
+            "new": lambda: self.rooms.session_over and self.go_to("prepare"),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
             "connect": self.bench.connect_choice,
             "acknowledge": lambda: self.bridge.view.bench.can_acknowledge and self.bridge.send(AcknowledgeOverloads()),
@@ -145,8 +145,8 @@ class MainWindow(QMainWindow):
             "subject": self.side.show,
             "ruler": lambda: (self.side.show(), self.subject.check_ruler()),
             "open": self.rooms.choose,
-            "report": lambda: (at := self.rooms.analyst) and at.write_report(),
-            "export": lambda: (at := self.rooms.analyst) and at.write_export(),
+            "report": lambda: (analyst := self.rooms.analyst) and analyst.write_report(),
+            "export": lambda: (analyst := self.rooms.analyst) and analyst.write_export(),
             "keys": self.keys.toggle,
             "leave": self._leave,
             **{f"go to {room}": partial(self.go_to, room) for room in ROOMS},
@@ -179,9 +179,9 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Leave; a session that is being recorded only when asked twice, and then it can be resumed."""
-        words = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
-        if self.bridge.recording and self.notice.warning != words:
-            self.notice.warn(words)
+        warning = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
+        if self.bridge.recording and self.notice.warning != warning:
+            self.notice.warn(warning)
             event.ignore()
             return
         save_place(self)
@@ -265,7 +265,7 @@ class MainWindow(QMainWindow):
         if self.tablet is None:
             self.page.screen_fields.show_line(millimetres(self.subject.screen()), self.subject.size())
         else:
-            self.page.screen_fields.show_tablet(self.tablet.words, self.tablet.problem, self.tablet.picture())
+            self.page.screen_fields.show_tablet(self.tablet.status, self.tablet.problem, self.tablet.picture())
             self._warn_of_tablet()
         if self.bridge.view.course is None:
             self._form_changed()
@@ -275,11 +275,11 @@ class MainWindow(QMainWindow):
             self.notice.warn(tr("The subject's window was closed; F6 brings it again."))
 
     def _warn_of_tablet(self) -> None:
-        words = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
+        warning = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
         silent = self.tablet is not None and self.bridge.recording and not self.tablet.server.connected
         if silent and not self.notice.warning:
-            self.notice.warn(words)
-        elif not silent and self.notice.warning == words:
+            self.notice.warn(warning)
+        elif not silent and self.notice.warning == warning:
             self.notice.warn("")
 
     def _draw(self) -> None:
@@ -317,16 +317,16 @@ class MainWindow(QMainWindow):
         window = QWidget()
         window.setObjectName("window")
         panels = QWidget()
-        for part in (self.bench, self.strip):
-            part.hide()  # until it is known how much room there is
+        for panel in (self.bench, self.strip):
+            panel.hide()  # until it is known how much room there is
         body = fill(_Panels(panels), (self._left, 4), (self.middle, 3), self.bench, self.strip)
         body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(GRID)
-        here = QWidget()
+        page = QWidget()
         below = scroll_area(panels)
         below.setMinimumHeight(1)  # what to do now is whole, however low the window is
-        vbox(self.notice, self.to_do, (below, 1), on=here, spacing=GRID)
-        self.rooms.addWidget(here)
+        vbox(self.notice, self.to_do, (below, 1), on=page, spacing=GRID)
+        self.rooms.addWidget(page)
         room = vbox(self.header, (self.rooms, 1), spacing=GRID)
         hbox(self.rail, (room, 1), on=window, margins=(GRID, GRID // 2, GRID, GRID), spacing=GRID)
         return window

@@ -18,8 +18,8 @@ from daq_app.qt.parts import (
     label,
     label_grid,
     regrade,
-    say,
     scroll_area,
+    set_text,
     stack_pages,
     vbox,
 )
@@ -64,8 +64,8 @@ class TrialStrip(QScrollArea):
             self._add()
         for tile_button, tile in zip(self.tiles, tiles, strict=True):
             tile_button.setText(f"{TILES[tile.kind][0]} {tile.number}\n{tile.code}")
-            tile_button.setAccessibleName(tile.words)
-            tile_button.setToolTip(tile.words)
+            tile_button.setAccessibleName(tile.description)
+            tile_button.setToolTip(tile.description)
             regrade(tile_button, TILE_GRADES.get(tile.kind, ""))
         self._view = tiles
         self._keep_in_sight()
@@ -76,16 +76,16 @@ class TrialStrip(QScrollArea):
             tile_button.setChecked(tile.number == number)
 
     def _keep_in_sight(self) -> None:
-        current = next((at for at, tile in enumerate(self._view) if tile.kind == "current"), None)
+        current = next((index for index, tile in enumerate(self._view) if tile.kind == "current"), None)
         if current is not None:
             self.ensureWidgetVisible(self.tiles[current], 8 * GRID, 0)
 
     def _add(self) -> None:
-        at = len(self.tiles)
-        tile_button = button("", tr("trial"), lambda: self._inspect(self._view[at].number), "tile", checkable=True)
+        index = len(self.tiles)
+        tile_button = button("", tr("trial"), lambda: self._inspect(self._view[index].number), "tile", checkable=True)
         tile_button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.tiles.append(tile_button)
-        self._row.insertWidget(at, tile_button)
+        self._row.insertWidget(index, tile_button)
 
 
 class InspectedTrial(QWidget):
@@ -101,23 +101,22 @@ class InspectedTrial(QWidget):
         self._plots = [LivePlot(*plot, PICTURE) for plot in PLOTS]
         for plot in self._plots:
             plot.show_axis(times=plot is self._plots[-1], end=tr("end"))
-        head = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
+        header = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
         # Two means in a row find room at every size of type.
         cells = label_grid(((short_name(name), cell) for name, cell in self.cells.items()), 2)
         plots = zip(self._plots, (3, 2, 2), strict=True)
-        vbox(head, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
+        vbox(header, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
 
     def show_trial(self, trial: Inspection) -> None:
         if trial == self._trial:
             return
         self._trial = trial
-        say(self.heading, trial.heading)
-        say(self.verdict, trial.verdict)
-        regrade(self.verdict, GRADES.get(trial.grade, ""))
-        say(self.details, trial.details)
+        set_text(self.heading, trial.heading)
+        set_text(self.verdict, trial.verdict, grade=GRADES.get(trial.grade, ""))
+        set_text(self.details, trial.details)
         self.details.setVisible(bool(trial.details))
         for name, text in trial.cells:
-            say(self.cells[name], text)
+            set_text(self.cells[name], text)
             self.cells[name].setAccessibleName(speech(name, text))
         for plot in self._plots:
             plot.setVisible(trial.stroke is not None and trial.stroke.curve is not None)
@@ -161,9 +160,9 @@ class Middle(QWidget):
         self.strip.setVisible(course is not None)
         self.live.show_forces(course is None or not course.no_forces)
         stroke = StrokeView("none", tr("No stroke yet.")) if course is None else course.stroke
-        words = stroke.words if course is None else course.no_forces or stroke.words
-        self.stroke.show_text(words)
-        self.stroke.setAccessibleName(f"{tr('The last stroke:')} {words}")
+        text = stroke.text if course is None else course.no_forces or stroke.text
+        self.stroke.show_text(text)
+        self.stroke.setAccessibleName(f"{tr('The last stroke:')} {text}")
         self.stroke.setToolTip(stroke.details)
         regrade(self.stroke, GRADES.get(stroke.grade, ""))
         if course is None:

@@ -10,8 +10,8 @@ from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import (
     common_range,
     compare_reports,
-    film_words,
-    finger_words,
+    film_text,
+    finger_text,
     name_and_errors,
     other_finger,
     visible_film,
@@ -20,7 +20,7 @@ from daq_app.analyst.finger_words import (
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
 from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, Row, selected_row
-from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
+from daq_app.qt.finger_canvas import NO_MESH, FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
 from daq_app.qt.pictures import (
@@ -47,20 +47,20 @@ class ModelColumn(QWidget):
     """Four tabs: the finger, pictures of the session, another session, and the scene."""
 
     def __init__(
-        self, tokens: Tokens, ask: Callable[[m.Ask], None], compare: Callable[[], None], say: Callable[[str], None]
+        self, tokens: Tokens, ask: Callable[[m.Ask], None], compare: Callable[[], None], show: Callable[[str], None]
     ) -> None:
-        """Show nothing; `ask` orders work, `compare` chooses another session, `say` takes what came of a saved file."""
+        """Show nothing; `ask` orders work, `compare` chooses another session, `show` takes what became of a file."""
         super().__init__()
-        self._ask, self._say = ask, say
+        self._ask, self._show_message = ask, show
         self._state: AnalystState | None = None
         self._film: m.FingerHistory | None = None
         self._name = ""  # of the finger's pictures, after their kind
         self._picture_request = ("", -1)  # picture that was asked for, and version of the report
         self._history_request: tuple[m.Key, int] | None = None  # of a trial without an answer, and version
-        self._at: int | None = None  # of the film; None: the settled state
+        self._index: int | None = None  # of the film; None: the settled state
         self.finger = FingerCanvas(tokens)
-        self.other = FingerCanvas(tokens, self.finger.sight)  # of the session that is compared
-        self.other.hide()
+        self.compared_finger = FingerCanvas(tokens, self.finger.sight)  # of the session that is compared
+        self.compared_finger.hide()
         self.fields, self.plot = FieldBar(), FieldPlot(tokens)
         self.probe, self.errors = WrappedLabel("quiet", keeps_room=True), WrappedLabel("quiet")
         self.fields.changed.connect(self._paint)
@@ -68,7 +68,7 @@ class ModelColumn(QWidget):
         self.plot.draw.toggled.connect(self._draw_line)
         self.finger.sight.pointed.connect(self._probe)
         self.finger.sight.cut.connect(self._cut)
-        for canvas in (self.finger, self.other):
+        for canvas in (self.finger, self.compared_finger):
             canvas.range_chosen.connect(self.fields.fix)
         texts = {
             tr("Contact"): tr("show the contact alone, with its tractions"),
@@ -84,15 +84,16 @@ class ModelColumn(QWidget):
         self.save = SaveButtons(tr("the finger"), self._save_finger)
         self.player = TransportBar(tr("the history"), tells_time=False)
         self.player.moved.connect(self._show_step)
-        self.why = WrappedLabel("value", "look")
+        self.failure_label = WrappedLabel("value", "look")
         self.errors.show_text(tr(FIELD_ERRORS))
-        self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
-        self.which.activated.connect(self._show_picture)
+        self.picture_choice = choice(tr("picture of the session"))
+        self.picture = PictureView(tr("the picture"), self._save)
+        self.picture_choice.activated.connect(self._show_picture)
         self.session_errors = WrappedLabel("quiet")
         self.comparison = ComparedView(compare, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
-        vbox(self.which, self.session_errors, (self.picture, 1), on=session)
+        vbox(self.picture_choice, self.session_errors, (self.picture, 1), on=session)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("pictures"))
         self.tabs.addTab(self._finger_page(), tr("Finger"))
@@ -103,33 +104,33 @@ class ModelColumn(QWidget):
         vbox(self.tabs, on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        before, self._state = self._state, state
+        previous, self._state = self._state, state
         film = visible_film(state)
         if film is not self._film:
             self._film = film
-            self._at = None if film is None else len(film.film.instants) - 1
+            self._index = None if film is None else len(film.film.instants) - 1
             count = 0 if film is None else len(film.film.instants)
             self.player.set_times([number / STEPS_A_SECOND for number in range(count)], max(count - 1, 0))
         row = selected_row(state)
         prediction, stroke = (None, None) if row is None else (row.prediction, row.stroke)
         self.history.setEnabled(film is None and prediction is not None and prediction.mu is not None)
-        self.why.show_text(film_words(film))
+        self.failure_label.show_text(film_text(film))
         if film is None:
             self._ask_where(row, state.version)
         drawable = film is not None or (row is not None and row.key in state.fingers)
         self._name = f" {stroke.number}" if drawable and stroke is not None else ""
-        self.together.setVisible(state.other is not None)
+        self.together.setVisible(state.comparison is not None)
         self._paint()
         self.scene.show_lines(scene_table(state))
-        if before is None or before.version != state.version or before.report is None:
-            names = [words for _, words in session_pictures(state.report)]
-            if names != [self.which.itemText(i) for i in range(self.which.count())]:
-                self.which.clear()
-                self.which.addItems(names)
-        if (other := state.other) is not None and state.report is not None:
-            names = (name_and_errors(state.report), name_and_errors(other.report))
-            self.comparison.show_rows(compare_reports(state.report, other.report), names)
-            if before is None or before.other is not other:
+        if previous is None or previous.version != state.version or previous.report is None:
+            names = [title for _, title in session_pictures(state.report)]
+            if names != [self.picture_choice.itemText(i) for i in range(self.picture_choice.count())]:
+                self.picture_choice.clear()
+                self.picture_choice.addItems(names)
+        if (comparison := state.comparison) is not None and state.report is not None:
+            names = (name_and_errors(state.report), name_and_errors(comparison.report))
+            self.comparison.show_rows(compare_reports(state.report, comparison.report), names)
+            if previous is None or previous.comparison is not comparison:
                 self._picture_request = ("", -1)
                 self.together.setChecked(True)
                 self._paint()
@@ -138,22 +139,22 @@ class ModelColumn(QWidget):
 
     def _show_picture(self, *_: object) -> None:
         """Show the picture of the tab; what is not drawn is asked for only when it is looked at."""
-        state, tab, which = self._state, self.tabs.currentIndex(), self.which.currentIndex()
+        state, tab, index = self._state, self.tabs.currentIndex(), self.picture_choice.currentIndex()
         if state is None:
             return
-        if tab == _COMPARISON and state.other is not None:
-            view, name, words = self.comparison.picture, COMPARISON_NAME, tr("both sessions")
-        elif tab == SESSION and 0 <= which < len(names := session_pictures(state.report)):
-            view, (name, words) = self.picture, names[which]
+        if tab == _COMPARISON and state.comparison is not None:
+            view, name, caption = self.comparison.picture, COMPARISON_NAME, tr("both sessions")
+        elif tab == SESSION and 0 <= index < len(names := session_pictures(state.report)):
+            view, (name, caption) = self.picture, names[index]
             self.session_errors.show_text(picture_errors(state.report, name))
         else:
             return
         picture = state.pictures.get(name)
         if picture is not None:
-            title = picture.title or tr("There are no numbers yet for: {words}", words=words)
+            title = picture.title or tr("There are no numbers yet for: {words}", words=caption)
             view.show_picture(name, title, picture.png)
             return
-        view.show_picture("", tr("Drawing: {words}", words=words), b"")
+        view.show_picture("", tr("Drawing: {words}", words=caption), b"")
         if self._picture_request != (name, state.version):
             self._picture_request = (name, state.version)
             self._ask(m.Draw(name))
@@ -161,35 +162,35 @@ class ModelColumn(QWidget):
     def _paint(self) -> None:
         state = self._state
         row = None if state is None else selected_row(state)
-        film, at = self._film, self._at
-        if film is not None and at is not None:
-            finger, words = Finger(film.film.parts, film.film.frames[at], film.film.arcs), film_words(film, at)
+        film, index = self._film, self._index
+        if film is not None and index is not None:
+            finger, text = Finger(film.film.mesh, film.film.frames[index], film.film.arcs), film_text(film, index)
         else:
             finger = None if state is None or row is None else state.fingers.get(row.key)
-            words = finger_words(state)
-        other, other_words = other_finger(state) if self.together.isChecked() else (None, "")
-        lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
+            text = finger_text(state)
+        second, second_text = other_finger(state) if self.together.isChecked() else (None, "")
+        lost = film.film.lost if film is not None and index == len(film.film.frames) - 1 else None
         field = self.fields.field
-        present = tuple(one.frame for one in (finger, other) if one is not None)
+        present = tuple(item.frame for item in (finger, second) if item is not None)
         frames = tuple(film.film.frames) if film is not None and self._filming else present
-        own = automatic_range(field, frames)  # of a film that is written: the same for all of it
+        own_range = automatic_range(field, frames)  # of a film that is written: the same for all of it
         common = common_range(state, field)
-        ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
-        look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
-        pair = ((self.finger, finger, f"A  {words}"), (self.other, other, f"B  {other_words}"))
-        panels = pair if other_words else ((self.finger, finger, words),)
-        self.finger.sight.words = tuple(caption for _, _, caption in panels)
-        for canvas, one, caption in panels:
-            frame, parts = (None, NO_PARTS) if one is None else (one.frame, one.parts)
+        colour_range = own_range if self.fields.mode == OWN or (lost and own_range[1] > common[1]) else common
+        look = Look(field, self.fields.range(colour_range), self.near.isChecked(), self.mesh.isChecked(), lost)
+        pair = ((self.finger, finger, f"A  {text}"), (self.compared_finger, second, f"B  {second_text}"))
+        panels = pair if second_text else ((self.finger, finger, text),)
+        self.finger.sight.captions = tuple(caption for _, _, caption in panels)
+        for canvas, item, caption in panels:
+            frame, parts = (None, NO_MESH) if item is None else (item.frame, item.mesh)
             canvas.show_frame(
                 frame, parts, caption, look if canvas is self.finger else replace(look, lost=None), present
             )
-        self.other.setVisible(bool(other_words))
-        self.plot.show_field((finger, other) if other_words else (finger,), field, self.finger.sight.line)
-        kind = "contact" if self.near.isChecked() else "finger"
+        self.compared_finger.setVisible(bool(second_text))
+        self.plot.show_field((finger, second) if second_text else (finger,), field, self.finger.sight.line)
+        view_name = "contact" if self.near.isChecked() else "finger"
         self.film.setEnabled(bool(self._name) and film is not None)
-        step = "" if film is None or at is None else f" {at}"  # of the history that is shown
-        self.save.set_name(f"{kind}{self._name}{step}" if self._name else "")
+        step = "" if film is None or index is None else f" {index}"  # of the history that is shown
+        self.save.set_name(f"{view_name}{self._name}{step}" if self._name else "")
 
     def _draw_line(self) -> None:
         self.finger.sight.draws_line = self.plot.draw.isChecked()
@@ -201,13 +202,13 @@ class ModelColumn(QWidget):
             self.plot.source.setCurrentIndex(LINE)
         self._paint()
 
-    def _probe(self, place: tuple[float, float] | None) -> None:
-        canvases = [self.finger, *([self.other] if self.other.isVisible() else [])]
-        readouts = [] if place is None else [canvas.words_at(place) for canvas in canvases]
+    def _probe(self, position: tuple[float, float] | None) -> None:
+        canvases = [self.finger, *([self.compared_finger] if self.compared_finger.isVisible() else [])]
+        readouts = [] if position is None else [canvas.readout_at(position) for canvas in canvases]
         self.probe.show_text("  |  ".join(filter(None, readouts)))
 
-    def _show_step(self, at: int) -> None:
-        self._at = at
+    def _show_step(self, index: int) -> None:
+        self._index = index
         self._paint()
 
     def _ask_history(self) -> None:
@@ -228,7 +229,7 @@ class ModelColumn(QWidget):
     def _save(self, name: str, path: str) -> None:
         self._ask(m.Write(f"picture {name}", path))
 
-    def _head(self) -> str:
+    def _heading(self) -> str:
         """Return what every picture of a field is marked with: whether simulated, the session, and its errors."""
         report = None if self._state is None else self._state.report
         marks = () if report is None else (report.head, report.session)
@@ -240,12 +241,12 @@ class ModelColumn(QWidget):
             self._save(name, path)
             return
         try:
-            write_picture(self.finger, self._head(), Path(path))
+            write_picture(self.finger, self._heading(), Path(path))
         except OSError as error:
-            why = error.strerror
-            self._say(tr("{path} could not be written ({why}): choose another folder.", path=path, why=why))
+            reason = error.strerror
+            self._show_message(tr("{path} could not be written ({why}): choose another folder.", path=path, why=reason))
         else:
-            self._say(tr("Saved: {path}", path=path))
+            self._show_message(tr("Saved: {path}", path=path))
 
     def _ask_film(self) -> None:
         file_name = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
@@ -256,18 +257,18 @@ class ModelColumn(QWidget):
     def write_film(self, path: Path) -> None:
         """Write the history that is shown as a film, and say what came of it."""
         assert self._film is not None
-        before, self._filming = self._at, True
+        previous, self._filming = self._index, True
         try:
-            sentence = write_film(self.finger, self._head(), self._show_step, len(self._film.film.frames), path)
+            sentence = write_film(self.finger, self._heading(), self._show_step, len(self._film.film.frames), path)
         finally:
-            self._filming, self._at = False, before
+            self._filming, self._index = False, previous
             self._paint()
-        self._say(sentence)
+        self._show_message(sentence)
 
     def _finger_page(self) -> QWidget:
         page = QWidget()
-        fingers, play = hbox((self.finger, 1), (self.other, 1)), hbox((self.player, 1), self.film)
+        fingers, play = hbox((self.finger, 1), (self.compared_finger, 1)), hbox((self.player, 1), self.film)
         acts = hbox(self.near, self.mesh, self.together, self.history, (self.save, 1))
         plots = (fingers, 3), self.probe, (self.plot, 1)
-        vbox(self.fields, *plots, self.errors, self.why, play, acts, on=page)
+        vbox(self.fields, *plots, self.errors, self.failure_label, play, acts, on=page)
         return page

@@ -16,9 +16,9 @@ from daq_app.qt.parts import (
     fill,
     hbox,
     label,
-    say,
     scroll_area,
     set_horizontal,
+    set_text,
     tick,
     vbox,
 )
@@ -57,8 +57,8 @@ class NewSessionPage(Panel):
         self._source: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in CARD_FIELDS}
         self.subject = entry(tr("subject code, never a name"))
-        words = tr("take the proposed code")
-        self._proposal = button("", words, lambda: self.subject.setText(self._proposal.text()), "small")
+        meaning = tr("take the proposed code")
+        self._proposal = button("", meaning, lambda: self.subject.setText(self._proposal.text()), "small")
         self.protocol = choice(tr("protocol"), (*protocol_names(), tr("choose a file …")))
         self._protocol = SessionForm().protocol  # the last that is none of a file yet to be chosen
         self.protocol.setCurrentText(self._protocol)
@@ -70,14 +70,14 @@ class NewSessionPage(Panel):
         self.folder = entry(tr("folder in which sessions are kept"))
         self.folder.setText("recordings")
         self.seed = entry(tr("seed of the stimulus order; empty for a new one"), tr("a new one"))
-        words = tr("height of the face above the transducer's origin in millimetres; may be empty")
-        self.height_above = entry(words, tr("as stated"))
+        meaning = tr("height of the face above the transducer's origin in millimetres; may be empty")
+        self.height_above = entry(meaning, tr("as stated"))
         self.normal = choice(
             tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *SIGNED_AXES)
         )
-        words = tr("contact area of finger and surface in square millimetres; may be empty")
-        self.area = entry(words, tr("as stated"))
-        hands = [tr(words) for words in HAND_NAMES]
+        meaning = tr("contact area of finger and surface in square millimetres; may be empty")
+        self.area = entry(meaning, tr("as stated"))
+        hands = [tr(meaning) for meaning in HAND_NAMES]
         self.stroking, self.answering = choice(tr("stroking hand"), hands), choice(tr("answering hand"), hands)
         self.pre_evaluation = tick(tr("Pre-evaluation first"), tr("every stimulus judged once before all else"))
         self.practice = tick(tr("Practice first"), tr("practice before the trials that count"))
@@ -86,11 +86,11 @@ class NewSessionPage(Panel):
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
         self.screen_fields = ScreenFields(act, self.form)
-        words = tr("pilot this protocol with simulated hand and answers")
-        self._pilot = button(tr("Pilot  F5"), words, lambda: act("pilot"))
+        meaning = tr("pilot this protocol with simulated hand and answers")
+        self._pilot = button(tr("Pilot  F5"), meaning, lambda: act("pilot"))
         self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
-        words = tr("preview every page that the subject will see")
-        self._preview = button(tr("Preview  F7"), words, lambda: act("preview"))
+        meaning = tr("preview every page that the subject will see")
+        self._preview = button(tr("Preview  F7"), meaning, lambda: act("preview"))
         self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrol_subject)
         self.cut_short = CutShort(send)
         self._height, self._area = QWidget(), QWidget()
@@ -103,12 +103,12 @@ class NewSessionPage(Panel):
         self._place_changed()
         self._show_study()
 
-    def _either(self, *words: str) -> list[QRadioButton]:
+    def _either(self, *texts: str) -> list[QRadioButton]:
         """Return buttons of which one is pressed, the first to begin with; of all on the same card."""
-        buttons = [QRadioButton(one) for one in words]
-        for one in buttons:
-            one.setAccessibleName(one.text())
-            one.setMinimumHeight(TARGET - GRID)
+        buttons = [QRadioButton(option) for option in texts]
+        for option in buttons:
+            option.setAccessibleName(option.text())
+            option.setMinimumHeight(TARGET - GRID)
         buttons[0].setChecked(True)
         return buttons
 
@@ -151,17 +151,17 @@ class NewSessionPage(Panel):
         # A simulated bench knows where its face lies.
         self._height.setVisible(self.with_forces.isChecked() and bench.frame is None)
         self._area.setVisible(self.with_forces.isChecked())
-        words = tr("The subject strokes the transducer and scores.")
+        text = tr("The subject strokes the transducer and scores.")
         if self.simulated.isChecked():
-            words = tr(
+            text = tr(
                 "Nobody is needed: strokes and scores are simulated, and marked so. "
                 "A sample of your own has the friction that its protocol sets; without, the nearest of ten stands in."
             )
         elif bench.simulated and self.with_forces.isChecked():
-            words = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")
+            text = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")
         elif self.scores_only.isChecked():
-            words = tr("The subject strokes and scores; no forces are recorded.")
-        say(self._people_words, words)
+            text = tr("The subject strokes and scores; no forces are recorded.")
+        set_text(self._people_words, text)
         may = bench.simulated or self.scores_only.isChecked() or not bench.connected
         self.simulated.setEnabled(may)
         if not may and self.simulated.isChecked():
@@ -169,7 +169,7 @@ class NewSessionPage(Panel):
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
         """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
-        source = self.form(), bench, self.screen_fields.words
+        source = self.form(), bench, self.screen_fields.status
         if anew or source != self._source:
             self._source = source
             self._cards = checklist(*source)
@@ -193,9 +193,9 @@ class NewSessionPage(Panel):
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
-        record, before = enrolment(self.form()), optional_phases(self.form())
-        self.pre_evaluation.setVisible("pre-evaluation" in before)
-        self.practice.setVisible("practice" in before)
+        record, phases = enrolment(self.form()), optional_phases(self.form())
+        self.pre_evaluation.setVisible("pre-evaluation" in phases)
+        self.practice.setVisible("practice" in phases)
         self._enrol.setVisible(record is not None and record.may_enrol)
         self.screen_fields.offer_languages()
         self.screen_fields.show_form()
@@ -213,10 +213,10 @@ class NewSessionPage(Panel):
         self._source = None  # the study has changed, not the form
         self.changed.emit()
         if refusal:
-            self.frames["Subject"].show_card(Card("Subject", ready=False, words=refusal, field="subject"))
+            self.frames["Subject"].show_card(Card("Subject", ready=False, text=refusal, field="subject"))
 
-    def _choose_protocol(self, at: int) -> None:
-        if at == self.protocol.count() - 1:
+    def _choose_protocol(self, index: int) -> None:
+        if index == self.protocol.count() - 1:
             self.protocol.setCurrentText(self._protocol)  # until a file is chosen, and where none is
             self.add_protocol(QFileDialog.getOpenFileName(self, tr("Protocol"), "", "Protocol (*.toml)")[0])
         self._protocol = self.protocol.currentText()
@@ -239,7 +239,7 @@ class NewSessionPage(Panel):
     def _place_changed(self) -> None:
         """Offer the studies of the folder, and the code after those that were there."""
         names = ["", *studies_in(folder_of(self.form()))]
-        if names != [self.studies.itemText(at) for at in range(self.studies.count())]:
+        if names != [self.studies.itemText(index) for index in range(self.studies.count())]:
             with QSignalBlocker(self.study):  # what stands in the field stays
                 typed = self.study.text()
                 self.studies.clear()
@@ -255,7 +255,7 @@ class NewSessionPage(Panel):
         height = field(tr("Height of the face above the transducer's origin [mm]"), self.height_above)
         vbox(height, field(tr("Axis along which pressing is positive"), self.normal), on=self._height)
         vbox(field(tr("Contact area, for tau_max [mm²]"), self.area), on=self._area)
-        other = button("…", tr("choose the folder of sessions"), self._choose_folder)
+        folder_button = button("…", tr("choose the folder of sessions"), self._choose_folder)
         columns = (
             {
                 "Subject": (
@@ -280,11 +280,11 @@ class NewSessionPage(Panel):
                     self._preview,
                     self._pilot,
                 ),
-                "Disk": (field(tr("Folder"), self.folder, other),),
+                "Disk": (field(tr("Folder"), self.folder, folder_button),),
             },
         )
-        for name, parts in (columns[0] | columns[1]).items():
-            fill(self.frames[name].body, *parts)
+        for name, widgets in (columns[0] | columns[1]).items():
+            fill(self.frames[name].body, *widgets)
         left, right = (vbox(*(self.frames[name] for name in names), 1, spacing=GRID) for names in columns)
         self._columns = vbox((left, 1), (right, 1))
         inside = QWidget()

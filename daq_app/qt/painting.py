@@ -30,14 +30,14 @@ def blank(widget: QWidget, colour: str) -> QPixmap:
 
 def paint_fitted(painter: QPainter, picture: QPixmap) -> QRect:
     """Paint a picture in the middle, as large as there is room and its proportions kept; return where it is."""
-    whole, ratio = painter.window(), painter.device().devicePixelRatioF()
+    window, ratio = painter.window(), painter.device().devicePixelRatioF()
     smooth = Qt.TransformationMode.SmoothTransformation
-    pixmap = picture.scaled(whole.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
+    pixmap = picture.scaled(window.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, smooth)
     pixmap.setDevicePixelRatio(ratio)
-    place = QRect(QPoint(), pixmap.deviceIndependentSize().toSize())
-    place.moveCenter(whole.center())
-    painter.drawPixmap(place.topLeft(), pixmap)
-    return place
+    box = QRect(QPoint(), pixmap.deviceIndependentSize().toSize())
+    box.moveCenter(window.center())
+    painter.drawPixmap(box.topLeft(), pixmap)
+    return box
 
 
 def sheer(colour: str, alpha: int) -> QColor:
@@ -61,8 +61,8 @@ def draw_line(painter: QPainter, x: Array, y: Array) -> None:
     """
     pieces = lines(x, y)
     pixel = 1.0 / painter.device().devicePixelRatio()
-    for down in (0.0, pixel):
-        painter.translate(0.0, down)
+    for offset in (0.0, pixel):
+        painter.translate(0.0, offset)
         for piece in pieces:
             painter.drawPolyline(piece)
     painter.translate(0.0, -pixel)
@@ -75,7 +75,7 @@ def lines(x: Array, y: Array) -> list[QPolygonF]:
     finite = np.zeros(len(x) + 2, np.bool_)
     finite[1:-1] = np.isfinite(x) & np.isfinite(y)
     edges = np.flatnonzero(finite[1:] != finite[:-1])
-    return [_polygon(points[a:b]) for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
+    return [_polygon(points[begin:end]) for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
 
 
 def _polygon(points: Array) -> QPolygonF:
@@ -97,9 +97,9 @@ def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]
     elements["x"], elements["y"] = corners[order, :, 0], corners[order, :, 1]
     edges = np.flatnonzero(np.diff(sorted_shades, prepend=-1, append=-1)).tolist()
     for begin, end in pairwise(edges):
-        part = elements[begin:end]
+        polygons = elements[begin:end]
         path = QPainterPath()
-        stream = QDataStream(QByteArray(part.size.to_bytes(4, "big") + part.tobytes() + _TAIL))
+        stream = QDataStream(QByteArray(polygons.size.to_bytes(4, "big") + polygons.tobytes() + _TAIL))
         stream >> path  # pyright: ignore[reportUnusedExpression]  it reads into `path`
         yield int(sorted_shades[begin]), path
 
@@ -148,9 +148,9 @@ class Lamp(QWidget):
         self.setFixedSize(2 * GRID + 4, 2 * GRID + 4)
         self.show_grade("off", "off")
 
-    def show_grade(self, grade: Grade, words: str) -> None:
-        self.setAccessibleName(f"{self._name}: {words}")
-        self.setToolTip(words)
+    def show_grade(self, grade: Grade, text: str) -> None:
+        self.setAccessibleName(f"{self._name}: {text}")
+        self.setToolTip(text)
         if grade != self._grade:
             self._grade = grade
             self.update()
@@ -182,11 +182,11 @@ def paint_arrow(painter: QPainter, x: float, tail: float, tip: float, wing: QPoi
         painter.drawLine(QPointF(x, tip), QPointF(x + side, tip + back))
 
 
-def paint_failed_solve(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
+def paint_failed_solve(painter: QPainter, centre: QPointF, tokens: Tokens) -> None:
     """Mark the place of a failed solve, on any ground: a ring with a cross."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for colour, width in ((tokens.surface, 5.0), (tokens.wrong, 2.5)):
         painter.setPen(QPen(QColor(colour), width))
-        painter.drawEllipse(at, 11.0, 11.0)
-        painter.drawLine(at + QPointF(-7, -7), at + QPointF(7, 7))
-        painter.drawLine(at + QPointF(-7, 7), at + QPointF(7, -7))
+        painter.drawEllipse(centre, 11.0, 11.0)
+        painter.drawLine(centre + QPointF(-7, -7), centre + QPointF(7, 7))
+        painter.drawLine(centre + QPointF(-7, 7), centre + QPointF(7, -7))

@@ -100,7 +100,7 @@ class WrappedLabel(QLabel):
         self.setFixedHeight(height)
 
 
-def button(text: str, name: str, does: Callable[[], object], role: str = "", *, checkable: bool = False) -> QPushButton:
+def button(text: str, name: str, act: Callable[[], object], role: str = "", *, checkable: bool = False) -> QPushButton:
     """Return a button that says `name` to screen readers, and with `checkable` stays pressed until the next press."""
     push = QPushButton(text)
     push.setAccessibleName(name)
@@ -108,7 +108,7 @@ def button(text: str, name: str, does: Callable[[], object], role: str = "", *, 
         push.setProperty("role", role)
     push.setAutoDefault(False)
     push.setCheckable(checkable)
-    push.clicked.connect(lambda: does())
+    push.clicked.connect(lambda: act())
     return push
 
 
@@ -182,28 +182,28 @@ def is_text_field(widget: QWidget | None) -> bool:
 
 def fill(layout: B, *parts: Part) -> B:
     """Return a layout with further parts at its end."""
-    for part in parts:
-        one, stretch = part if isinstance(part, tuple) else (part, 0)
-        if isinstance(one, QWidget):
-            layout.addWidget(one, stretch)
-        elif isinstance(one, QLayout):
-            layout.addLayout(one, stretch)
+    for item in parts:
+        content, stretch = item if isinstance(item, tuple) else (item, 0)
+        if isinstance(content, QWidget):
+            layout.addWidget(content, stretch)
+        elif isinstance(content, QLayout):
+            layout.addLayout(content, stretch)
         else:
-            layout.addStretch(one)
+            layout.addStretch(content)
     return layout
 
 
 def hbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QHBoxLayout:
     """Return parts beside each other, as the layout of a widget or within another layout."""
-    return _set_out(QHBoxLayout(), parts, on, margins, spacing)
+    return _arrange(QHBoxLayout(), parts, on, margins, spacing)
 
 
 def vbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QVBoxLayout:
     """Return parts below each other, likewise."""
-    return _set_out(QVBoxLayout(), parts, on, margins, spacing)
+    return _arrange(QVBoxLayout(), parts, on, margins, spacing)
 
 
-def _set_out(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Margins, spacing: int | None) -> B:
+def _arrange(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Margins, spacing: int | None) -> B:
     layout.setContentsMargins(*(margins if isinstance(margins, tuple) else (margins,) * 4))
     if spacing is not None:
         layout.setSpacing(spacing)
@@ -230,10 +230,10 @@ def label_grid(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str
     grid = QGridLayout()
     grid.setHorizontalSpacing(GRID)
     grid.setVerticalSpacing(2)
-    place = Qt.AlignmentFlag.AlignTop if across == 1 else Qt.AlignmentFlag(0)  # beside what may wrap
-    for at, (name, widget) in enumerate(values):
-        row, column = at // across, 2 * (at % across)
-        grid.addWidget(label(name, role), row, column, place)
+    alignment = Qt.AlignmentFlag.AlignTop if across == 1 else Qt.AlignmentFlag(0)  # beside what may wrap
+    for index, (name, widget) in enumerate(values):
+        row, column = index // across, 2 * (index % across)
+        grid.addWidget(label(name, role), row, column, alignment)
         grid.addWidget(widget, row, column + 1)
         grid.setColumnStretch(column + 1, 1)
     return grid
@@ -250,16 +250,16 @@ def scroll_area(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea
     return area
 
 
-def regrade(widget: QWidget, value: str, of: str = "grade") -> None:
+def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
     """Give a widget another grade, or role, of the style sheet."""
-    if widget.property(of) != value:
-        widget.setProperty(of, value)
-        for one in (widget, *widget.findChildren(QWidget)):
-            one.style().unpolish(one)
-            one.style().polish(one)
+    if widget.property(property_name) != value:
+        widget.setProperty(property_name, value)
+        for child in (widget, *widget.findChildren(QWidget)):
+            child.style().unpolish(child)
+            child.style().polish(child)
 
 
-def say(widget: QLabel, text: str, name: str = "") -> None:
+def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None) -> None:
     """Show a text, only where it is another one: nothing is laid out anew for nothing.
 
     A screen reader says it after the `name` of what it tells; without a name the text alone.
@@ -268,19 +268,21 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
         widget.setText(text)
     if name:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
+    if grade is not None:
+        regrade(widget, grade)
 
 
-def field(words: str, widget: QWidget, *more: QWidget) -> QVBoxLayout:
+def field(text: str, widget: QWidget, *more: QWidget) -> QVBoxLayout:
     """Return a caption over an input field, and further widgets beside the field."""
-    caption = label(words, "quiet", wrap=True)
+    caption = label(text, "quiet", wrap=True)
     if not isinstance(widget, _Choice):  # it has a label of its own
         caption.setBuddy(widget)
     return vbox(caption, hbox((widget, 1), *more), spacing=4)
 
 
-def tick(words: str, name: str) -> QCheckBox:
+def tick(text: str, name: str) -> QCheckBox:
     """Return a box to tick that says `name` to screen readers."""
-    box = QCheckBox(words)
+    box = QCheckBox(text)
     box.setAccessibleName(name)
     box.setMinimumHeight(TARGET - GRID)
     return box
@@ -300,8 +302,8 @@ class Openness:
     Where there is none it begins closed, and opening it is not remembered. `place` is called when it has changed.
     """
 
-    def __init__(self, key: str, place: Callable[[], object]) -> None:
-        self._key, self._place = key, place
+    def __init__(self, key: str, on_change: Callable[[], object]) -> None:
+        self._key, self._on_change = key, on_change
         self._wish = settings().value(key) != "no"
         self._instead = False  # it was opened where there is no room
         self.room = True
@@ -313,7 +315,7 @@ class Openness:
     def set_room(self, room: bool) -> None:
         if room != self.room:
             self.room, self._instead = room, False
-            self._place()
+            self._on_change()
 
     def toggle(self) -> None:
         if self.room:
@@ -321,7 +323,7 @@ class Openness:
             settings().setValue(self._key, "yes" if self._wish else "no")
         else:
             self._instead = not self._instead
-        self._place()
+        self._on_change()
 
 
 class Drawer(QSplitter):
@@ -333,22 +335,22 @@ class Drawer(QSplitter):
         self.addWidget(main)
         self.addWidget(drawer)
         self.setChildrenCollapsible(False)
-        for at, share in enumerate(SHARES):
-            self.setStretchFactor(at, share)
+        for index, share in enumerate(SHARES):
+            self.setStretchFactor(index, share)
         self.setSizes(list(SHARES))
         sizes = settings().value(DRAWER_SIZES)
         if isinstance(sizes, QByteArray):
             self.restoreState(sizes)
         self.handle(1).setAccessibleName(tr("edge of the drawer"))
         self.splitterMoved.connect(lambda: settings().setValue(DRAWER_SIZES, self.saveState()))
-        self.open = Openness(DRAWER, self._place)
-        self._place()
+        self.open = Openness(DRAWER, self._show_panes)
+        self._show_panes()
 
     def least_height(self) -> int:
         """Return the height that those of its two parts need that are shown [px]."""
-        layouts = [layout for part in (self._main, self._drawer) if not part.isHidden() and (layout := part.layout())]
+        layouts = [layout for pane in (self._main, self._drawer) if not pane.isHidden() and (layout := pane.layout())]
         return max(layout.totalMinimumSize().height() for layout in layouts)
 
-    def _place(self) -> None:
+    def _show_panes(self) -> None:
         self._drawer.setVisible(bool(self.open))
         self._main.setVisible(self.open.room or not self.open)

@@ -4,6 +4,7 @@ import io
 import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,13 +18,13 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QProgressDialog, QPushB
 from daq_app.analyst.finger_words import MEAN_PANELS, ComparisonRows
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.painting import paint_fitted
-from daq_app.qt.parts import button, hbox, label, say, vbox
+from daq_app.qt.parts import button, hbox, label, set_text, vbox
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 from sessions.file_access import write_whole
 
-_KINDS = ("SVG", "PNG", "CSV")
+_FILE_FORMATS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
 COMPARISON_NAME = "compared"  # its name
 _DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
@@ -37,12 +38,12 @@ NO_MP4 = tr_noop("MP4 needs the package imageio-ffmpeg: pip install 'daq-app[fil
 class SaveButtons(QWidget):
     """Saves a picture by its name."""
 
-    def __init__(self, what: str, save: Save) -> None:
+    def __init__(self, subject: str, save: Save) -> None:
         super().__init__()
         self._name, self._save = "", save
         self.buttons = [
-            button(kind, tr("save {what} as {kind}", what=what, kind=kind), lambda kind=kind: self._ask(kind), "small")
-            for kind in _KINDS
+            button(suffix, tr("save {what} as {kind}", what=subject, kind=suffix), partial(self._ask, suffix), "small")
+            for suffix in _FILE_FORMATS
         ]
         hbox(1, *self.buttons, on=self, spacing=GRID // 2)
         self.set_name("")
@@ -52,10 +53,10 @@ class SaveButtons(QWidget):
         for widget in self.buttons:
             widget.setEnabled(bool(name))
 
-    def _ask(self, kind: str) -> None:
-        suffix = f".{kind.lower()}"
+    def _ask(self, file_format: str) -> None:
+        suffix = f".{file_format.lower()}"
         file_name = self._name.replace(" ", "-") + suffix
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save as {kind}", kind=kind), file_name)
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save as {kind}", kind=file_format), file_name)
         if path:
             self._save(self._name, path if path.lower().endswith(suffix) else path + suffix)
 
@@ -63,10 +64,10 @@ class SaveButtons(QWidget):
 class PictureView(QWidget):
     """A picture made for paper."""
 
-    def __init__(self, what: str, save: Save) -> None:
+    def __init__(self, subject: str, save: Save) -> None:
         super().__init__()
         self._canvas = _Canvas()
-        self.save = SaveButtons(what, save)
+        self.save = SaveButtons(subject, save)
         vbox((self._canvas, 1), self.save, on=self)
 
     def show_picture(self, name: str, title: str, png: bytes) -> None:
@@ -82,19 +83,19 @@ class _Canvas(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._picture, self._words = QPixmap(), ""
+        self._picture, self._text = QPixmap(), ""
         self.setMinimumSize(160, 200)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
-    def show_png(self, content: bytes, words: str) -> None:
+    def show_png(self, content: bytes, text: str) -> None:
         self._picture.loadFromData(content)
-        self._words = words
+        self._text = text
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         if self._picture.isNull():
-            painter.drawText(self.rect(), self._words)
+            painter.drawText(self.rect(), self._text)
         else:
             paint_fitted(painter, self._picture)
 
@@ -104,20 +105,20 @@ class ComparedView(QWidget):
 
     def __init__(self, choose: Callable[[], object], save: Save) -> None:
         super().__init__()
-        self.words = label("", "quiet", wrap=True)
+        self.names_label = label("", "quiet", wrap=True)
         self.choose = button(tr("Compare with…"), tr("compare with another session"), choose)
-        head = (tr("stimulus"), *(f"{tr(name)} {part}" for name in MEAN_PANELS for part in ("A", "B", "B − A")))
-        self.table = TextTable(tr("two sessions compared"), head)
+        columns = (tr("stimulus"), *(f"{tr(name)} {suffix}" for name in MEAN_PANELS for suffix in ("A", "B", "B − A")))
+        self.table = TextTable(tr("two sessions compared"), columns)
         self.table.setMinimumHeight(130)
         self.picture = PictureView(tr("the picture of both sessions"), save)
-        vbox(hbox((self.words, 1), self.choose), (self.table, 1), (self.picture, 2), on=self)
+        vbox(hbox((self.names_label, 1), self.choose), (self.table, 1), (self.picture, 2), on=self)
         self.show_rows((), ("", ""))
 
     def show_rows(self, rows: ComparisonRows, sessions: tuple[str, str]) -> None:
         """Show the stimuli of two sessions, by their names."""
         visible = bool(sessions[1])
         names = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
-        say(self.words, names if visible else tr("No second session is open."))
+        set_text(self.names_label, names if visible else tr("No second session is open."))
         self.table.setVisible(visible)
         self.picture.setVisible(visible)
         lines: list[tuple[str, ...]] = []
@@ -126,46 +127,47 @@ class ComparedView(QWidget):
             for name, (first, second) in zip(MEAN_PANELS, pairs, strict=True):
                 digits = 1 if name == "score" else 3
                 difference = None if first is None or second is None else second - first
-                values = (first, ""), (second, ""), (difference, "+")
-                cells += ["–" if one is None else f"{one:{sign}.{digits}f}".replace("-", "−") for one, sign in values]
+                means = (first, ""), (second, ""), (difference, "+")
+                cells += ["–" if mean is None else f"{mean:{sign}.{digits}f}".replace("-", "−") for mean, sign in means]
             lines.append(tuple(cells))
         self.table.show_lines(tuple(lines))
 
 
-def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
-    """Write what `canvas` shows as the suffix says: `.svg`, `.csv` or PNG. `head` stands over it. Raises OSError."""
+def write_picture(canvas: FingerCanvas, heading: str, path: Path) -> None:
+    """Write what `canvas` shows as the suffix says: `.svg`, `.csv` or PNG. `heading` stands over it. Raises OSError."""
     match path.suffix.lower():
         case ".csv":
             frame, field = canvas.frame, canvas.look.field
             rows = io.StringIO()
             if frame is not None:
-                table = np.column_stack([frame.nodes, field.of(frame)])
-                rows.writelines(f"# {line}\n" for line in (*head.split("\n"), canvas.accessibleName()) if line)
+                table = np.column_stack([frame.nodes, field.values_of(frame)])
+                rows.writelines(f"# {line}\n" for line in (*heading.split("\n"), canvas.accessibleName()) if line)
                 np.savetxt(rows, table, "%.9g", ",", header=f"x [mm],y [mm],{field.axis}", comments="")
             write_whole(path, rows.getvalue().encode())
         case ".svg":
             buffer, drawing = QBuffer(), QSvgGenerator()
             drawing.setOutputDevice(buffer)
-            drawing.setSize(canvas.size_with(head))
-            drawing.setViewBox(QRect(QPoint(), canvas.size_with(head)))
+            drawing.setSize(canvas.size_with(heading))
+            drawing.setViewBox(QRect(QPoint(), canvas.size_with(heading)))
             drawing.setTitle(canvas.accessibleName())
-            canvas.draw(QPainter(drawing), head)
+            canvas.draw(QPainter(drawing), heading)
             write_whole(path, bytes(buffer.data().data()))
         case _:
             buffer = QBuffer()
-            _image(canvas, _DENSITY, head).save(buffer, "PNG")  # pyright: ignore[reportCallIssue, reportArgumentType]
+            image = _image(canvas, _DENSITY, heading)
+            image.save(buffer, "PNG")  # pyright: ignore[reportCallIssue, reportArgumentType]
             write_whole(path, bytes(buffer.data().data()))
 
 
-def _image(canvas: FingerCanvas, density: float, head: str) -> QImage:
-    image = QImage(canvas.size_with(head) * density, QImage.Format.Format_RGB888)
+def _image(canvas: FingerCanvas, density: float, heading: str) -> QImage:
+    image = QImage(canvas.size_with(heading) * density, QImage.Format.Format_RGB888)
     image.setDevicePixelRatio(density)
-    canvas.draw(QPainter(image), head)
+    canvas.draw(QPainter(image), heading)
     return image
 
 
-def write_film(canvas: FingerCanvas, head: str, show: Callable[[int], None], count: int, path: Path) -> str:
-    """Write `count` states that `show` puts on `canvas`, with a `head` over them; return where it is, or why it is not.
+def write_film(canvas: FingerCanvas, heading: str, show: Callable[[int], None], count: int, path: Path) -> str:
+    """Write `count` states that `show` puts on `canvas`, a `heading` over them; return where it is, or why it is not.
 
     It is an MP4 where the suffix says so, and else a GIF. Meanwhile the window goes on behind a dialog that can cancel.
     """
@@ -177,17 +179,17 @@ def write_film(canvas: FingerCanvas, head: str, show: Callable[[int], None], cou
     dialog.setMinimumDuration(0)
     frames: list[Image.Image] = []
     try:
-        for at in range(count):
-            dialog.setValue(at)
+        for index in range(count):
+            dialog.setValue(index)
             QApplication.processEvents()
             if dialog.wasCanceled():
                 return tr("The film was cancelled: {path} was not written.", path=path)
-            show(at)
-            image = _image(canvas, 1.0, head)
+            show(index)
+            image = _image(canvas, 1.0, heading)
             size = (image.width(), image.height())
-            whole = Image.frombytes("RGB", size, bytes(image.constBits()), "raw", "RGB", image.bytesPerLine())
+            picture = Image.frombytes("RGB", size, bytes(image.constBits()), "raw", "RGB", image.bytesPerLine())
             gif = path.suffix.lower() != ".mp4"
-            frames.append(whole.quantize(_COLOURS, Image.Quantize.FASTOCTREE) if gif else whole)
+            frames.append(picture.quantize(_COLOURS, Image.Quantize.FASTOCTREE) if gif else picture)
         dialog.setValue(count)
         dialog.setCancelButton(None)
         with ThreadPoolExecutor(1) as pool:

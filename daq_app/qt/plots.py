@@ -59,10 +59,10 @@ def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: AN
     axis.enableAutoSIPrefix(False)
 
 
-def name_axis(axis: Any, words: str) -> None:  # noqa: ANN401  pyqtgraph has no types
+def name_axis(axis: Any, text: str) -> None:  # noqa: ANN401  pyqtgraph has no types
     """Set the label of an axis, centred: pyqtgraph centres a new label only when the axis is resized."""
-    if words != axis.labelText:
-        axis.setLabel(words)
+    if text != axis.labelText:
+        axis.setLabel(text)
         axis.resizeEvent()
 
 
@@ -84,19 +84,19 @@ class ZoomedPlot(pg.PlotWidget):
         self.reset = item.enableAutoRange
         self._pointer = pg.InfiniteLine(angle=90, pen=pg.mkPen(tokens.text, width=1))
         item.addItem(self._pointer, ignoreBounds=True)
-        self.words = label("", "tight")
-        self.words.setParent(self)
-        self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.words.setStyleSheet(f"background: {tokens.surface}; color: {tokens.text}; padding: 0 {GRID // 2}px;")
+        self.readout = label("", "tight")
+        self.readout.setParent(self)
+        self.readout.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.readout.setStyleSheet(f"background: {tokens.surface}; color: {tokens.text}; padding: 0 {GRID // 2}px;")
         self._hide_words()
         item.hideButtons()
         for side in ("left", "bottom"):
             style_axis(item.getAxis(side), tokens, font(SMALL))
 
-    def name_across(self, words: str) -> None:
+    def name_across(self, name: str) -> None:
         """Name the horizontal axis in one or two lines, under its numbers."""
         axis: Any = self.getPlotItem().getAxis("bottom")
-        name_axis(axis, words)
+        name_axis(axis, name)
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
         axis.setHeight(round(above + axis.label.boundingRect().height()))
 
@@ -132,24 +132,24 @@ class ZoomedPlot(pg.PlotWidget):
         box: Any = self.getPlotItem().getViewBox()
         scene, room = self.mapToScene(event.position().toPoint()), box.sceneBoundingRect()
         x = float(box.mapSceneToView(scene).x())
-        words = self.read(x) if self.read is not None and room.contains(scene) else ""
-        if not words:
+        text = self.read(x) if self.read is not None and room.contains(scene) else ""
+        if not text:
             self._hide_words()
             return
         self._pointer.setPos(x)
         self._pointer.show()
-        self.words.setText(words)
-        self.words.adjustSize()
-        left = room.left() if scene.x() > room.center().x() else room.right() - self.words.width()
-        self.words.move(round(left), round(room.top()))
-        self.words.show()
+        self.readout.setText(text)
+        self.readout.adjustSize()
+        left = room.left() if scene.x() > room.center().x() else room.right() - self.readout.width()
+        self.readout.move(round(left), round(room.top()))
+        self.readout.show()
 
     def leaveEvent(self, event: QEvent) -> None:
         self._hide_words()
         pg.PlotWidget.leaveEvent(self, event)
 
     def _hide_words(self) -> None:
-        self.words.hide()
+        self.readout.hide()
         self._pointer.hide()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
@@ -177,10 +177,10 @@ class FieldPlot(QWidget):
             pg.PlotDataItem(pen=pen, connect="finite", symbolSize=4, symbolPen=None, name=name)
             for name, pen in zip(_NAMES, pens, strict=True)
         ]
-        self._here = pg.InfiniteLine(pos=0.0, angle=90, pen=pg.mkPen(tokens.quiet, width=1))
+        self._zero_line = pg.InfiniteLine(pos=0.0, angle=90, pen=pg.mkPen(tokens.quiet, width=1))
         for curve in self._curves:
             self.plot.addItem(curve)
-        self.plot.addItem(self._here, ignoreBounds=True)
+        self.plot.addItem(self._zero_line, ignoreBounds=True)
         vbox(hbox((self.source, 1), self.draw, spacing=GRID // 2), (self.plot, 1), on=self, spacing=GRID // 2)
         self.source.currentIndexChanged.connect(lambda: self.changed.emit())
 
@@ -189,26 +189,28 @@ class FieldPlot(QWidget):
         source = self.source.currentIndex()
         axis = "SED [kPa]" if source == _RECEPTORS else field.axis
         self.values = [_curve(finger, source, field, line) for finger in fingers]
-        place, _ = self.values[0]
-        words = tr(_PLACES[source])
+        positions, _ = self.values[0]
+        text = tr(_PLACES[source])
         if source == LINE and line is None:
-            words = tr("Press Line and drag over the finger, or drag with Shift.")
-        for at, curve in enumerate(self._curves):
-            points = self.values[at] if at < len(self.values) else _NOTHING
+            text = tr("Press Line and drag over the finger, or drag with Shift.")
+        for index, curve in enumerate(self._curves):
+            points = self.values[index] if index < len(self.values) else _NOTHING
             curve.setData(*points, symbol="o" if source == _RECEPTORS else None, symbolBrush=MODEL)
         if (len(fingers) > 1) != self._named:
             self._named = len(fingers) > 1
             self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
-        self._here.setVisible(source != LINE)
-        self.plot.name_across(f"{axis}<br>{words}" if len(place) else words)
-        self.plot.show_numbers(visible=len(place) > 0)
-        self.plot.setAccessibleName(f"{axis}: {words}")
+        self._zero_line.setVisible(source != LINE)
+        self.plot.name_across(f"{axis}<br>{text}" if len(positions) else text)
+        self.plot.show_numbers(visible=len(positions) > 0)
+        self.plot.setAccessibleName(f"{axis}: {text}")
         self._unit = "kPa" if source == _RECEPTORS else field.unit.removesuffix("-")
 
-    def _read(self, at: float) -> str:
+    def _read(self, position: float) -> str:
         names = _NAMES if len(self.values) > 1 else ("",)
-        curves = zip(names, self.values, strict=True)
-        readouts = (read_out("mm", place, at, [(name, self._unit, values)]) for name, (place, values) in curves)
+        readouts = (
+            read_out("mm", positions, position, [(name, self._unit, values)])
+            for name, (positions, values) in zip(names, self.values, strict=True)
+        )
         return "   ".join(filter(None, readouts))
 
 
@@ -219,8 +221,8 @@ def _curve(finger: Finger | None, source: int, field: FieldChoice, line: Line | 
     if source == _RECEPTORS:
         return (finger.arcs, 1000.0 * finger.frame.row) if len(finger.arcs) == len(finger.frame.row) else _NOTHING
     if source == SKIN:
-        return along_skin(finger.frame, finger.parts, field)
-    return _NOTHING if line is None else along_line(finger.frame, finger.parts, field, line)
+        return along_skin(finger.frame, finger.mesh, field)
+    return _NOTHING if line is None else along_line(finger.frame, finger.mesh, field, line)
 
 
 class FieldBar(QWidget):
@@ -231,19 +233,19 @@ class FieldBar(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._automatic: Range = (0.0, 1.0)
-        self.which = choice(tr("field that is drawn"), (tr(field.label) for field in FIELD_CHOICES))
+        self.field_choice = choice(tr("field that is drawn"), (tr(field.label) for field in FIELD_CHOICES))
         self.ranges = choice(tr("range of the colours"), (tr("All trials"), tr("Own scale"), tr("Fixed")))
         self.low, self.high = _NumberField(tr("colours begin at")), _NumberField(tr("colours end at"))
-        hbox((self.which, 3), (self.ranges, 2), self.low, self.high, on=self, spacing=GRID // 2)
+        hbox((self.field_choice, 3), (self.ranges, 2), self.low, self.high, on=self, spacing=GRID // 2)
         for number in (self.low, self.high):
             number.setVisible(False)
             number.valueChanged.connect(lambda: self.changed.emit())
-        self.which.currentIndexChanged.connect(self._free)
+        self.field_choice.currentIndexChanged.connect(self._free)
         self.ranges.currentIndexChanged.connect(self._fix)
 
     @property
     def field(self) -> FieldChoice:
-        return FIELD_CHOICES[max(self.which.currentIndex(), 0)]
+        return FIELD_CHOICES[max(self.field_choice.currentIndex(), 0)]
 
     @property
     def mode(self) -> int:
@@ -253,11 +255,11 @@ class FieldBar(QWidget):
     def range(self, automatic: Range) -> Range:
         """Return where colours begin and end: as given, or as somebody fixed them, the lesser number first."""
         self._automatic = automatic
-        ends = sorted((self.low.value(), self.high.value()))
-        return (ends[0], ends[1]) if self.mode == FIXED_RANGE and ends[0] < ends[1] else automatic
+        limits = sorted((self.low.value(), self.high.value()))
+        return (limits[0], limits[1]) if self.mode == FIXED_RANGE and limits[0] < limits[1] else automatic
 
-    def fix(self, ends: Range) -> None:
-        self._automatic = ends
+    def fix(self, limits: Range) -> None:
+        self._automatic = limits
         self.ranges.setCurrentIndex(FIXED_RANGE)
         self._fix()
 
@@ -270,12 +272,12 @@ class FieldBar(QWidget):
 
     def _fix(self) -> None:
         """Begin fixed colours with those that were shown."""
-        for number, end in zip((self.low, self.high), self._automatic, strict=True):
+        for number, limit in zip((self.low, self.high), self._automatic, strict=True):
             number.setVisible(self.mode == FIXED_RANGE)
             with QSignalBlocker(number):
                 number.setSuffix(f" {self.field.unit}".removesuffix(" -"))
                 number.setSingleStep((self._automatic[1] - self._automatic[0]) / 20.0)
-                number.setValue(end)
+                number.setValue(limit)
         self.changed.emit()
 
 

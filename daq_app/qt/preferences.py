@@ -5,6 +5,7 @@ import os
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import cast
 
 from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize
 from PySide6.QtGui import QFontInfo, QGuiApplication, QScreen
@@ -28,9 +29,9 @@ USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scalin
 _GEOMETRY, _RECENT = "window/geometry", "window/recent sessions"
 
 
-def choose(what: str, value: object) -> None:
+def choose(key: str, value: object) -> None:
     """Remember what was chosen as `THEME`, `SCALE` or `LANGUAGE`; None follows the system again."""
-    settings().setValue(what, "" if value is None else str(value))
+    settings().setValue(key, "" if value is None else str(value))
 
 
 def theme() -> str:
@@ -69,15 +70,15 @@ def recent_sessions() -> tuple[Path, ...]:
         entries = json.loads(str(settings().value(_RECENT)))
     except ValueError:
         return ()
-    places = [Path(one) for one in entries if isinstance(one, str)] if isinstance(entries, list) else []  # pyright: ignore[reportUnknownVariableType]
-    return tuple(place for place in places if place.is_dir())[:RECENT]
+    texts = cast("list[object]", entries) if isinstance(entries, list) else []
+    return tuple(folder for text in texts if isinstance(text, str) and (folder := Path(text)).is_dir())[:RECENT]
 
 
 def remember_session(folder: Path) -> None:
     """Put a session first among the recent ones."""
-    whole = folder.absolute()
-    folders = [whole, *(place for place in recent_sessions() if place != whole)]
-    settings().setValue(_RECENT, json.dumps([str(place) for place in folders[:RECENT]]))
+    path = folder.absolute()
+    folders = [path, *(recent for recent in recent_sessions() if recent != path)]
+    settings().setValue(_RECENT, json.dumps([str(recent) for recent in folders[:RECENT]]))
 
 
 def save_place(window: QWidget) -> None:
@@ -111,8 +112,8 @@ def name_of(language: str) -> str:
     >>> name_of("de")
     'Deutsch (de)'
     """
-    own = "English" if language == SOURCE_LANGUAGE else QLocale(language).nativeLanguageName()
-    return f"{own[:1].upper()}{own[1:]} ({language})" if own else language
+    native_name = "English" if language == SOURCE_LANGUAGE else QLocale(language).nativeLanguageName()
+    return f"{native_name[:1].upper()}{native_name[1:]} ({language})" if native_name else language
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +124,7 @@ class Millimetres:
     checked: bool  # somebody held a ruler to it
 
     @property
-    def words(self) -> str:
+    def origin(self) -> str:
         return tr("checked with a ruler") if self.checked else tr("as the screen says, not checked with a ruler")
 
 
@@ -153,9 +154,9 @@ def _pixels_per_mm(screen: QScreen) -> float:
 
 def _key(screen: QScreen) -> str:
     """Return the name of a screen: of this very one where it has a serial number, at this scaling."""
-    parts = (screen.manufacturer(), screen.model(), screen.serialNumber(), screen.name())
-    name = "-".join(filter(None, parts)) or "screen"
-    safe = "".join(c if c.isalnum() or c == "-" else "_" for c in name)
+    names = (screen.manufacturer(), screen.model(), screen.serialNumber(), screen.name())
+    name = "-".join(filter(None, names)) or "screen"
+    safe = "".join(character if character.isalnum() or character == "-" else "_" for character in name)
     return f"millimetres/{safe}-{screen.devicePixelRatio():g}"
 
 

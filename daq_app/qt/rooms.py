@@ -72,11 +72,11 @@ class Rail(Panel):
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
         self.setFixedWidth(px(_WIDTH, most=1.4))
 
-    def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:
-        """Show which room is open, and which can be; a session may be `in_hand`, or `over`."""
+    def show_room(self, room: Room, *, in_hand: bool, session_over: bool) -> None:
+        """Show which room is open, and which can be; a session may be `in_hand`, or `session_over`."""
         for name, widget in self.buttons.items():
             widget.setChecked(name == room)
-            closed = (name == "prepare" and in_hand and not over) or (name == "run" and not in_hand)
+            closed = (name == "prepare" and in_hand and not session_over) or (name == "run" and not in_hand)
             widget.setEnabled(not closed)
             widget.setToolTip(tr(WHY_NOT[name]) if closed else "")
             widget.setAccessibleDescription(widget.toolTip())
@@ -106,7 +106,7 @@ class Menus:
         self._add(self.session, "preview", tr("Preview the subject's pages"))
         self._add(self.session, "tare", tr("Zero the bench"))
         self.session.addSeparator()
-        self.course = [self._add(self.session, name, tr(words)) for name, words in _SESSION]
+        self.course = [self._add(self.session, name, tr(text)) for name, text in _SESSION]
         view = bar.addMenu(tr("&View"))
         for room in ROOMS:
             self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
@@ -119,8 +119,8 @@ class Menus:
         menu, language = view.addMenu(tr("Language")), preferences.language()
         self.languages = self._choices(menu, preferences.LANGUAGE, codes, language)
         panels = view.addMenu(tr("Panels"))
-        for name, words in PANELS:
-            self._add(panels, name, tr(words))
+        for name, text in PANELS:
+            self._add(panels, name, tr(text))
         self._add(view, "subject", tr("Subject's window"))
         help_menu = bar.addMenu(tr("&Help"))
         self._add(help_menu, "keys", tr("Keys"))
@@ -128,28 +128,28 @@ class Menus:
         docs.setEnabled(DOCS.exists())
         help_menu.addAction(tr("About daq-app"), lambda: about_box(window).show())
 
-    def show_state(self, *, in_hand: bool, over: bool, session_open: bool) -> None:
+    def show_state(self, *, in_hand: bool, session_over: bool, session_open: bool) -> None:
         for action in self.course:
-            action.setEnabled(in_hand and not over)
+            action.setEnabled(in_hand and not session_over)
         self.pilot.setEnabled(not in_hand)
         for action in (self.report, self.export):
             action.setEnabled(session_open)
 
-    def _add(self, menu: QMenu, name: str, words: str) -> QAction:
+    def _add(self, menu: QMenu, name: str, text: str) -> QAction:
         """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
-        return menu.addAction(f"{words}\t{KEY_OF.get(name, '')}".rstrip(), lambda: self._act(name))
+        return menu.addAction(f"{text}\t{KEY_OF.get(name, '')}".rstrip(), lambda: self._act(name))
 
-    def _choices(self, menu: QMenu, what: str, values: Mapping[str, object], now: object) -> QActionGroup:
+    def _choices(self, menu: QMenu, preference: str, values: Mapping[str, object], now: object) -> QActionGroup:
         """Return an entry for each value of a preference, by its name, that remembers it and does what follows."""
 
         def choose(value: object) -> None:
-            preferences.choose(what, value)
-            self._act(what)
+            preferences.choose(preference, value)
+            self._act(preference)
 
         group = QActionGroup(menu)
         for name, value in values.items():
-            words = tr(name)
-            action = menu.addAction(words[:1].upper() + words[1:], lambda value=value: choose(value))
+            text = tr(name)
+            action = menu.addAction(text[:1].upper() + text[1:], lambda value=value: choose(value))
             action.setCheckable(True)
             action.setChecked(value == now)
             group.addAction(action)
@@ -158,20 +158,20 @@ class Menus:
     def _list_recent(self) -> None:
         self.recent.clear()
         folders = preferences.recent_sessions()
-        for place in folders:
-            self.recent.addAction(place.name, lambda place=place: self._act(f"open {place}"))
+        for folder in folders:
+            self.recent.addAction(folder.name, lambda folder=folder: self._act(f"open {folder}"))
         if not folders:
             self.recent.addAction(tr("No session was recorded or opened yet")).setEnabled(False)
 
 
 def about_box(parent: QWidget) -> QMessageBox:
     """Return a box with the versions, which goes when it is closed."""
-    box = QMessageBox(QMessageBox.Icon.NoIcon, tr("About daq-app"), about_words(), parent=parent)
+    box = QMessageBox(QMessageBox.Icon.NoIcon, tr("About daq-app"), about_text(), parent=parent)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     return box
 
 
-def about_words() -> str:
+def about_text() -> str:
     """Return the versions of the program and of what it stands on."""
     versions = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
     return "\n".join((*versions, *(f"{name} {_version(name)}" for name in _LIBRARIES)))
@@ -193,8 +193,8 @@ class ReviewRoom(QWidget):
         self._has_room = False  # for the list beside an open session
         self.recent = QListWidget()
         self.recent.setAccessibleName(tr("recent sessions"))
-        self.recent.itemActivated.connect(self._go)
-        self.recent.itemClicked.connect(self._go)
+        self.recent.itemActivated.connect(self._open_item)
+        self.recent.itemClicked.connect(self._open_item)
         self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
         self._side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
         self._side.setFixedWidth(px(LIST_WIDTH))
@@ -224,7 +224,7 @@ class ReviewRoom(QWidget):
         self._list()
         from daq_app.qt.analyst_window import AnalystWindow  # loaded when somebody looks at a session
 
-        self._place(AnalystWindow(folder, theme_of(self)))
+        self._show_analyst(AnalystWindow(folder, theme_of(self)))
 
     def leave(self) -> None:
         if self.analyst is not None:
@@ -247,12 +247,12 @@ class ReviewRoom(QWidget):
 
     def _follow_theme(self) -> None:
         """Show the session in another window: plots keep the colours that they were made with."""
-        before, tokens = self.analyst, theme_of(self)
-        if before is not None and before.tokens is not tokens:
-            self._place(before.hand_over(tokens))
-            self._remove(before)
+        previous, tokens = self.analyst, theme_of(self)
+        if previous is not None and previous.tokens is not tokens:
+            self._show_analyst(previous.hand_over(tokens))
+            self._remove(previous)
 
-    def _place(self, analyst: "AnalystWindow") -> None:
+    def _show_analyst(self, analyst: "AnalystWindow") -> None:
         self.analyst = analyst
         analyst.setWindowFlags(Qt.WindowType.Widget)
         self._none.hide()
@@ -269,13 +269,13 @@ class ReviewRoom(QWidget):
 
     def _list(self) -> None:
         self.recent.clear()
-        for place in recent_sessions():
-            item = QListWidgetItem("\n".join(place.name.rsplit("_", 2)))  # subject, protocol, time: none is cut off
-            item.setToolTip(str(place))
-            item.setData(Qt.ItemDataRole.UserRole, str(place))
+        for folder in recent_sessions():
+            item = QListWidgetItem("\n".join(folder.name.rsplit("_", 2)))  # subject, protocol, time: none is cut off
+            item.setToolTip(str(folder))
+            item.setData(Qt.ItemDataRole.UserRole, str(folder))
             self.recent.addItem(item)
 
-    def _go(self, item: QListWidgetItem) -> None:
+    def _open_item(self, item: QListWidgetItem) -> None:
         self.open(Path(item.data(Qt.ItemDataRole.UserRole)))
 
 
@@ -296,9 +296,9 @@ class Rooms(QStackedWidget):
         return "prepare" if self._bridge.view.course is None else "run"
 
     @property
-    def over(self) -> bool:
+    def session_over(self) -> bool:
         session = self._bridge.state.session
-        return session is not None and session.over
+        return session is not None and session.is_over
 
     @property
     def analyst(self) -> "AnalystWindow | None":
@@ -310,9 +310,9 @@ class Rooms(QStackedWidget):
         session = self._bridge.state.session
         if room != "review":
             self.setCurrentIndex(0)
-            if room == "prepare" and self.over:
+            if room == "prepare" and self.session_over:
                 self._bridge.send(NewSession())
-        elif session is not None and session.over:
+        elif session is not None and session.is_over:
             self.open(Path(session.folder))
         else:
             self._enter_review().enter()
@@ -333,12 +333,12 @@ class Rooms(QStackedWidget):
     def show_state(self) -> None:
         """Show in rail and menu what can be done now, and keep a session that has ended among the recent ones."""
         session = self._bridge.state.session
-        if session is not None and session.over and session.folder != self._recent_folder:
+        if session is not None and session.is_over and session.folder != self._recent_folder:
             self._recent_folder = session.folder
             remember_session(Path(session.folder))
         in_hand = self._bridge.view.course is not None
-        self._rail.show_room(self.room, in_hand=in_hand, over=self.over)
-        self._menus.show_state(in_hand=in_hand, over=self.over, session_open=self.analyst is not None)
+        self._rail.show_room(self.room, in_hand=in_hand, session_over=self.session_over)
+        self._menus.show_state(in_hand=in_hand, session_over=self.session_over, session_open=self.analyst is not None)
 
     def _enter_review(self) -> ReviewRoom:
         if self.count() == 1:

@@ -68,7 +68,7 @@ def window(arguments: list[str]) -> int:
         from daq_app.qt.tokens import preferred_tokens
 
         tokens = preferred_tokens()
-        _dress(application, tokens)
+        _apply_theme(application, tokens)
         remember_session(folder)
         window = AnalystWindow(folder, tokens)
         resize_to_hint(window)
@@ -121,19 +121,19 @@ def open_window(
     from daq_app.qt.tokens import preferred_tokens
 
     application.setQuitOnLastWindowClosed(False)
-    _dress(application, theme or preferred_tokens())
+    _apply_theme(application, theme or preferred_tokens())
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, tablet)
 
     def follow_theme() -> None:
-        _dress(application, preferred_tokens())
+        _apply_theme(application, preferred_tokens())
 
     window.theme_chosen.connect(follow_theme)
     if theme is None:
         application.styleHints().colorSchemeChanged.connect(follow_theme)
 
-    def show_error(_kind: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
+    def show_error(_type: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
         """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""
         if isinstance(error, Exception):
             bridge.report_drawing_failure(error)
@@ -190,12 +190,12 @@ def _speak(application: "QApplication") -> None:
 
     language = os.environ[VARIABLE] = preferences.language()
     application.setLayoutDirection(QLocale(language).textDirection())
-    own = QTranslator(application)
-    if own.load(f"qtbase_{language}", QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)):
-        application.installTranslator(own)
+    qt_texts = QTranslator(application)
+    if qt_texts.load(f"qtbase_{language}", QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)):
+        application.installTranslator(qt_texts)
 
 
-def _dress(application: "QApplication", tokens: "Tokens") -> None:
+def _apply_theme(application: "QApplication", tokens: "Tokens") -> None:
     from PySide6.QtGui import QIcon
 
     from daq_app.qt.tokens import palette, style_sheet, tick_palette
@@ -209,8 +209,8 @@ def _dress(application: "QApplication", tokens: "Tokens") -> None:
     if not application.styleSheet():  # at the first call
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
-    for kind in ("QCheckBox", "QRadioButton"):
-        application.setPalette(tick_palette(tokens), kind)  # pyright: ignore[reportArgumentType]  its stub asks for bytes
+    for box in ("QCheckBox", "QRadioButton"):  # the stub asks for bytes
+        application.setPalette(tick_palette(tokens), box)  # pyright: ignore[reportArgumentType]
     application.setStyleSheet(sheet)
 
 
@@ -230,7 +230,7 @@ def what_is_missing() -> str | None:
     for library, package in _LIBRARIES.items():
         if _load(library) is None:
             return f"the window needs {library}, which is not on this computer: install the system package {package}"
-    return None if _answers() else f"the display {os.environ['DISPLAY']} does not answer: {NO_SCREEN}"
+    return None if _display_answers() else f"the display {os.environ['DISPLAY']} does not answer: {NO_SCREEN}"
 
 
 def missing_library(error: ImportError) -> str:
@@ -248,7 +248,7 @@ def _load(library: str) -> ctypes.CDLL | None:
         return None
 
 
-def _answers() -> bool:
+def _display_answers() -> bool:
     """Say whether an X server answers at DISPLAY."""
     xcb = _load("libxcb.so.1")
     if xcb is None:

@@ -21,7 +21,7 @@ from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
 _NUMBERS, _READINGS = range(2)  # tabs
-BY = "analyst/by"  # where the code is remembered
+AUTHOR = "analyst/by"  # where the code is remembered
 NOBODY = "analyst"  # who decided, where nobody gave a code
 DRAGGED = "dragged by hand"
 
@@ -59,8 +59,8 @@ class StrokeColumn(QWidget):
         self._scroll.setAccessibleName(tr("numbers of the stroke and its prediction"))
         self.tabs.addTab(self._scroll, tr("Numbers"))
         self.tabs.addTab(self.readings, tr("Readings"))
-        self.friction = TextTable(tr("friction of every stroke"), [tr(words) for words in FRICTION_HEAD])
-        self.friction.row_chosen.connect(self._choose)
+        self.friction = TextTable(tr("friction of every stroke"), [tr(text) for text in FRICTION_HEAD])
+        self.friction.row_chosen.connect(lambda row: ask(m.Choose(row)))
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
         row = hbox((self.player, 1), self.save)
@@ -98,9 +98,6 @@ class StrokeColumn(QWidget):
             readings = self._excerpt.readings
             self.readings.go_to(int(readings.block.time.searchsorted(self._stroke.steady[0])))
 
-    def _choose(self, row: int) -> None:
-        self._ask(m.Choose(row))
-
     def go_to_numbers(self) -> None:
         self.tabs.setCurrentIndex(_NUMBERS)
         self._scroll.setFocus()
@@ -134,13 +131,13 @@ class StrokeColumn(QWidget):
     def _drag(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:
             self._moving = True
-            by, why = self.decisions.who(), self.decisions.reason()
-            self._ask(m.Move(self._stroke.number, edge, time, by, why))
+            author, reason = self.decisions.author(), self.decisions.reason()
+            self._ask(m.Move(self._stroke.number, edge, time, author, reason))
 
-    def _move(self, at: int) -> None:
-        self.stroke.show_moment(at)
+    def _move(self, index: int) -> None:
+        self.stroke.show_moment(index)
         if not self.player.playing:
-            self.readings.go_to(at)
+            self.readings.go_to(index)
 
 
 class DecisionsBar(QWidget):
@@ -148,36 +145,37 @@ class DecisionsBar(QWidget):
 
     def __init__(self, ask: Callable[[m.Ask], None]) -> None:
         super().__init__()
-        self.by = QLineEdit(str(settings().value(BY, "")))
-        self.by.setPlaceholderText(NOBODY)
-        self.by.setAccessibleName(tr("code of who decides; never a name"))
-        self.by.setMaximumWidth(px(110))
-        self.by.editingFinished.connect(lambda: settings().setValue(BY, self.by.text()))
-        self.why = QLineEdit()
-        self.why.setPlaceholderText(DRAGGED)
-        self.why.setMinimumWidth(QFontMetrics(font(TEXT)).horizontalAdvance(DRAGGED) + 3 * GRID)
-        self.why.setAccessibleName(tr("why an edge is moved"))
-        self.undo = button(tr("Undo"), "", lambda: ask(m.Undo(self.who())), "small")
-        self.redo = button(tr("Redo"), "", lambda: ask(m.Undo(self.who(), again=True)), "small")
+        self.author_field = QLineEdit(str(settings().value(AUTHOR, "")))
+        self.author_field.setPlaceholderText(NOBODY)
+        self.author_field.setAccessibleName(tr("code of who decides; never a name"))
+        self.author_field.setMaximumWidth(px(110))
+        self.author_field.editingFinished.connect(lambda: settings().setValue(AUTHOR, self.author_field.text()))
+        self.reason_field = QLineEdit()
+        self.reason_field.setPlaceholderText(DRAGGED)
+        self.reason_field.setMinimumWidth(QFontMetrics(font(TEXT)).horizontalAdvance(DRAGGED) + 3 * GRID)
+        self.reason_field.setAccessibleName(tr("why an edge is moved"))
+        self.undo = button(tr("Undo"), "", lambda: ask(m.Undo(self.author())), "small")
+        self.redo = button(tr("Redo"), "", lambda: ask(m.Undo(self.author(), redo=True)), "small")
         self.show_history(History())
         self.sentences_label = WrappedLabel("value", "look")
-        by, why = label(tr("by"), "quiet"), label(tr("why"), "quiet")
-        row = hbox(by, self.by, why, (self.why, 1), self.undo, self.redo, spacing=GRID // 2)
+        author = label(tr("by"), "quiet"), self.author_field
+        reason = label(tr("why"), "quiet"), (self.reason_field, 1)
+        row = hbox(*author, *reason, self.undo, self.redo, spacing=GRID // 2)
         vbox(row, self.sentences_label, on=self, spacing=GRID // 2)
 
-    def who(self) -> str:
-        return self.by.text().strip() or NOBODY
+    def author(self) -> str:
+        return self.author_field.text().strip() or NOBODY
 
     def reason(self) -> str:
-        return self.why.text().strip() or DRAGGED
+        return self.reason_field.text().strip() or DRAGGED
 
     def show_history(self, history: History) -> None:
         """Say on each button what it would do next."""
-        for widget, decisions, words in (
+        for widget, decisions, text in (
             (self.undo, history.undoable[-1:], tr_noop("undo {decision}, Ctrl+Z")),
             (self.redo, history.redoable[:1], tr_noop("redo {decision}, Ctrl+Shift+Z")),
         ):
             widget.setEnabled(bool(decisions))
             none = tr("{button}: no decision", button=widget.text())
-            widget.setAccessibleName(tr(words, decision=decisions[0]) if decisions else none)
+            widget.setAccessibleName(tr(text, decision=decisions[0]) if decisions else none)
             widget.setToolTip(widget.accessibleName())

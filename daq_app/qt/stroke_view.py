@@ -8,7 +8,7 @@ from PySide6.QtGui import QFocusEvent, QFontMetricsF, QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.frame import read_out
-from daq_app.analyst.stroke import EDGE_LEAP, EDGE_STEP, EDGES, Edge, PlacedEdge, RawReadings, edges_of, within
+from daq_app.analyst.stroke import EDGE_LEAP, EDGE_STEP, EDGES, Edge, EdgePosition, RawReadings, clamp_edge, edges_of
 from daq_app.qt.painting import sheer
 from daq_app.qt.parts import hbox, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
@@ -29,14 +29,14 @@ class EdgeHandle(QPushButton):
     def __init__(self, edge: Edge) -> None:
         super().__init__()
         self.edge: Edge = edge
-        self._placed: PlacedEdge | None = None
+        self._placed: EdgePosition | None = None
         self._time, self._origin = 0.0, 0.0
         self.setAutoDefault(False)
         self.setProperty("role", "handle")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.show_edge(None, 0.0)
 
-    def show_edge(self, placed: PlacedEdge | None, origin: float) -> None:
+    def show_edge(self, placed: EdgePosition | None, origin: float) -> None:
         """Show an edge, its time counted from `origin` [s]."""
         self._placed, self._origin = placed, origin
         self._time = 0.0 if placed is None else placed.time
@@ -82,14 +82,14 @@ class EdgeHandle(QPushButton):
             self.setText(name)
             self.setAccessibleName(tr("{name}: no stroke", name=name))
             return
-        at = f"{self._time - self._origin:.3f}"
+        time_text = f"{self._time - self._origin:.3f}"
         mark = "✎ " if placed.decision else "" if placed.present else "○ "
-        self.setText(f"{mark}{name} {at}{' ⏎' if self._away else ''}")
+        self.setText(f"{mark}{name} {time_text}{' ⏎' if self._away else ''}")
         state = placed.decision or (tr("as found") if placed.present else tr("not found; where it could be"))
-        words = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
-        self.setToolTip(words)
+        tool_tip = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
+        self.setToolTip(tool_tip)
         speech = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
-        self.setAccessibleName(f"{speech} {at} s, {state}{tr(', Enter records') if self._away else ''}")
+        self.setAccessibleName(f"{speech} {time_text} s, {state}{tr(', Enter records') if self._away else ''}")
 
 
 class StrokeView(QWidget):
@@ -143,7 +143,7 @@ class StrokeView(QWidget):
 
     def show_stroke(self, stroke: StrokeFinding | None) -> None:
         trace = None if stroke is None else stroke.trace
-        other = self._stroke is None or stroke is None or stroke.number != self._stroke.number
+        is_another = self._stroke is None or stroke is None or stroke.number != self._stroke.number
         self._stroke = stroke
         self._origin = 0.0 if trace is None else trace.origin
         word = tr("no stroke") if stroke is None else tr("stroke {number}", number=stroke.number)
@@ -154,10 +154,10 @@ class StrokeView(QWidget):
             plot.show_numbers(visible=len(self._time) > 0)
         self._plots[1].setLabel("bottom", tr("time since contact [s]") if len(self._time) else word)
         self.show_edges()
-        if other:
+        if is_another:
             self._raw = None
         self.show_moment(None)
-        if other:
+        if is_another:
             self.show_all()
 
     def show_all(self) -> None:
@@ -185,8 +185,8 @@ class StrokeView(QWidget):
         for edge, number in rows.items():
             self._lines[edge][0].label.setPosition(1.0 - (number + 0.5) * row)
         if np.allclose(self._forces.viewRange()[1], self._range):
-            head = min((max(rows.values()) + 1) * row, 0.6)
-            self._range = low, low + (high - low) / (1.0 - head)
+            share = min((max(rows.values()) + 1) * row, 0.6)
+            self._range = low, low + (high - low) / (1.0 - share)
             self._plots[0].setYRange(*self._range, padding=0.0)
 
     def _read(self, time: float) -> str:
@@ -199,14 +199,14 @@ class StrokeView(QWidget):
         self._raw = readings
         self.show_moment(None)
 
-    def show_moment(self, at: int | None) -> None:
+    def show_moment(self, index: int | None) -> None:
         """Show the readings up to one of them, as if they came now; None shows the stroke as a whole."""
         raw = self._raw
-        now = None if at is None or raw is None else float(raw.block.time[at]) - self._origin
+        now = None if index is None or raw is None else float(raw.block.time[index]) - self._origin
         until = len(self._time) if now is None else int(np.searchsorted(self._time, now, side="right"))
         for curve, column in zip(self._curves, self._columns, strict=True):
             curve.setData(self._time[:until], column[:until])
-        stop = 0 if raw is None else len(raw.block) if at is None else at + 1
+        stop = 0 if raw is None else len(raw.block) if index is None else index + 1
         for curve, name in zip(self._raw_curves, ("normal", "tangential"), strict=True):
             data = () if raw is None else (raw.block.time[:stop] - self._origin, getattr(raw, name)[:stop])
             curve.setData(*(data or ([], [])))
@@ -216,34 +216,34 @@ class StrokeView(QWidget):
                 line.setPos(now)
 
     def show_edges(self) -> None:
-        by_edge = {} if self._stroke is None else {one.edge: one for one in edges_of(self._stroke)}
+        by_edge = {} if self._stroke is None else {placement.edge: placement for placement in edges_of(self._stroke)}
         for edge in EDGES:
-            one = by_edge.get(edge)
-            self.handles[edge].show_edge(one, self._origin)
+            placement = by_edge.get(edge)
+            self.handles[edge].show_edge(placement, self._origin)
             for line in self._lines[edge]:
-                line.setVisible(one is not None)
-                if one is not None:
-                    style = Qt.PenStyle.DashDotLine if one.decision else Qt.PenStyle.SolidLine
-                    style = style if one.present else Qt.PenStyle.DotLine
-                    line.setPen(pg.mkPen(self._tokens.act, width=3 if one.decision else 1.5, style=style))
-                    line.setPos(one.time - self._origin)
+                line.setVisible(placement is not None)
+                if placement is not None:
+                    style = Qt.PenStyle.DashDotLine if placement.decision else Qt.PenStyle.SolidLine
+                    style = style if placement.present else Qt.PenStyle.DotLine
+                    line.setPen(pg.mkPen(self._tokens.act, width=3 if placement.decision else 1.5, style=style))
+                    line.setPos(placement.time - self._origin)
             label: Any = self._lines[edge][0].label
-            label.setFormat(f"✎ {tr(edge)}" if one is not None and one.decision else tr(edge))
+            label.setFormat(f"✎ {tr(edge)}" if placement is not None and placement.decision else tr(edge))
         self._fill()
 
     def _fill(self) -> None:
         visible = self._stroke is not None and self._stroke.steady is not None
-        ends = [float(self._lines[edge][0].value()) for edge in ("steady begin", "steady end")]
+        limits = [float(self._lines[edge][0].value()) for edge in ("steady begin", "steady end")]
         for window in self._windows:
             window.setVisible(visible)
-            window.setRegion(ends)
+            window.setRegion(limits)
         self._make_room()
 
     def _try(self, edge: Edge, time: float) -> None:
         """Show an edge where it is being moved to, as far as it may be."""
         if self._stroke is None:
             return
-        inside = within(self._stroke, edge, time)
+        inside = clamp_edge(self._stroke, edge, time)
         for line in self._lines[edge]:
             line.setPos(inside - self._origin)
         self.handles[edge].show_at(inside)

@@ -65,9 +65,9 @@ class SubjectPicture(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         if not self._picture.isNull():
             painter = QPainter(self)
-            place = paint_fitted(painter, self._picture)
+            box = paint_fitted(painter, self._picture)
             painter.setPen(self.palette().mid().color())
-            painter.drawRect(place.adjusted(0, 0, -1, -1))
+            painter.drawRect(box.adjusted(0, 0, -1, -1))
 
 
 class Thumbnail(SubjectPicture):
@@ -98,19 +98,19 @@ class Mirror(QWidget):
         super().__init__()
         self._view: SubjectView | None = None
         self._size = QSize(1000, 640)
-        self.open = Openness(MIRROR, self._place)
+        self.open = Openness(MIRROR, self._show_openness)
         self.picture: SubjectPicture | None = None  # made when it is first seen
         self.tab = button("", tr("the subject's page"), self.open.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         vbox(self.tab, on=self, spacing=4)
-        self._place()
+        self._show_openness()
 
     def show_view(self, view: SubjectView | None, size: QSize) -> None:
         """Show a page as it looks in the subject's window of a size; None before a session."""
         self._view, self._size = view, QSize(size)
         self._show_page()
 
-    def _place(self) -> None:
+    def _show_openness(self) -> None:
         self.tab.setText(tr("The subject sees  V  {word}", word="▾" if self.open else "▸"))
         self.tab.setAccessibleName(tr("{word} the subject's page", word=tr("fold") if self.open else tr("show")))
         if self.picture is not None:
@@ -156,37 +156,37 @@ class SubjectPreview(QDialog):
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.lost = WrappedLabel("value", "look")
-        self.back = button(tr("◂ Back"), tr("the page before"), lambda: self._turn(-1))
-        self.on = button(tr("Forward ▸"), tr("the next page"), lambda: self._turn(1))
+        self.back = button(tr("◂ Back"), tr("the page before"), lambda: self.list.turn(-1))
+        self.forward = button(tr("Forward ▸"), tr("the next page"), lambda: self.list.turn(1))
         self._count = label("", "quiet")
         close = button(tr("Close  Esc"), tr("close the preview"), self.close)
-        page = vbox((self.picture, 1), self.lost, hbox(self.back, self.on, self._count, 1, close), spacing=GRID)
+        page = vbox((self.picture, 1), self.lost, hbox(self.back, self.forward, self._count, 1, close), spacing=GRID)
         hbox(self.list, (page, 1), on=self, margins=2 * GRID, spacing=2 * GRID)
         self.resize(px(1000, most=1.25), px(560, most=1.25))
         self.list.currentRowChanged.connect(self._show)
         self.list.setCurrentRow(0)
         self.list.setFocus()
 
-    def _turn(self, by: int) -> None:
-        self.list.setCurrentRow(min(max(self.list.currentRow() + by, 0), len(self._pages) - 1))
-
     def _show(self, row: int) -> None:
         view = self._pages[row].view
         self.picture.show_page(view, self._size)
-        own = map(translator(view.language), (SubjectText.NEXT, SubjectText.FIRST, SubjectText.SECOND))
-        lost = missing_glyphs([view.title, view.text, *view.ends, *(own if view.asks else ())], self.font())
+        button_texts = map(translator(view.language), (SubjectText.NEXT, SubjectText.FIRST, SubjectText.SECOND))
+        lost = missing_glyphs([view.title, view.text, *view.ends, *(button_texts if view.asks else ())], self.font())
         self.lost.show_text(tr("▲ No font here draws {lost}: install one that does.", lost=lost) if lost else "")
         self.back.setEnabled(row > 0)
-        self.on.setEnabled(row < len(self._pages) - 1)
+        self.forward.setEnabled(row < len(self._pages) - 1)
         self._count.setText(tr("{row} of {len}", row=row + 1, len=len(self._pages)))
 
 
 class _Pages(QListWidget):
     """A list in which the keys that turn pages turn them too."""
 
+    def turn(self, step: int) -> None:
+        self.setCurrentRow(min(max(self.currentRow() + step, 0), self.count() - 1))
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = _STEPS.get(Qt.Key(event.key()))
         if step is None:
             super().keyPressEvent(event)
         else:
-            self.setCurrentRow(min(max(self.currentRow() + step, 0), self.count() - 1))
+            self.turn(step)

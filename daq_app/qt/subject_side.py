@@ -42,7 +42,7 @@ class TabletScreen(QObject):
         super().__init__()
         self.session_offset = 0.0  # session clock minus this machine's monotonic one [s]
         self._pixels: float | None = None  # in a millimetre, measured with a ruler
-        self._part = 0.0
+        self._fraction = 0.0
         self._last_sent = 0.0  # when the bar got its last value [s]
         self._incoming.connect(self._take, Qt.ConnectionType.QueuedConnection)
         self._moved.connect(self.changed, Qt.ConnectionType.QueuedConnection)
@@ -50,7 +50,7 @@ class TabletScreen(QObject):
         self._dialogue = Dialogue(self.server.send)
 
     @property
-    def words(self) -> str:
+    def status(self) -> str:
         """Return what is worth knowing of the tablet, for the experimenter."""
         if not self.server.connected:
             return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
@@ -71,17 +71,17 @@ class TabletScreen(QObject):
     @property
     def problem(self) -> str:
         """Return why no session can begin; empty where one can."""
-        return "" if self.server.connected else self.words
+        return "" if self.server.connected else self.status
 
     def show_view(self, view: SubjectView, session: SessionState | None) -> None:
         mirrored = QLocale(view.language).textDirection() == Qt.LayoutDirection.RightToLeft
         self._dialogue.show(view, session, translator(view.language), mirrored=mirrored)
 
     def show_force(self, trace: LiveTrace) -> None:
-        part, now = min(max(newest_force(trace) / FULL, 0.0), 1.0), time.monotonic()
-        if now - self._last_sent >= FORCE_EVERY and round(part * _STEPS) != round(self._part * _STEPS):
-            self._part, self._last_sent = part, now
-            self.server.send(Force(part))
+        fraction, now = min(max(newest_force(trace) / FULL, 0.0), 1.0), time.monotonic()
+        if now - self._last_sent >= FORCE_EVERY and round(fraction * _STEPS) != round(self._fraction * _STEPS):
+            self._fraction, self._last_sent = fraction, now
+            self.server.send(Force(fraction))
 
     def line_settings(self) -> tuple[Setting, ...]:
         """Return what a session keeps of the line that is answered on."""
@@ -98,9 +98,9 @@ class TabletScreen(QObject):
                 if event is not None:
                     self.answered.emit(event)
 
-    def _session_time(self, sent: float, arrival: float, at: float) -> float:
+    def _session_time(self, sent: float, arrival: float, tablet_time: float) -> float:
         """Return the session's clock [s] at an instant of the tablet's [ms]: so long before the answer arrived."""
-        return arrival + self.session_offset - max(sent - at, 0.0) * 1e-3
+        return arrival + self.session_offset - max(sent - tablet_time, 0.0) * 1e-3
 
 
 class SubjectSide(QObject):
@@ -134,7 +134,7 @@ class SubjectSide(QObject):
         """Show the subject's window, and let the keyboard go to it from whatever is being typed."""
         if self.keyboard.focused_field() is not None:
             self._window.setFocus()
-        self._place(activating=True)
+        self._show_subject(activating=True)
         self.show_view(self._bridge.view)  # which a window that is hidden need not have
         self._subject.raise_()
         self._subject.activateWindow()
@@ -142,7 +142,7 @@ class SubjectSide(QObject):
     def begin(self) -> None:
         """Show the page on a second screen from the first step on; the keyboard stays where it is."""
         if self._tablet is None and self._with_people():
-            self._place(activating=False)
+            self._show_subject(activating=False)
 
     def show_view(self, view: View) -> None:
         """Show what the subject sees now, small in the mirror too; bring the page for an answer that is due."""
@@ -179,10 +179,10 @@ class SubjectSide(QObject):
             self._window.raise_()
         self._window.activateWindow()
 
-    def _place(self, *, activating: bool) -> None:
+    def _show_subject(self, *, activating: bool) -> None:
         """Show the subject's window: on a second screen where there is one."""
-        subject, here = self._subject, self._window.screen()
-        elsewhere = [screen for screen in QGuiApplication.screens() if screen is not here]
+        subject, own_screen = self._subject, self._window.screen()
+        elsewhere = [screen for screen in QGuiApplication.screens() if screen is not own_screen]
         subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)
         if elsewhere and not subject.isVisible():
             subject.setGeometry(elsewhere[0].availableGeometry())
@@ -200,7 +200,7 @@ class SubjectSide(QObject):
         if active and self.keyboard.focused_field() is None:
             self.show()
         else:
-            self._place(activating=False)
+            self._show_subject(activating=False)
 
     def _with_people(self) -> bool:
         session = self._bridge.state.session

@@ -7,7 +7,7 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEv
 from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
-from daq_app.qt.parts import button, hbox, label, say, stack_pages, vbox
+from daq_app.qt.parts import button, hbox, label, set_text, stack_pages, vbox
 from daq_app.qt.preferences import LEAST, MOST, millimetres, store_ruler_length
 from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator
@@ -49,7 +49,7 @@ class SubjectWindow(QWidget):
         self._scale = _Scale(self.line)
         self.number = NumberField(now)
         self.choice = ChoiceOfTwo(now)
-        self._ways = stack_pages(self._scale, self.number, self.choice)
+        self._answer_fields = stack_pages(self._scale, self.number, self.choice)
         self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
         self.next.setMinimumSize(px(180), px(64))
         self.ruler = RulerCheck()
@@ -57,8 +57,8 @@ class SubjectWindow(QWidget):
         self.ruler.finished.connect(self._end_ruler_check)
         self._pages = stack_pages(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
-        for way in (self.line, self.number, self.choice):
-            way.changed.connect(self._answer_changed)
+        for answer_field in (self.line, self.number, self.choice):
+            answer_field.changed.connect(self._answer_changed)
         self.setMinimumSize(px(560, most=1.25), 340)
         self.resize(1000, 640)
         self.fit_screen()
@@ -77,28 +77,29 @@ class SubjectWindow(QWidget):
         return self._pages.currentWidget() is self.ruler
 
     @property
-    def _way(self) -> ScoreLine | NumberField | ChoiceOfTwo:
+    def _answer_field(self) -> ScoreLine | NumberField | ChoiceOfTwo:
         return self.number if self.asks == "number" else self.choice if self.asks == "choice" else self.line
 
     def show_view(self, view: SubjectView, hand: Hand | None) -> None:
         """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
         if view == self._answered:
             return
-        before, self._view, self._stated_hand, self._answered = self._view, view, hand, None
-        if before == view:
+        previous, self._view, self._stated_hand, self._answered = self._view, view, hand, None
+        if previous == view:
             return
         if view.language != self._language:
             self._speak(view.language)
-        self._place_next(view.hand)
+        directions = QBoxLayout.Direction
+        self._next_row.setDirection(directions.LeftToRight if view.hand == "right" else directions.RightToLeft)
         self.press.setVisible(view.force)
         if view.asks:
-            if before is None or _question_of(before) != _question_of(view):
+            if previous is None or _question_of(previous) != _question_of(view):
                 self._begin(view)
-            say(self._question, view.title)
+            set_text(self._question, view.title)
             self._answer_changed()
         else:
-            say(self._title, view.title)
-            say(self._text, view.text)
+            set_text(self._title, view.title)
+            set_text(self._text, view.text)
         if not self.measuring:
             self._turn()
         self._fit_type()
@@ -106,12 +107,12 @@ class SubjectWindow(QWidget):
     def _fit_type(self) -> None:
         """Make the letters as large as they should be, or as small as lets all of the page be read."""
         layout = self._answer_layout if self.scoring else self._message_layout
-        for part in SHRINKING:
+        for factor in SHRINKING:
             for widget in (self._title, self._question):
-                _set_type(widget, LARGER * part, bold=True)
+                _set_type(widget, LARGER * factor, bold=True)
             for widget in (self._text, self._hint):
-                _set_type(widget, _LARGE * part)
-            self._scale.set_type(_LARGE * part)
+                _set_type(widget, _LARGE * factor)
+            self._scale.set_type(_LARGE * factor)
             layout.invalidate()
             layout.activate()  # a page that is not shown has not yet heard of its new texts
             if layout.totalHeightForWidth(self.width()) <= self.height():
@@ -123,25 +124,25 @@ class SubjectWindow(QWidget):
 
     def _speak(self, language: str) -> None:
         self._language = language
-        words = translator(language)
+        translate = translator(language)
         self.setLayoutDirection(QLocale(language).textDirection())
-        self.next.setText(words(Text.NEXT))
-        self.next.setAccessibleName(words(Text.NEXT))
-        self.line.speak(words)
-        self.number.field.setAccessibleName(words(Text.OWN_NUMBER))
+        self.next.setText(translate(Text.NEXT))
+        self.next.setAccessibleName(translate(Text.NEXT))
+        self.line.speak(translate)
+        self.number.field.setAccessibleName(translate(Text.OWN_NUMBER))
         self.number.point = QLocale(language).decimalPoint()
-        self.choice.setAccessibleName(words(Text.OF_TWO))
-        self.press.setAccessibleName(words(Text.PRESSING))
-        self.choice.set_words(words(Text.FIRST), words(Text.SECOND))
+        self.choice.setAccessibleName(translate(Text.OF_TWO))
+        self.press.setAccessibleName(translate(Text.PRESSING))
+        self.choice.set_texts(translate(Text.FIRST), translate(Text.SECOND))
 
     def _begin(self, view: SubjectView) -> None:
-        way = self._way
-        if isinstance(way, ScoreLine):
-            way.begin(view.ends, view.ticks)
-            self._scale.show_ends(view.ends)
+        answer_field = self._answer_field
+        if isinstance(answer_field, ScoreLine):
+            answer_field.begin(view.ends, view.ticks)
+            self._scale.show_texts(view.ends)
         else:
-            way.begin()
-        self._ways.setCurrentWidget(self._scale if way is self.line else way)
+            answer_field.begin()
+        self._answer_fields.setCurrentWidget(self._scale if answer_field is self.line else answer_field)
 
     def check_ruler(self) -> None:
         """Show the page on which the line is held against a ruler."""
@@ -169,7 +170,7 @@ class SubjectWindow(QWidget):
         if event.key() in GIVING:
             self._give(event.key())
         else:
-            QApplication.sendEvent(self._way.focusProxy() or self._way, event)
+            QApplication.sendEvent(self._answer_field.focusProxy() or self._answer_field, event)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the window to screens of another size from now on."""
@@ -208,49 +209,45 @@ class SubjectWindow(QWidget):
 
     def _scale_page(self) -> QWidget:
         page = QWidget()
-        for words in (self._question, self._hint):
-            words.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        place = QWidget()  # keeps the button's place while there is none
-        self._next_row = hbox(1, self.next, on=place, margins=(4 * GRID, 0, 4 * GRID, 0))
-        place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
-        place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
-        place.setMaximumWidth(_WIDEST)
-        row, margins = hbox(1, (place, 1000), 1), (2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
-        self._answer_layout = vbox(self._question, 2, self._hint, self._ways, 2, row, on=page, margins=margins)
+        for text_label in (self._question, self._hint):
+            text_label.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        button_place = QWidget()  # keeps the button's place while there is none
+        self._next_row = hbox(1, self.next, on=button_place, margins=(4 * GRID, 0, 4 * GRID, 0))
+        button_place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand in every script
+        button_place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
+        button_place.setMaximumWidth(_WIDEST)
+        row, margins = hbox(1, (button_place, 1000), 1), (2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
+        self._answer_layout = vbox(self._question, 2, self._hint, self._answer_fields, 2, row, on=page, margins=margins)
         return page
-
-    def _place_next(self, hand: Hand) -> None:
-        ways = QBoxLayout.Direction
-        self._next_row.setDirection(ways.LeftToRight if hand == "right" else ways.RightToLeft)
 
     def _turn(self) -> None:
         self._pages.setCurrentIndex(1 if self.scoring else 0)
         if self.scoring:
-            self._way.setFocus()
+            self._answer_field.setFocus()
 
     def _end_ruler_check(self) -> None:
         self._screen_changed()
         self._turn()
 
     def _answer_changed(self) -> None:
-        self.next.setVisible(self._way.answered)
+        self.next.setVisible(self._answer_field.answered)
         hint, meanings = "" if self._view is None else self._view.text, self.number.two_meanings
         if self.asks == "number" and meanings is not None:
-            words = translator(self._language)(Text.TWO_MEANINGS)
-            hint = words.format(whole=meanings[0], fraction=meanings[1])
+            template = translator(self._language)(Text.TWO_MEANINGS)
+            hint = template.format(whole=meanings[0], fraction=meanings[1])
         if self._hint.text() != hint:
-            say(self._hint, hint)
+            set_text(self._hint, hint)
             self._fit_type()
 
     def _give(self, key: int | None = None) -> None:
-        if not self.scoring or not self._way.answered:
+        if not self.scoring or not self._answer_field.answered:
             return
         self.answer_key = key
-        answer_event = self._way.answer_event(self._stated_hand)
+        answer_event = self._answer_field.answer_event(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
         self._view, self._answered = None, self._view
-        say(self._title, translator(self._language)(Text.THANKS))
-        say(self._text, "")
+        set_text(self._title, translator(self._language)(Text.THANKS))
+        set_text(self._text, "")
         self._fit_type()
         self._pages.setCurrentIndex(0)
         self.answered.emit(answer_event)
@@ -263,32 +260,32 @@ class _Scale(QWidget):
         super().__init__()
         self._line = line
         line.setParent(self)
-        self._ends = [label(wrap=True) for _ in range(2)]
-        for end in self._ends:
-            end.setParent(self)
-            end.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-            end.setMargin(GRID)  # keeps the words apart; Arabic letters reach beyond the height of the label's own font
+        self._labels = [label(wrap=True) for _ in range(2)]
+        for text_label in self._labels:
+            text_label.setParent(self)
+            text_label.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+            text_label.setMargin(GRID)  # keeps texts apart; Arabic letters reach beyond the height of the label's font
 
-    def show_ends(self, ends: tuple[str, str]) -> None:
-        for widget, words in zip(self._ends, ends, strict=True):
-            say(widget, words)
+    def show_texts(self, texts: tuple[str, str]) -> None:
+        for widget, text in zip(self._labels, texts, strict=True):
+            set_text(widget, text)
         self.fit()
 
     def set_type(self, size: float) -> None:
-        for end in self._ends:
-            _set_type(end, size)
+        for text_label in self._labels:
+            _set_type(text_label, size)
         self.fit()
 
     def fit(self) -> None:
         """Place the words: beside each other without touching, as wide as there is room."""
         line = self._line
         line.move((self.width() - line.width()) // 2, 0)
-        ends = [line.x() + line.place_of(position).x() for position in (0.0, 100.0)]
-        width = int(min(abs(ends[1] - ends[0]), 2 * min(ends)))
+        positions = [line.x() + line.point_at(position).x() for position in (0.0, 100.0)]
+        width = int(min(abs(positions[1] - positions[0]), 2 * min(positions)))
         tallest = 0
-        for widget, at in zip(self._ends, ends, strict=True):
+        for widget, x in zip(self._labels, positions, strict=True):
             tallest = max(tallest, widget.heightForWidth(width))
-            widget.setGeometry(int(at - width / 2), line.height(), width, widget.heightForWidth(width))
+            widget.setGeometry(int(x - width / 2), line.height(), width, widget.heightForWidth(width))
         self.setFixedHeight(line.height() + tallest + GRID)
         self.setMinimumWidth(line.width())
 
@@ -326,7 +323,7 @@ class RulerCheck(QWidget):
         self._length.selectAll()
         self._length.setFocus(Qt.FocusReason.OtherFocusReason)
         screen_name = screen.name() or tr("without a name")
-        say(self._wrong, tr("Screen: {name}, {words}.", name=screen_name, words=millimetres(screen).words))
+        set_text(self._wrong, tr("Screen: {name}, {words}.", name=screen_name, words=millimetres(screen).origin))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Let the Enter that keeps a length mean nothing else: the page behind would take it."""
@@ -338,11 +335,11 @@ class RulerCheck(QWidget):
         if self._screen is not None and length is not None and store_ruler_length(self._screen, length) is not None:
             self.finished.emit()
             return
-        words = tr(
+        refusal = tr(
             "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
             least=LEAST, most=MOST, it=self._length.text().strip(),
         )  # fmt: skip
-        say(self._wrong, words)
+        set_text(self._wrong, refusal)
 
 
 def _question_of(view: SubjectView) -> tuple[object, ...]:

@@ -23,7 +23,7 @@ from daq_app.wording import tr, tr_noop
 
 _NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
 Index = QModelIndex | QPersistentModelIndex
-_HEAD = tr_noop(("window", "sequence", "counter", "status", "time [s]", "received [ns]"))
+_COLUMNS = tr_noop(("window", "sequence", "counter", "status", "time [s]", "received [ns]"))
 
 
 class CopyableTable(QTableView):
@@ -45,10 +45,10 @@ class CopyableTable(QTableView):
 
     def selected_text(self) -> str:
         """Return the least rectangle of cells that holds the selection; empty where a cell in it is not selected."""
-        cells = {(at.row(), at.column()): str(at.data()) for at in self.selectedIndexes()}
+        cells = {(cell.row(), cell.column()): str(cell.data()) for cell in self.selectedIndexes()}
         if not cells:
             return ""
-        rows, columns = ({place[part] for place in cells} for part in (0, 1))
+        rows, columns = ({position[axis] for position in cells} for axis in (0, 1))
         return as_tsv(
             [cells.get((row, column), "") for column in range(min(columns), max(columns) + 1)]
             for row in range(min(rows), max(rows) + 1)
@@ -67,19 +67,19 @@ class TextTable(CopyableTable):
 
     row_chosen = Signal(int)  # its number before any sorting
 
-    def __init__(self, name: str, head: Sequence[str]) -> None:
+    def __init__(self, name: str, columns: Sequence[str]) -> None:
         super().__init__(name)
         self._texts: tuple[tuple[str, ...], ...] = ()
-        self._cells = QStandardItemModel(0, len(head), self)
-        self._cells.setHorizontalHeaderLabels(list(head))
+        self._cells = QStandardItemModel(0, len(columns), self)
+        self._cells.setHorizontalHeaderLabels(list(columns))
         self._sorter = _ByNumber(self)
         self._sorter.setSourceModel(self._cells)
         self.setModel(self._sorter)
         self.horizontalHeader().setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # as the session has them
         self.setSortingEnabled(True)
-        self.selectionModel().currentRowChanged.connect(self._went)
+        self.selectionModel().currentRowChanged.connect(self._row_changed)
 
-    def show_lines(self, lines: tuple[tuple[str, ...], ...], at: int = -1) -> None:
+    def show_lines(self, lines: tuple[tuple[str, ...], ...], current: int = -1) -> None:
         if lines != self._texts:
             self._texts = lines
             with QSignalBlocker(self.selectionModel()):
@@ -89,26 +89,26 @@ class TextTable(CopyableTable):
                     self._cells.appendRow([_item(*cell) for cell in zip(cells, right, strict=True)])
                 self.resizeColumnsToContents()
         now = self._sorter.mapToSource(self.currentIndex())
-        if 0 <= at < len(lines) and at != now.row():
+        if 0 <= current < len(lines) and current != now.row():
             with QSignalBlocker(self):
-                self.go_to(at, max(now.column(), 0))
+                self.go_to(current, max(now.column(), 0))
 
     def go_to(self, line: int, column: int = 0) -> None:
         """Stand at a cell of a line, which is numbered as before any sorting."""
         self.setCurrentIndex(self._sorter.mapFromSource(self._cells.index(line, column)))
 
-    def _went(self, now: QModelIndex, _before: QModelIndex) -> None:
+    def _row_changed(self, now: QModelIndex, _previous: QModelIndex) -> None:
         if now.isValid():
             self.row_chosen.emit(self._sorter.mapToSource(now).row())
 
 
 def _is_of_numbers(column: Sequence[str]) -> bool:
     """Say whether every cell is a number: beside a long text one at the right edge of its column is out of sight."""
-    return all(number_in(words) is not None or words in ("", "–") for words in column)
+    return all(number_in(text) is not None or text in ("", "–") for text in column)
 
 
-def _item(words: str, right: bool) -> QStandardItem:
-    item = QStandardItem(words)
+def _item(text: str, right: bool) -> QStandardItem:
+    item = QStandardItem(text)
     if right:
         item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     return item
@@ -119,34 +119,34 @@ class ReadingsTable(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.place = WrappedLabel("quiet")
+        self.caption = WrappedLabel("quiet")
         self.table = CopyableTable(tr("raw readings"))  # in the order in which they came
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()
         self.table.setModel(self._model)
-        vbox(self.place, (self.table, 1), on=self)
+        vbox(self.caption, (self.table, 1), on=self)
 
     def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
         """Show readings, those of the steady window marked by a word and by bold type."""
         self._model.show_readings(readings, steady)
         self._fit_columns()
-        words = tr("Not read yet.")
+        text = tr("Not read yet.")
         if readings is not None:
-            words = tr(
+            text = tr(
                 "{place}. raw 1 to 6 as the device sent them [{unit}]; N and T unfiltered, zero taken off: {zero}.",
-                place=readings.place, unit=readings.unit, zero=readings.zero,
+                place=readings.location, unit=readings.unit, zero=readings.zero,
             )  # fmt: skip
-        self.place.show_text(words)
+        self.caption.show_text(text)
 
     def _fit_columns(self) -> None:
         """Make each column as wide as its head and a few of its lines need: there may be a hundred thousand."""
         model, count = self._model, self._model.rowCount()
         metrics, heads = self.table.fontMetrics(), self.table.horizontalHeader().fontMetrics()
         for column in range(model.columnCount()):
-            head = heads.horizontalAdvance(str(model.headerData(column, Qt.Orientation.Horizontal)))
+            title_width = heads.horizontalAdvance(str(model.headerData(column, Qt.Orientation.Horizontal)))
             texts = [model.index(row, column).data() for row in (0, count // 2, count - 1) if 0 <= row < count]
-            widest = max(head, *(metrics.horizontalAdvance(str(text)) for text in texts), 0)
+            widest = max(title_width, *(metrics.horizontalAdvance(str(text)) for text in texts), 0)
             self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady ones are bold
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -179,29 +179,30 @@ class _Model(QAbstractTableModel):
         return 0 if self._readings is None else len(self._readings.block)
 
     def columnCount(self, parent: Index | None = None) -> int:
-        return len(_HEAD) + 8
+        return len(_COLUMNS) + 8
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: ANN401
         if role != Qt.ItemDataRole.DisplayRole or orientation != Qt.Orientation.Horizontal:
             return None
-        return (*map(tr, _HEAD), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
+        return (*map(tr, _COLUMNS), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
 
     def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
-        r = self._readings
-        if r is None:
+        readings = self._readings
+        if readings is None:
             return None
-        at, b = index.row(), r.block
-        inside = self._steady is not None and self._steady[0] <= b.time[at] <= self._steady[1]
+        row, block = index.row(), readings.block
+        inside = self._steady is not None and self._steady[0] <= block.time[row] <= self._steady[1]
         match role:
             case Qt.ItemDataRole.FontRole:
                 return self._bold if inside else None
             case Qt.ItemDataRole.TextAlignmentRole:
                 return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             case Qt.ItemDataRole.DisplayRole:
-                counts = (b.sequence[at], b.counter[at], b.status[at], f"{b.time[at]:.6f}", b.received_ns[at])
-                forces = (f"{r.normal[at]:.4f}", f"{r.tangential[at]:.4f}")
-                cells = (tr("steady") if inside else "", *counts, *(f"{raw:.10g}" for raw in b.raw[at]), *forces)
-                return str(cells[index.column()])
+                counts = (column[row] for column in (block.sequence, block.counter, block.status))
+                times = (f"{block.time[row]:.6f}", block.received_ns[row])
+                raw = (f"{number:.10g}" for number in block.raw[row])
+                forces = (f"{readings.normal[row]:.4f}", f"{readings.tangential[row]:.4f}")
+                return str((tr("steady") if inside else "", *counts, *times, *raw, *forces)[index.column()])
             case _:
                 return None
 

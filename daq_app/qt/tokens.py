@@ -121,6 +121,5 @@ def style_sheet(t: Tokens) -> str:
 def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
     """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
     metrics, characters = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
-    return "".join(
-        sorted(c for c in characters if not (c.isspace() or category(c) == "Cf" or metrics.inFontUcs4(ord(c))))
-    )
+    printed = (letter for letter in sorted(characters) if not letter.isspace() and category(letter) != "Cf")
+    return "".join(letter for letter in printed if not metrics.inFontUcs4(ord(letter)))

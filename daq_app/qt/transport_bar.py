@@ -7,7 +7,7 @@ from PySide6.QtCore import QEasingCurve, QSignalBlocker, Qt, QTimeLine, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QSizePolicy, QSlider, QWidget
 
-from daq_app.qt.parts import button, choice, hbox, label, say
+from daq_app.qt.parts import button, choice, hbox, label, set_text
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
@@ -21,33 +21,33 @@ class TransportBar(QWidget):
     moved = Signal(int)
     ended = Signal()
 
-    def __init__(self, what: str, *, tells_time: bool = True) -> None:
-        """Offer to play `what`, which is not there yet; without `tells_time` the instants are no times of it."""
+    def __init__(self, name: str, *, tells_time: bool = True) -> None:
+        """Offer to play `name`, which is not there yet; without `tells_time` the instants are no times of it."""
         super().__init__()
-        self._what = what
+        self._name = name
         self._times: Sequence[float] = ()
         self._index = -1
-        self.play = button("▶", tr("play {what}", what=what), self.toggle, "small")
-        self.back = button("◀|", tr("one step back in {what}", what=what), lambda: self.step(-1), "small")
-        self.forward = button("|▶", tr("one step forward in {what}", what=what), lambda: self.step(+1), "small")
+        self.play = button("▶", tr("play {what}", what=name), self.toggle, "small")
+        self.back = button("◀|", tr("one step back in {what}", what=name), lambda: self.step(-1), "small")
+        self.forward = button("|▶", tr("one step forward in {what}", what=name), lambda: self.step(+1), "small")
         for widget in (self.play, self.back, self.forward):
             widget.setMinimumWidth(TARGET)
         self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.setAccessibleName(tr("place in {what}", what=what))
+        self.slider.setAccessibleName(tr("place in {what}", what=name))
         self.slider.setMinimumHeight(TARGET)
         self.slider.setMinimumWidth(60)
         self.slider.valueChanged.connect(self._move_to)
-        self.speed = choice(tr("speed of {what}", what=what), (f"× {value:g}" for value in SPEEDS))
+        self.speed = choice(tr("speed of {what}", what=name), (f"× {value:g}" for value in SPEEDS))
         self.speed.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.speed.setCurrentIndex(SPEEDS.index(1.0))
-        self.speed.activated.connect(lambda: self._stand(self._place))
-        self.place = label("", "quiet")
-        self.place.setVisible(tells_time)
-        hbox(self.play, self.back, self.forward, (self.slider, 1), self.place, self.speed, on=self, spacing=GRID)
+        self.speed.activated.connect(lambda: self._set_time(self._time))
+        self.time_label = label("", "quiet")
+        self.time_label.setVisible(tells_time)
+        hbox(self.play, self.back, self.forward, (self.slider, 1), self.time_label, self.speed, on=self, spacing=GRID)
         self._line = QTimeLine(parent=self)  # from the first instant to the last, at the chosen speed
         self._line.setEasingCurve(QEasingCurve.Type.Linear)
         self._line.setUpdateInterval(_TICK)
-        self._line.valueChanged.connect(lambda: self._show(self._place))
+        self._line.valueChanged.connect(lambda: self._show(self._time))
         self._line.finished.connect(self._finish)
         self._enable()
 
@@ -55,7 +55,7 @@ class TransportBar(QWidget):
     def playing(self) -> bool:
         return self._line.state() == QTimeLine.State.Running
 
-    def set_times(self, times: Sequence[float], at: int = 0) -> None:
+    def set_times(self, times: Sequence[float], index: int = 0) -> None:
         """Take the instants [s], rising, and stand at one of them; none of them: nothing can be played."""
         self._times = times
         self._line.stop()
@@ -65,9 +65,9 @@ class TransportBar(QWidget):
         self._index = -1
         self._enable()
         if len(times):
-            self.seek(at)
+            self.seek(index)
         else:
-            say(self.place, "")
+            set_text(self.time_label, "")
 
     def toggle(self) -> None:
         if self.playing:
@@ -78,16 +78,16 @@ class TransportBar(QWidget):
             self._line.resume()
         self._enable()
 
-    def step(self, by: int) -> None:
+    def step(self, count: int) -> None:
         """Go some instants on or back; what plays is paused."""
         if len(self._times):
             if self.playing:
                 self.toggle()
-            self.seek(min(max(self._index + by, 0), len(self._times) - 1))
+            self.seek(min(max(self._index + count, 0), len(self._times) - 1))
 
-    def seek(self, at: int) -> None:
-        self._stand(self._times[at])
-        self._show(self._times[at])
+    def seek(self, index: int) -> None:
+        self._set_time(self._times[index])
+        self._show(self._times[index])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         match event.key():
@@ -104,17 +104,17 @@ class TransportBar(QWidget):
             case _:
                 super().keyPressEvent(event)
 
-    def _move_to(self, at: int) -> None:
-        if at != self._index and len(self._times):
-            self.seek(at)
+    def _move_to(self, index: int) -> None:
+        if index != self._index and len(self._times):
+            self.seek(index)
 
     @property
-    def _place(self) -> float:
+    def _time(self) -> float:
         """Where the time line is among the instants [s]."""
         first, last = (self._times[0], self._times[-1]) if len(self._times) else (0.0, 0.0)
         return first + self._line.currentValue() * (last - first)
 
-    def _stand(self, place: float) -> None:
+    def _set_time(self, time: float) -> None:
         """Put the time line at a place [s], at the chosen speed; where it ran it goes on from there."""
         if not len(self._times):
             return
@@ -123,7 +123,7 @@ class TransportBar(QWidget):
         with QSignalBlocker(self._line):  # the place is shown by whoever asks for it, exact to a reading
             self._line.stop()
             self._line.setDuration(max(round(per_second * (last - first)), 1))
-            self._line.setCurrentTime(round(per_second * (place - first)))
+            self._line.setCurrentTime(round(per_second * (time - first)))
             if playing:
                 self._line.resume()
 
@@ -131,20 +131,20 @@ class TransportBar(QWidget):
         self._enable()
         self.ended.emit()
 
-    def _show(self, place: float) -> None:
-        at = max(bisect_right(self._times, place) - 1, 0)
-        if at == self._index:
+    def _show(self, time: float) -> None:
+        index = max(bisect_right(self._times, time) - 1, 0)
+        if index == self._index:
             return
-        self._index = at
+        self._index = index
         with QSignalBlocker(self.slider):
-            self.slider.setValue(at)
-        say(self.place, f"{self._times[at] - self._times[0]:.3f} s")
-        self.moved.emit(at)
+            self.slider.setValue(index)
+        set_text(self.time_label, f"{self._times[index] - self._times[0]:.3f} s")
+        self.moved.emit(index)
 
     def _enable(self) -> None:
         playable = len(self._times) > 0
-        for part in (self.play, self.back, self.forward, self.slider, self.speed):
-            part.setEnabled(playable)
+        for widget in (self.play, self.back, self.forward, self.slider, self.speed):
+            widget.setEnabled(playable)
         self.play.setText("❚❚" if self.playing else "▶")
-        words = tr("pause {what}", what=self._what) if self.playing else tr("play {what}", what=self._what)
-        self.play.setAccessibleName(words)
+        name = tr("pause {what}", what=self._name) if self.playing else tr("play {what}", what=self._name)
+        self.play.setAccessibleName(name)

@@ -39,7 +39,6 @@ class Recorder:
     """What the process does."""
 
     def __init__(self, inbox: Inbox, outbox: Outbox, clock: Clock) -> None:
-        """Serve requests from `inbox`."""
         self._inbox = inbox
         self._send = outbox.send
         self._clock = clock
@@ -88,9 +87,9 @@ class Recorder:
         try:
             work()
         except Exception as error:  # noqa: BLE001  an error of ours must not take the recorder along
-            kind = type(error).__name__
-            sentence = " ".join(str(error).split()) if is_ours(error) else f"unexpected {kind} ({error})"
-            self._send(m.Failed(name, sentence, kind))
+            error_name = type(error).__name__
+            sentence = " ".join(str(error).split()) if is_ours(error) else f"unexpected {error_name} ({error})"
+            self._send(m.Failed(name, sentence, error_name))
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ class Tap(WrappedTransducer):
 
 
 class Bench:
-    """At most one transducer. Its readings are shown while no session runs; a session takes it by `lent`."""
+    """At most one transducer. Its readings are shown while no session runs; a session takes it by `lend`."""
 
     def __init__(self, clock: Clock, display: Display, send: Callable[[Report], None]) -> None:
         self._clock = clock
@@ -71,8 +71,8 @@ class Bench:
         self._stack = ExitStack()
         self.connected: Connection | None = None  # what is open
         self.uri: str | None = None  # of the transducer, as asked for
-        self._before: TransducerInfo | None = None  # who it was when it was lost
-        self._again = 0.0  # when to try once more [real s]
+        self._lost_info: TransducerInfo | None = None  # who it was when it was lost
+        self._retry_time = 0.0  # when to try once more [real s]
         self._tare: _Tare | None = None
         self._streaming = False  # for nobody but the display
 
@@ -104,7 +104,7 @@ class Bench:
         uri = self.uri
         self._close()
         self._display.forget()
-        self.uri = self._before = None
+        self.uri = self._lost_info = None
         if uri is not None:
             self._send(NoDevice())
 
@@ -116,11 +116,11 @@ class Bench:
             raise NotNow(f"a zero is measured over 0.1 to 60 s, not {duration:g} s")
         self._tare = _Tare(duration)
 
-    def end_tare(self, why: str) -> None:
+    def end_tare(self, reason: str) -> None:
         """Give up a tare under way."""
         if self._tare is not None:
             self._tare = None
-            self._send(Failed("Tare", f"the zero was not measured: {why}", "NotNow"))
+            self._send(Failed("Tare", f"the zero was not measured: {reason}", "NotNow"))
 
     def stream(self) -> None:
         """Begin to show what is measured, unless it is shown already. Raises NotNow when a stop broke it off."""
@@ -134,7 +134,7 @@ class Bench:
                 self.disconnect()
                 raise
 
-    def lent(self, clock_offset_ns: int) -> Tap | None:
+    def lend(self, clock_offset_ns: int) -> Tap | None:
         """Return the transducer for a session whose clock is so far ahead, not streaming; None where there is none."""
         self.end_tare("a session began; zero again after it")
         if self.connected is None:
@@ -187,15 +187,15 @@ class Bench:
     def lose(self, sentence: str) -> None:
         """Let go of a transducer that fell silent, and look for it again later."""
         if self.connected is not None:
-            self._before = self.connected.transducer.info
+            self._lost_info = self.connected.transducer.info
             self._close()
-            self._again = time.monotonic() + TRY_AGAIN
+            self._retry_time = time.monotonic() + TRY_AGAIN
             self._send(LinkDown(sentence))
 
     def _look_for_it(self) -> None:
-        if self.uri is None or time.monotonic() < self._again:
+        if self.uri is None or time.monotonic() < self._retry_time:
             return
-        self._again = time.monotonic() + TRY_AGAIN
+        self._retry_time = time.monotonic() + TRY_AGAIN
         try:
             with _breakable(self.uri):
                 self._open(self.uri)
@@ -204,12 +204,12 @@ class Bench:
         assert self.connected is not None
         info = self.connected.transducer.info
         try:
-            check_same_transducer(self._before, info)
-            same = True
+            check_same_transducer(self._lost_info, info)
+            is_same = True
         except RecordingError:
-            same = False
+            is_same = False
             self._display.forget()
-        self._send(LinkBack(info, same))
+        self._send(LinkBack(info, is_same))
         self.stream()
 
 

@@ -85,10 +85,10 @@ class Recorder:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close it; where somebody pressed Ctrl-C without waiting."""
-        self.close(0.0 if kind is not None and issubclass(kind, KeyboardInterrupt) else _PATIENCE)
+        self.close(0.0 if error_type is not None and issubclass(error_type, KeyboardInterrupt) else _PATIENCE)
 
     @property
     def pid(self) -> int:
@@ -155,17 +155,16 @@ class Recorder:
         self._wake()
 
     def _end_message(self, detail: str) -> Gone:
-        """Return the message that says how the recorder ended."""
         if self._asked_to_end:
             return Gone(True, "the recorder has ended")
         try:
             code = self._process.wait(2.0)
         except subprocess.TimeoutExpired:
             code = None
-        why = f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
+        cause = f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
         return Gone(
             False,
-            f"the recorder has ended unexpectedly ({why}){detail}: all that it had acknowledged is safe;"
+            f"the recorder has ended unexpectedly ({cause}){detail}: all that it had acknowledged is safe;"
             " resume the session to go on at the same trial",
         )
 

@@ -33,7 +33,7 @@ class Life:
 
 def remember_zero(info: TransducerInfo, mean: Sequence[float], spread: Sequence[float]) -> None:
     """Keep a zero and its noise [raw units], as a wrench by the calibration in force."""
-    matrix = info.calibration.own(info.calibration.matrix.T).T  # whatever tool is on it today
+    matrix = info.calibration.in_own_frame(info.calibration.matrix.T).T  # whatever tool is on it today
     noise = np.sqrt(matrix**2 @ np.square(spread))  # gauges are taken to be independent of each other
     _add(info, "zero", {"wrench": (matrix @ np.array(mean)).tolist(), "noise": noise.tolist()})
 

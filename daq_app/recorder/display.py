@@ -103,7 +103,7 @@ class Display:
             return
         calibration = info.calibration
         wrench = calibration.wrench(block.raw, np.zeros(6))
-        load = loads(calibration.own(wrench), calibration.rated).max(axis=0)
+        load = loads(calibration.in_own_frame(wrench), calibration.rated).max(axis=0)
         self._load, self._peak = np.fmax(self._load, load), np.fmax(self._peak, load)
         if np.any(self._peak > LIMITS) and not self._overload_told:
             self._overload_told = True

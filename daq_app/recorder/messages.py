@@ -220,13 +220,12 @@ class Codec:
     """Packs and unpacks messages of the types it was given; a type is known by its name."""
 
     def __init__(self, types: Iterable[type]) -> None:
-        """Know these types, none of which share a name."""
         self._types = {cls.__name__: cls for cls in types}
 
     def read(self, file: IO[bytes]) -> Iterator[Any]:
         """Yield each message of a pipe until its other end goes, which may cut the last. Raises BrokenMessage."""
-        while len(head := file.read(LENGTH_PREFIX.size)) == LENGTH_PREFIX.size:
-            (length,) = LENGTH_PREFIX.unpack(head)
+        while len(prefix := file.read(LENGTH_PREFIX.size)) == LENGTH_PREFIX.size:
+            (length,) = LENGTH_PREFIX.unpack(prefix)
             if length > _LONGEST:
                 raise BrokenMessage(f"a message of {length} bytes is none of ours")
             if len(body := file.read(length)) == length:
@@ -257,8 +256,8 @@ def _array_out(value: object) -> object:
 
 def _array_in(_: type, value: Any) -> NDArray[Any]:  # noqa: ANN401  what MessagePack holds
     """Return the array that `_array_out` gave this for. Raises ValueError where it is none of numbers."""
-    kind, shape, content = value
-    dtype = np.dtype(kind)
+    dtype_name, shape, content = value
+    dtype = np.dtype(dtype_name)
     if dtype.kind not in "if":
-        raise ValueError(f"an array of kind {kind}")
+        raise ValueError(f"an array of kind {dtype_name}")
     return np.frombuffer(content, dtype).reshape(shape)

@@ -20,7 +20,6 @@ class Inbox:
     """Requests as they come, read by a thread; a stop nudges the main thread out of whatever it waits for."""
 
     def __init__(self, reading: int) -> None:
-        """Read from this file descriptor."""
         self._reading = reading
         self._queue: deque[m.Request] = deque()
         self._nudge_lock = threading.Lock()
@@ -65,7 +64,6 @@ class Outbox:
     """Reports on their way to the client. Whoever sends never waits, whatever the client does."""
 
     def __init__(self, writing: int) -> None:
-        """Write to this file descriptor."""
         self._file = os.fdopen(writing, "wb", closefd=False)
         self._codec = m.Codec(m.REPORTS)
         self._reports: Queue[m.Report] = Queue()

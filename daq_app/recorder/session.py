@@ -100,7 +100,7 @@ class SessionSetup:
     info: TransducerInfo | None
     clock_offset_ns: int = 0
     continuation: Continuation | None = None
-    before: tuple[LoggedEvent, ...] = ()  # all that was recorded before
+    earlier_events: tuple[LoggedEvent, ...] = ()  # all that was recorded before
 
 
 def begin(request: m.StartSession, bench: Bench, clock: Clock) -> SessionSetup:
@@ -139,7 +139,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     factor = float(recording.provenance["clock"]["factor"])
     if clock.factor != factor:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
-    at, last = resuming.resumption(recording.plan, recording.events), recording.last_block()
+    resumption, last = resuming.resumption(recording.plan, recording.events), recording.last_block()
     going_on, gap = resuming.continue_clock(recording, last, clock, datetime.now(UTC))
     people = _recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
@@ -149,7 +149,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> SessionSetup
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
     writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
-    continuation = Continuation(at, resuming.resumed_data(gap, info, software_versions()), last)
+    continuation = Continuation(resumption, resuming.resumed_data(gap, info, software_versions()), last)
     return SessionSetup(
         recording.plan, writer, going_on, people, info, going_on.offset_ns, continuation, tuple(recording.events)
     )
@@ -163,13 +163,13 @@ def run(prepared: SessionSetup, bench: Bench, display: Display, inbox: Inbox, se
     simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
     folder, kind = str(writer.folder), prepared.people.kind
     offset_ns, factor = prepared.clock_offset_ns, prepared.clock.factor
-    send(m.SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, factor, prepared.before))
+    send(m.SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, factor, prepared.earlier_events))
     with awake():
         end = run_session(
             prepared.plan,
             writer,
             operator,
-            bench.lent(prepared.clock_offset_ns) if prepared.plan.forces else None,
+            bench.lend(prepared.clock_offset_ns) if prepared.plan.forces else None,
             resumed=prepared.continuation,
             stop=operator.stop,
             progress=send,

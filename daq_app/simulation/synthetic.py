@@ -63,12 +63,12 @@ def conduct(
     transducer = None if people.connected is None else people.connected.transducer
     info = None if transducer is None else transducer.info
     came_from = provenance(people.clock, settings)
-    kind = SessionWriter if durable else FleetingWriter
-    writer = kind.create(folder, plan, info, came_from, subject_simulated=True, clock=people.clock)
+    writer_type = SessionWriter if durable else FleetingWriter
+    writer = writer_type.create(folder, plan, info, came_from, subject_simulated=True, clock=people.clock)
 
     def show(status: Status) -> None:
-        part = 0.0 if status.trial is None else (status.trial - 1) / status.trials
-        console.progress(part, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
+        fraction = 0.0 if status.trial is None else (status.trial - 1) / status.trials
+        console.progress(fraction, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
     end = run_session(plan, writer, people, transducer, settings=run, progress=show)
     if end.cause not in RESUMABLE:
@@ -79,20 +79,20 @@ def conduct(
 
 
 @contextmanager
-def recordings_in(out: Path) -> Generator[None]:
-    """Guard work that records into the folder `out`, which must be new or empty.
+def recordings_in(folder: Path) -> Generator[None]:
+    """Guard work that records into the folder `folder`, which must be new or empty.
 
-    Raises RecordingError where `out` is not empty. When the user stops the work after it recorded something, raises
+    Raises RecordingError where `folder` is not empty. When the user stops the work after it recorded something, raises
     RecordingKept, which names the folder, in place of KeyboardInterrupt.
     """
-    if holds_something(out):
-        raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
+    if holds_something(folder):
+        raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
     try:
         yield
     except KeyboardInterrupt:
-        if not holds_something(out):
+        if not holds_something(folder):
             raise
-        raise RecordingKept(f"stopped; what was recorded is in {out}") from None
+        raise RecordingKept(f"stopped; what was recorded is in {folder}") from None
 
 
 class StudyCutShort(Exception):
@@ -110,10 +110,10 @@ class Study:
     lost: int
 
 
-def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Study:
-    """Run every visit into a folder of its own below `out`. The same seed gives the same people and surfaces.
+def simulated_study(parent: Path, seed: int, clock: Clock, console: Console) -> Study:
+    """Run every visit into a folder of its own below `parent`. The same seed gives the same people and surfaces.
 
-    Raises RecordingError where `out` cannot be used, StudyCutShort where a visit did not come to its end.
+    Raises RecordingError where `parent` cannot be used, StudyCutShort where a visit did not come to its end.
     """
     study_protocol = protocol(PROTOCOL)
 
@@ -125,16 +125,16 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
 
     scores: list[Path] = []
     for number in range(1, SUBJECTS + 1):
-        subject, own = f"S{number:02d}", _seed(seed, number)
-        scores.append(out / f"{subject}-scores")
-        visit(
-            plan(study_protocol, subject, own, forces=False), scores[-1], SimulatedPeople(SimulatedSubject(own), clock)
-        )
-    subject, own = f"S{STROKING:02d}", _seed(seed, STROKING)
-    folder = out / f"{subject}-forces"
+        subject, subject_seed = f"S{number:02d}", _seed(seed, number)
+        scores.append(parent / f"{subject}-scores")
+        people = SimulatedPeople(SimulatedSubject(subject_seed), clock)
+        visit(plan(study_protocol, subject, subject_seed, forces=False), scores[-1], people)
+    subject, subject_seed = f"S{STROKING:02d}", _seed(seed, STROKING)
+    folder = parent / f"{subject}-forces"
     with connect(f"sim:?seed={seed}&rate=200", clock) as bench:
-        people = SimulatedPeople(SimulatedSubject(own), clock, bench)
-        end = visit(plan(study_protocol, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
+        people = SimulatedPeople(SimulatedSubject(subject_seed), clock, bench)
+        setting = VisitSetting(frame=bench.frame)
+        end = visit(plan(study_protocol, subject, subject_seed + 1, setting=setting), folder, people)
         ground_truth = tuple(
             GroundTruth(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
             for trial, stroke in people.strokes.items()
@@ -143,7 +143,6 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
 
 
 def _seed(study: int, subject: int) -> int:
-    """Return a seed of one subject's own."""
     return study * 100 + subject
 
 
@@ -184,17 +183,17 @@ FAULTS: Mapping[str, VisitFaults] = {
 }
 
 
-def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJECTS) -> None:
-    """Write the study below `out`: a folder a visit, one that is damaged, decisions, and the ground truth.
+def synthetic_study(parent: Path, seed: int, console: Console, subjects: int = SUBJECTS) -> None:
+    """Write the study below `parent`: a folder a visit, one that is damaged, decisions, and the ground truth.
 
-    The same seed gives the same readings and answers. Raises RecordingError where `out` cannot be used.
+    The same seed gives the same readings and answers. Raises RecordingError where `parent` cannot be used.
     """
-    strokes = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
-    (out / DAMAGED).mkdir()
-    (out / DAMAGED / LIVE_FILE).write_bytes((out / "S01" / LIVE_FILE).read_bytes()[:1000])
-    (out / EXCLUSIONS).write_text(_DECISIONS, encoding="utf-8")
+    strokes = [_visit(parent, seed, number, console) for number in range(1, subjects + 1)]
+    (parent / DAMAGED).mkdir()
+    (parent / DAMAGED / LIVE_FILE).write_bytes((parent / "S01" / LIVE_FILE).read_bytes()[:1000])
+    (parent / EXCLUSIONS).write_text(_DECISIONS, encoding="utf-8")
     write_json(
-        out / GROUND_TRUTH_FILE,
+        parent / GROUND_TRUTH_FILE,
         {
             "SIMULATED": "SIMULATED: this is the ground truth of a simulated study",
             "seed": seed,
@@ -217,23 +216,22 @@ def true_slopes(people: SubjectSettings) -> dict[str, Any]:
     return {"gain": by_index, "friction": judgements, "drift": people.drift, "carry_over": people.carry_over}
 
 
-def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
+def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
     """Record one subject's visit and return its ground truth, a row a stroke."""
-    subject, own = f"S{number:02d}", _seed(seed, number)
+    subject, subject_seed = f"S{number:02d}", _seed(seed, number)
     faults = FAULTS.get(subject, VisitFaults(expected=""))
-    gains = np.random.default_rng([own, 7]).normal(1.0, CALIBRATION, 6)
+    gains = np.random.default_rng([subject_seed, 7]).normal(1.0, CALIBRATION, 6)
     a, b, c, d, e, f = gains.tolist()
-    bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
+    bench = Bench(subject_seed, BenchSettings(gains=(a, b, c, d, e, f)))
     clock = SimulatedClock()
     transducer = DirectTransducer(bench, clock, lost=faults.lost, frozen=faults.frozen)
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if faults.reversed else PEOPLE
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
-    session_plan = plan(protocol(PROTOCOL), subject, own, setting=setting)
-    people = SyntheticPeople(
-        SimulatedSubject(own, settings), clock, Connection(transducer, bench, transducer.now), session_plan, faults
-    )
+    session_plan = plan(protocol(PROTOCOL), subject, subject_seed, setting=setting)
+    person = SimulatedSubject(subject_seed, settings)
+    people = SyntheticPeople(person, clock, Connection(transducer, bench, transducer.now), session_plan, faults)
     study, run = [_study_seed(seed)], RunnerSettings(tick=_TICK)
-    conduct(session_plan, out / subject, people, console, settings=study, run=run, durable=False)
+    conduct(session_plan, parent / subject, people, console, settings=study, run=run, durable=False)
     return [
         {
             "subject": subject,
@@ -268,20 +266,20 @@ class SyntheticPeople(SimulatedPeople):
 
     def score(self, trial: Trial) -> float:
         """Return the score of a trial, with drift within its block and what is carried over from the trial before."""
-        _, place, before = self._order(trial)
-        return self.subject.score(self.surface(trial), 1, place, before)
+        _, position, previous_index = self._order(trial)
+        return self.subject.score(self.surface(trial), 1, position, previous_index)
 
     def true_judgement(self, trial: Trial) -> dict[str, Any]:
         """Return a trial's depth, its place, what was stroked before, and the score without noise."""
-        block, place, before = self._order(trial)
-        score = self.subject.expected_score(self.surface(trial), place, before)
-        return {"indentation": block.indentation, "place": place, "before": before, "score": score}
+        block, position, previous_index = self._order(trial)
+        score = self.subject.expected_score(self.surface(trial), position, previous_index)
+        return {"indentation": block.indentation, "place": position, "before": previous_index, "score": score}
 
     def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
         """Return a trial's block, its place in it from 0, and the index stroked before it."""
         block = next(block for block in self._plan.blocks if trial in block.trials)
-        place = block.trials.index(trial)
-        return block, place, block.trials[place - 1].stimulus.known_index if place else None
+        position = block.trials.index(trial)
+        return block, position, block.trials[position - 1].stimulus.known_index if position else None
 
     def _perceived_surface(self, trial: Trial) -> Surface:
         surface = self.subject.perceived_surface(simulated_surface(trial))
@@ -326,9 +324,9 @@ def relations(people: SubjectSettings, seds: SedsAt) -> Mapping[str, PopulationR
     by_descriptor: dict[str, PopulationRelation] = {}
     for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
         surfaces = [simulated_surface(trial) for trial in block.trials]
-        at = _seds_of_fingers(surfaces, block, people.moisture, seds)
-        if at is not None:
-            by_descriptor[surfaces[0].descriptor] = _relation(people, surfaces, at)
+        seds_of_finger = _seds_of_fingers(surfaces, block, people.moisture, seds)
+        if seds_of_finger is not None:
+            by_descriptor[surfaces[0].descriptor] = _relation(people, surfaces, seds_of_finger)
     return by_descriptor
 
 
@@ -338,7 +336,9 @@ def _seds_of_fingers(
     """Return what gives the SED [kPa] of each surface under a finger whose friction is so many times the usual."""
     times = np.exp(moisture * _FINGERS) if moisture else np.ones(1)
     loads = [
-        (s.mu * m, s.tau_max * m, block.indentation, s.direction, s.speed) for m in times.tolist() for s in surfaces
+        (surface.mu * factor, surface.tau_max * factor, block.indentation, surface.direction, surface.speed)
+        for factor in times.tolist()
+        for surface in surfaces
     ]
     answers = [sed for sed in seds(loads) if sed is not None]
     if len(answers) < len(loads):
@@ -347,7 +347,7 @@ def _seds_of_fingers(
     if not moisture:
         return lambda _: table[0].tolist()
     spline = CubicSpline(np.log(times), table)
-    return lambda m: np.asarray(spline(math.log(m))).tolist()
+    return lambda factor: np.asarray(spline(math.log(factor))).tolist()
 
 
 def _relation(
@@ -356,14 +356,15 @@ def _relation(
     products = np.zeros((4, 4))  # of SED, place, index before, and score, each without the person's own mean
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
     for seed in range(_FIRST, _FIRST + SAMPLE_SIZE):
-        person, order = SimulatedSubject(seed, people), [int(one) for one in draw.permutation(len(surfaces))]
+        person = SimulatedSubject(seed, people)
+        order: list[int] = draw.permutation(len(surfaces)).tolist()
         perceived = [person.perceived_surface(surface) for surface in surfaces]
-        own = seds(perceived[0].mu / surfaces[0].mu)
-        before: list[int | None] = [None, *(indices[one] for one in order[:-1])]
+        own_seds = seds(perceived[0].mu / surfaces[0].mu)
+        previous_indices: list[int | None] = [None, *(indices[i] for i in order[:-1])]
         rows = np.array(
             [
-                (own[one], place, 0 if last is None else last - 50, person.expected_score(perceived[one], place, last))
-                for place, (one, last) in enumerate(zip(order, before, strict=True))
+                (own_seds[i], place, 0 if last is None else last - 50, person.expected_score(perceived[i], place, last))
+                for place, (i, last) in enumerate(zip(order, previous_indices, strict=True))
             ]
         )
         rows -= rows.mean(axis=0)

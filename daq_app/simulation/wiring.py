@@ -94,7 +94,7 @@ def simulated_surface(trial: Trial, friction: Sequence[tuple[str, int, float]] =
     stimulus = trial.stimulus
     surfaces = paper_surfaces().values()
     alike = [surface for surface in surfaces if surface.descriptor == stimulus.descriptor]
-    surface = min(alike or surfaces, key=lambda one: abs(one.index - stimulus.known_index))
+    surface = min(alike or surfaces, key=lambda candidate: abs(candidate.index - stimulus.known_index))
     surface = replace(surface, direction=trial.direction)
     for descriptor, index, mu in friction:
         if (descriptor, index) == (stimulus.descriptor, stimulus.known_index):
@@ -140,7 +140,7 @@ class SimulatedHand:
 
     def take(self, trial: Trial) -> int:
         """Return how often a trial was stroked."""
-        return sum(one.number == trial.number for one in self.stroke_trials)
+        return sum(stroke_trial.number == trial.number for stroke_trial in self.stroke_trials)
 
     def poll(self) -> tuple[steps.Event, ...]:
         """Return nothing: the transducer measures what a hand does."""
@@ -166,9 +166,9 @@ class SimulatedPeople(SimulatedHand):
         self.judgement_s = JUDGING if bench else 0.0  # from lift to judgement [s]
         self._due: list[tuple[int, steps.Event]] = []  # session clock [ns]
 
-    def put(self, event: steps.Event, after: float = 0.0) -> None:
-        """Let an event come up in `after` seconds of the clock."""
-        self._due.append((self.clock.now_ns() + int(after * 1e9), event))
+    def put(self, event: steps.Event, delay: float = 0.0) -> None:
+        """Let an event come up in `delay` seconds of the clock."""
+        self._due.append((self.clock.now_ns() + int(delay * 1e9), event))
 
     def poll(self) -> tuple[steps.Event, ...]:
         """Return what has come up by now, once, in the order it was put in."""
@@ -188,7 +188,7 @@ class SimulatedPeople(SimulatedHand):
             case steps.AskStroke(trial) if self.connected is None:
                 self.put(steps.StrokeDone())
             case steps.AskScore() | steps.AskNumber() | steps.AskChoice():
-                self.put(self._judgement(command), after=self.judgement_s)
+                self.put(self._judgement(command), delay=self.judgement_s)
             case steps.AskRest(None):
                 self.put(steps.Resume())
             case steps.AskFinish():
@@ -201,18 +201,17 @@ class SimulatedPeople(SimulatedHand):
         return self.subject.score(self.surface(trial), self.take(trial))
 
     def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
-        """Return what the subject answers."""
-        at = self.clock.now_ns() * 1e-9 + self.judgement_s
+        time = self.clock.now_ns() * 1e-9 + self.judgement_s
         match command:
             case steps.AskScore(trial):
                 score = self.score(trial)
-                return steps.Scored(score, ((at, score),), at, 0, None, INPUT)
+                return steps.Scored(score, ((time, score),), time, 0, None, INPUT)
             case steps.AskNumber(trial):
                 number = self.subject.number(self.surface(trial), self.take(trial))
-                return steps.MagnitudeEstimate(number, at, 0, None, INPUT)
+                return steps.MagnitudeEstimate(number, time, 0, None, INPUT)
             case steps.AskChoice(first, second):
                 more = self._more(first, second)
-                return steps.PairedChoice("first" if more else "second", at, 0, None, INPUT)
+                return steps.PairedChoice("first" if more else "second", time, 0, None, INPUT)
 
     def _more(self, first: Trial, second: Trial) -> bool:
         """Say whether the first of two has more: of friction where one is a standard, else of its descriptor."""

@@ -118,19 +118,19 @@ class Dialogue:
         self._session: SessionState | None = None
         self._open_keys: set[str] = set()  # keys of answers that were handed on and are not yet stored
 
-    def show(self, view: SubjectView, session: SessionState | None, say: Translate, *, mirrored: bool) -> None:
-        """Show a page, in the language that `say` makes of English, and acknowledge the answers that are stored.
+    def show(self, view: SubjectView, session: SessionState | None, translate: Translate, *, mirrored: bool) -> None:
+        """Show a page, in the language that `translate` makes of English, and acknowledge the answers that are stored.
 
         `mirrored` says that the language is read from right to left.
         """
         self._session = session
-        if session is None or session.over:
+        if session is None or session.is_over:
             self._open_keys.clear()  # what the recorder has not stored is sent again
         for key in tuple(self._open_keys):
             self._acknowledge(key)
         key = _key(session, *view.key) if view.asks and session is not None else ""
-        words = {word.name.lower(): say(word) for word in _WORDS}
-        page = Page(view, key, "rtl" if mirrored else "ltr", session is None, words)
+        texts = {word.name.lower(): translate(word) for word in _WORDS}
+        page = Page(view, key, "rtl" if mirrored else "ltr", session is None, texts)
         if page != self._page:
             if self._page is not None and self._page.key != key:
                 self._open_keys.discard(key)  # asked once more: the recorder refused its answer, as in a pause
@@ -144,7 +144,7 @@ class Dialogue:
         In a pause none is taken, for the tablet sends it again when its question is asked once more.
         """
         session, page, key = self._session, self._page, answer.key
-        if session is None or session.over or page is None or key in self._open_keys or self._acknowledge(key):
+        if session is None or session.is_over or page is None or key in self._open_keys or self._acknowledge(key):
             return None
         if session.phase == "paused":
             return None
@@ -160,7 +160,8 @@ class Dialogue:
         session = self._session
         if session is None:
             return False
-        safe = any(of.answer is not None and _key(session, of.trial.number, of.takes) == key for of in session.trials)
+        answers = (trial for trial in session.trials if trial.answer is not None)
+        safe = any(_key(session, trial.trial.number, trial.takes) == key for trial in answers)
         if safe:
             self._open_keys.discard(key)
             self._send(Stored(key))
@@ -179,12 +180,12 @@ def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | 
                 line = line.drag(time, position, act.device)
             case "release", _:
                 line = line.release()
-            case "step", float(by):
-                line = line.step(time, by)
+            case "step", float(step):
+                line = line.step(time, step)
             case "number", float() | None as number:
                 choice = choice.type_number(time, number)
-            case "choose", "first" | "second" as which:
-                choice = choice.choose(time, which, act.device)
+            case "choose", "first" | "second" as option:
+                choice = choice.choose(time, option, act.device)
             case _:
                 pass  # a value that does not go with its act
     return choice.judgement(hand) if choice != Choice() else line.release().judgement(hand)

@@ -98,7 +98,7 @@ class TabletServer:
         with self._lock:  # so that a tablet that comes now does not hear of it too early
             self._last[type(message)] = text
             if self._tablet is not None:
-                _tell(self._tablet, text)
+                _send_text(self._tablet, text)
 
     def renew(self) -> None:
         """Let go of the tablet, and let in whoever says the new code."""
@@ -152,8 +152,8 @@ class TabletServer:
         with self._door:
             if self._admit(connection, hello.code, by_code=True):
                 return True
-            why = self._refuse_code(hello)
-        _tell(connection, encode(Refused(why)))
+            refusal = self._refuse_code(hello)
+        _send_text(connection, encode(Refused(refusal)))
         return False
 
     def _admit(self, connection: "ServerConnection", secret: str, *, by_code: bool) -> bool:
@@ -162,12 +162,12 @@ class TabletServer:
             right = self.code if by_code else self._token
             if by_code == bool(self._token) or not secrets.compare_digest(secret.encode(), right.encode()):
                 return False
-            before, self._tablet = self._tablet, connection
+            previous, self._tablet = self._tablet, connection
             self._token = self._token or secrets.token_urlsafe()
             for text in (encode(Welcome(self._token)), *self._last.values()):
-                _tell(connection, text)
-        if before is not None:
-            before.close(REPLACED)
+                _send_text(connection, text)
+        if previous is not None:
+            previous.close(REPLACED)
         self._on_change()
         return True
 
@@ -220,7 +220,7 @@ def _new_code() -> str:
     return f"{secrets.randbelow(10**6):06d}"
 
 
-def _tell(connection: "ServerConnection", text: str) -> None:
+def _send_text(connection: "ServerConnection", text: str) -> None:
     """Send a text to a tablet; where it is gone, the thread that listens to it finds out."""
     from websockets.exceptions import ConnectionClosed
 

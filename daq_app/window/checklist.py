@@ -25,7 +25,7 @@ class Card:
 
     name: str
     ready: bool
-    words: str  # why not; or what is worth knowing
+    text: str  # why not; or what is worth knowing
     field: str = ""  # the first that is wrong
 
 
@@ -68,7 +68,7 @@ def headline(cards: tuple[Card, ...], subject: str) -> str:
 def codes_in(folder: Path) -> tuple[str, ...]:
     """Return the codes of the subjects that have sessions in a folder, one for each session."""
     try:
-        names = sorted(place.parent.name for place in folder.glob("*/session.*") if place.stem == "session")
+        names = sorted(file.parent.name for file in folder.glob("*/session.*") if file.stem == "session")
     except OSError:
         return ()
     matches = (re.fullmatch(r"(.+)_[^_]+_\d{8}T\d{6}", name) for name in dict.fromkeys(names))
@@ -84,14 +84,14 @@ def next_code(codes: tuple[str, ...]) -> str:
     pairs = [match.groups() for code in codes if (match := re.fullmatch(r"(.*?)(\d{1,9})", code))]
     if not pairs:
         return "P01"
-    before, digits = max(pairs, key=lambda parts: int(parts[1]))
-    return f"{before}{int(digits) + 1:0{len(digits)}d}"
+    prefix, digits = max(pairs, key=lambda pair: int(pair[1]))
+    return f"{prefix}{int(digits) + 1:0{len(digits)}d}"
 
 
 def studies_in(folder: Path) -> tuple[str, ...]:
     """Return the names of the studies in a folder."""
     try:
-        return tuple(sorted(place.name for place in folder.iterdir() if place.is_dir() and is_study(place)))
+        return tuple(sorted(child.name for child in folder.iterdir() if child.is_dir() and is_study(child)))
     except OSError:
         return ()
 
@@ -105,15 +105,15 @@ def _study_note(form: SessionForm) -> str:
         return tr("A study of protocol {protocol}.", protocol=record.protocol)
     names = ", ".join(studies_in(place_of(form).parent))
     elsewhere = tr(" Studies there: {there}.", there=names) if names else ""
-    words = tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name)
-    return words + elsewhere
+    text = tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name)
+    return text + elsewhere
 
 
 def _subject_note(form: SessionForm) -> str:
     record = enrolment(form)
     if record is not None:
-        return record.words
+        return record.sentence
     subject = form.subject.strip()
-    if not (before := codes_in(place_of(form)).count(subject)):
+    if not (visits := codes_in(place_of(form)).count(subject)):
         return ""
-    return tr("Sessions of {subject} here already: {before}. Is it the same person?", subject=subject, before=before)
+    return tr("Sessions of {subject} here already: {before}. Is it the same person?", subject=subject, before=visits)

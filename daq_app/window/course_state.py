@@ -8,7 +8,7 @@ from msgspec import Struct
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
-from daq_app.wording import answer_words
+from daq_app.wording import answer_text
 from sessions.plan.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
 from sessions.run import steps
@@ -32,7 +32,7 @@ class Remark(NamedTuple):
     """Something that is wrong with a stroke."""
 
     grade: Grade
-    words: str  # few
+    text: str  # few
     sentence: str  # the same at length
     advice: str  # what to do about it, one sentence; empty where no further stroke mends it
 
@@ -54,9 +54,9 @@ class Quality:
         return "doubtful" if self.remarks else "good"
 
     @property
-    def words(self) -> tuple[str, ...]:
+    def texts(self) -> tuple[str, ...]:
         """Return what is wrong in few words, each once."""
-        return tuple(dict.fromkeys(remark.words for remark in self.remarks))
+        return tuple(dict.fromkeys(remark.text for remark in self.remarks))
 
     @property
     def sentences(self) -> str:
@@ -146,11 +146,11 @@ class SessionState:
     sealing: Literal["no", "running", "cut short", "sealed"] = "no"
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Say whether nothing is recorded any more."""
         return self.end is not None or self.fault is not None
 
-    def of(self, number: int | None) -> TrialState | None:
+    def trial_state(self, number: int | None) -> TrialState | None:
         """Return the trial of that number."""
         return next((t for t in self.trials if t.trial.number == number), None)
 
@@ -163,7 +163,9 @@ class SessionState:
 def begin_session(message: m.SessionBegun, now: float) -> SessionState:
     """Return the state of a session that begins, or goes on, at `now` [s]."""
     trials = tuple(
-        TrialState(t, has_stimulus=t.standard or not b.candidates) for b in message.plan.blocks for t in b.trials
+        TrialState(trial, has_stimulus=trial.standard or not block.candidates)
+        for block in message.plan.blocks
+        for trial in block.trials
     )
     session = SessionState(message.folder, message.plan, message.people, message.simulated, trials, now, since=now)
     for event in message.events:
@@ -173,11 +175,11 @@ def begin_session(message: m.SessionBegun, now: float) -> SessionState:
 
 def session_after(session: SessionState, message: object, now: float) -> SessionState:
     """Return the session after a message that came at `now` [s]; the same object where it does not concern it."""
-    after = _after(session, message, now)
-    return after if after.phase == session.phase else replace(after, since=now)
+    changed = _fold_message(session, message, now)
+    return changed if changed.phase == session.phase else replace(changed, since=now)
 
 
-def _after(session: SessionState, message: object, now: float) -> SessionState:
+def _fold_message(session: SessionState, message: object, now: float) -> SessionState:
     match message:
         case LoggedEvent():
             return _fold_event(session, message)
@@ -198,9 +200,9 @@ def _after(session: SessionState, message: object, now: float) -> SessionState:
 def _fold_end(session: SessionState, message: object) -> SessionState:
     match message:
         case m.SessionEnded(folder, end, resumable):
-            return replace(_over(session), folder=folder, end=end, resumable=resumable)
-        case m.Gone(requested, sentence) if not requested and not session.over:
-            return replace(_over(session), fault=sentence, resumable=True)
+            return replace(_ended_session(session), folder=folder, end=end, resumable=resumable)
+        case m.Gone(requested, sentence) if not requested and not session.is_over:
+            return replace(_ended_session(session), fault=sentence, resumable=True)
         case m.Gone(False) | m.Failed("ResumeSession") if session.phase == "resuming":
             return replace(session, phase="ended")
         case m.ResumeSession():
@@ -209,13 +211,13 @@ def _fold_end(session: SessionState, message: object) -> SessionState:
             return session  # a request that has to wait for the end of this session
         case m.Gone() | m.Failed("StartSession" | "ResumeSession") if session.sealing == "running":
             return replace(session, sealing="cut short")
-        case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
-            return replace(_over(session), fault=sentence)
+        case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.is_over:
+            return replace(_ended_session(session), fault=sentence)
         case _:
             return session
 
 
-def _over(session: SessionState) -> SessionState:
+def _ended_session(session: SessionState) -> SessionState:
     """Return the session once nothing is recorded any more; its marks go with the clock of its stream."""
     return replace(session, phase="ended", command=None, marks=(), redone=())
 
@@ -223,15 +225,15 @@ def _over(session: SessionState) -> SessionState:
 def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
     """Return the trials that a redo would discard now: one, two that are compared, or none."""
     if session.phase in IN_A_TRIAL - {"mounting"}:
-        trial = session.of(session.trial)
+        trial = session.trial_state(session.trial)
     elif session.phase == "closing":
         trial = session.trials[-1]
     else:  # before the first take of a trial it is the one before
-        current = session.of(session.trial) if session.phase == "mounting" else None
-        trial = session.of(current.trial.number - 1) if current is not None and not current.takes else None
+        current = session.trial_state(session.trial) if session.phase == "mounting" else None
+        trial = session.trial_state(current.trial.number - 1) if current is not None and not current.takes else None
     if trial is None:
         return ()
-    first = session.of(trial.trial.compared_with)
+    first = session.trial_state(trial.trial.compared_with)
     return (trial,) if first is None else (first, trial)
 
 
@@ -288,8 +290,8 @@ def _fold_event(session: SessionState, event: LoggedEvent) -> SessionState:
         case "note":
             return replace(session, notes=(*session.notes, str(data["text"])))
         case "redo" if session.phase not in ("taring", "ready"):
-            again = redo_targets(session) if session.phase != "stroking" else ()
-            return replace(session, redone=tuple(one.trial.number for one in again))
+            trials = redo_targets(session) if session.phase != "stroking" else ()
+            return replace(session, redone=tuple(state.trial.number for state in trials))
         case "undo_redo" | "stroke_done":
             return replace(session, redone=())
         case _:
@@ -299,11 +301,11 @@ def _fold_event(session: SessionState, event: LoggedEvent) -> SessionState:
 def _of_trial(session: SessionState, number: int | None, kind: str, data: Mapping[str, Any]) -> SessionState:
     match kind:
         case "scored":
-            return session.with_trial(number, answer=answer_words("scored", data["score"]))
+            return session.with_trial(number, answer=answer_text("scored", data["score"]))
         case "number_given":
-            return session.with_trial(number, answer=answer_words("numbered", data["number"]))
+            return session.with_trial(number, answer=answer_text("numbered", data["number"]))
         case "chosen":
-            return session.with_trial(number, answer=answer_words("chosen", data["choice"]))
+            return session.with_trial(number, answer=answer_text("chosen", data["choice"]))
         case "left_out":
             return session.with_trial(number, outcome="skipped")
         case "take_started":
@@ -321,16 +323,17 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
 
 
 def _discard(session: SessionState, number: int | None, reason: str) -> SessionState:
-    of = session.of(number)
-    earlier = () if of is None else (*of.earlier, replace(of, earlier=()))
+    state = session.trial_state(number)
+    earlier = () if state is None else (*state.earlier, replace(state, earlier=()))
     outcome = "skipped" if reason.startswith("skipped: ") else "coming"
     return session.with_trial(number, outcome=outcome, answer=None, discard_reason=reason, earlier=earlier)
 
 
 def _restore(session: SessionState, number: int | None, take: int) -> SessionState:
     """Return the session with a discarded take as the present one again, with its answer and quality."""
-    of = session.of(number)
-    earlier = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
+    state = session.trial_state(number)
+    discarded_states = () if state is None else state.earlier
+    earlier = next((discarded for discarded in discarded_states if discarded.takes == take), None)
     if earlier is None:
         return session
     values = {name: getattr(earlier, name) for name in ("takes", "answer", "quality", "discard_reason")}
@@ -339,21 +342,23 @@ def _restore(session: SessionState, number: int | None, take: int) -> SessionSta
 
 def _judge(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:
     """Return the session with the quality of a stroke; as it is where that take has been repeated."""
-    of = session.of(trial)
-    if of is None or of.takes != take:
+    state = session.trial_state(trial)
+    if state is None or state.takes != take:
         return session
     session = replace(session.with_trial(trial, quality=quality), judged_trial=trial)
-    if quality.stroke is None or quality.stroke.steady is None or session.over:
+    if quality.stroke is None or quality.stroke.steady is None or session.is_over:
         return session
     return _add_mark(session, Mark("steady", *quality.stroke.steady))
 
 
 def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mapping[str, Any]) -> Mark:
-    at = float(data["time"]) - session.time_offset
-    return Mark(kind, at, at)
+    time = float(data["time"]) - session.time_offset
+    return Mark(kind, time, time)
 
 
 def _add_mark(session: SessionState, mark: Mark) -> SessionState:
     """Return the session with another mark; a new steady window replaces the earlier one that it overlaps."""
-    marks = [m for m in session.marks if m.kind != "steady" or mark.kind != "steady" or m.stop < mark.start]
+    marks = session.marks
+    if mark.kind == "steady":
+        marks = tuple(other for other in marks if other.kind != "steady" or other.stop < mark.start)
     return replace(session, marks=(*marks, mark)[-_MARKS:])

@@ -38,21 +38,25 @@ class Load:
     shares: tuple[float, ...] = (nan,) * 7  # of LOADS, as `drivers.calibration.loads` has them
 
     @property
-    def over(self) -> tuple[str, ...]:
+    def overloads(self) -> tuple[str, ...]:
         """Return the names of what is beyond its rated load."""
         loads = zip(LOADS, self.shares, LIMITS, strict=True)
         return tuple(name for name, share, limit in loads if share > limit)
 
     @property
-    def near(self) -> tuple[str, ...]:
+    def near_limits(self) -> tuple[str, ...]:
         """Return the names of what is near its rated load, or beyond it."""
         return tuple(name for name, share in zip(LOADS, self.shares, strict=True) if share > WARNING)
 
 
-def together(reports: Iterable[Report]) -> Iterator[Report]:
+def merge_live(reports: Iterable[Report]) -> Iterator[Report]:
     """Return reports in order, readings that follow each other as one: a window that is late catches up at once."""
-    # What readings must share to be taken as one; None for what are no readings.
-    for key, group in groupby(reports, key=lambda one: (one.stream, one.zero) if isinstance(one, Live) else None):
+
+    def stream_and_zero(report: Report) -> tuple[int, object] | None:
+        """Return what readings must share to be taken as one; None for what are no readings."""
+        return (report.stream, report.zero) if isinstance(report, Live) else None
+
+    for key, group in groupby(reports, key=stream_and_zero):
         if key is None:
             yield from group
             continue
@@ -97,8 +101,8 @@ class LiveFeed:
             self._tail = _Tail()
             self._sequence = None
             self.trace.clear()
-        before = live.sequence[0] - 1 if self._sequence is None else self._sequence
-        gaps = np.flatnonzero(np.diff(live.sequence, prepend=before) > 1)  # before these, others are missing
+        previous = live.sequence[0] - 1 if self._sequence is None else self._sequence
+        gaps = np.flatnonzero(np.diff(live.sequence, prepend=previous) > 1)  # before these, others are missing
         time, values = with_gaps(live.time, self._channels(live, frame), gaps)
         self._sequence = int(live.sequence[-1])
         self._take.append(live)
@@ -110,9 +114,9 @@ class LiveFeed:
         """Return the readings of the take in hand, as a wrench: N, N mm."""
         if not self._take:
             return ReadingBlock.empty()
-        whole = _join(list(self._take))
-        sequence, wrench = whole.sequence, whole.wrench
-        return ReadingBlock(sequence, sequence, whole.status, whole.time, whole.received_ns, raw=wrench)
+        take = _join(list(self._take))
+        sequence, wrench = take.sequence, take.wrench
+        return ReadingBlock(sequence, sequence, take.status, take.time, take.received_ns, raw=wrench)
 
     def _channels(self, live: Live, frame: Frame) -> Array:
         """Return what is drawn (channels, n); nan where a value means nothing."""
@@ -123,7 +127,7 @@ class LiveFeed:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(pressed, tangential / normal, np.nan)
         position = np.where(pressed[:, None], centre_of_pressure(wrench, frame.height), np.nan)
-        self._tail, speed = self._tail.onward(live.time, position)
+        self._tail, speed = self._tail.advance(live.time, position)
         values = np.empty((len(CHANNELS), len(normal)))
         values[:6] = wrench.T
         values[6], values[7], values[8], values[9] = normal, tangential, ratio, speed
@@ -138,32 +142,32 @@ class _Tail:
     time: Array = field(default_factory=lambda: np.empty(0))  # (k,)
     position: Array = field(default_factory=lambda: np.empty((0, 2)))  # (k, 2)
 
-    def onward(self, time: Array, position: Array) -> tuple["_Tail", Array]:
+    def advance(self, time: Array, position: Array) -> tuple["_Tail", Array]:
         """Return the next tail and the speed (n,) [mm/s] at each of n further readings."""
         times = np.concatenate([self.time, time])
-        places = np.concatenate([self.position, position])
+        positions = np.concatenate([self.position, position])
         origin = times[0]  # so that sums of times stay exact
-        rows = np.column_stack([np.nan_to_num(places), times - origin])
+        rows = np.column_stack([np.nan_to_num(positions), times - origin])
         total = np.vstack([np.zeros((1, 3)), np.cumsum(rows, axis=0)])
-        bad = np.concatenate([[0], np.cumsum(np.isnan(places[:, 0]))])
-        ends = np.arange(len(self.time), len(times)) + 1
+        bad = np.concatenate([[0], np.cumsum(np.isnan(positions[:, 0]))])
+        stops = np.arange(len(self.time), len(times)) + 1
         recent = np.searchsorted(times, time - SMOOTH)
         old_end = np.searchsorted(times, time - LAG)
         old_start = np.searchsorted(times, time - LAG - SMOOTH)
-        now, known_now = _mean(total, bad, recent, ends)
-        then, known_then = _mean(total, bad, old_start, old_end)
-        step = now - then
+        latest, known_now = _mean(total, bad, recent, stops)
+        earlier, known_then = _mean(total, bad, old_start, old_end)
+        step = latest - earlier
         with np.errstate(divide="ignore", invalid="ignore"):
             speed = np.hypot(step[:, 0], step[:, 1]) / step[:, 2]
         keep = times > (time[-1] - LAG - 2 * SMOOTH)
-        return _Tail(times[keep], places[keep]), np.where(known_now & known_then, speed, np.nan)
+        return _Tail(times[keep], positions[keep]), np.where(known_now & known_then, speed, np.nan)
 
 
 def _mean(
-    total: Array, bad: NDArray[np.int64], starts: NDArray[np.int64], ends: NDArray[np.int64]
+    total: Array, bad: NDArray[np.int64], starts: NDArray[np.int64], stops: NDArray[np.int64]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return means (n, 3) of position and time from `starts` to `ends`, and which have no unknown reading in them."""
-    count = ends - starts
+    """Return means (n, 3) of position and time from `starts` to `stops`, and which have no unknown reading in them."""
+    count = stops - starts
     with np.errstate(divide="ignore", invalid="ignore"):
-        mean = (total[ends] - total[starts]) / count[:, None]
-    return mean, (count > 0) & (bad[ends] == bad[starts])
+        mean = (total[stops] - total[starts]) / count[:, None]
+    return mean, (count > 0) & (bad[stops] == bad[starts])

@@ -63,7 +63,7 @@ class _Observation:
     time: float  # [s, device time]
     row: Array
     picture: Picture
-    rest: Array  # (n, 2) where its nodes are while nothing touches [mm]
+    rest_nodes: Array  # (n, 2) where its nodes are while nothing touches [mm]
     depth: float
 
 
@@ -73,7 +73,7 @@ class _Model:
     picture: LivePicture
 
     @classmethod
-    def of(cls, scene: Scene) -> Self:
+    def from_scene(cls, scene: Scene) -> Self:
         follower = stepper(scene)
         picture = LivePicture(follower.finger)
         picture.sed(follower.state)  # what it needs is made at once
@@ -99,7 +99,7 @@ class Follower:
         self._kinematics: Kinematics = use.kinematics
         self._scene = scene
         finite = (live_scene(use.plan, "finite"),) if use.kinematics == "finite" else ()
-        self._models = [_Model.of(one) for one in (scene, *finite)]  # at small strain, and at finite strain
+        self._models = [*map(_Model.from_scene, (scene, *finite))]  # at small strain, and at finite strain
         self._reached = False  # by finite strain, at the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
@@ -117,16 +117,16 @@ class Follower:
             self._seds.clear()
             self._observations.clear()
             self._forget_contact()
-        steps = [self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)]
+        steps = [self._step(normal, pull) for normal, pull in zip(forces.normal, forces.pull, strict=True)]
         sed = np.array([value for value, _ in steps])
         instead = np.array([len(self._models) > 1 and not reached for _, reached in steps])
         self._seds += zip(forces.time.tolist(), sed.tolist(), strict=True)
         while self._seds and self._seds[0][0] < forces.time[-1] - _HISTORY:
             self._seds.popleft()
         model = self._models[1 if self._reached and len(self._models) > 1 else 0]
-        row, now, (picture, rest) = model.stepper.row(), float(forces.time[-1]), model.picture_and_rest()
+        row, now, (picture, rest_nodes) = model.stepper.row(), float(forces.time[-1]), model.picture_and_rest()
         if sed[-1] > 0.0 and (not self._observations or abs(now - self._observations[-1].time) >= OBSERVATION_EVERY):
-            self._observations.append(_Observation(now, row, picture, rest, model.stepper.depth))
+            self._observations.append(_Observation(now, row, picture, rest_nodes, model.stepper.depth))
         return Provisional(
             forces.time, sed, row, picture, model.stepper.depth, self._mu,
             self._kinematics, instead, forces.received_ns, forces.stream,
@@ -138,8 +138,9 @@ class Follower:
         values = np.array([sed for time, sed in self._seds if first <= time <= last])
         values = values[np.isfinite(values)]
         provisional = float(values.mean()) if len(values) else None
-        observation = next((one for one in reversed(self._observations) if first <= one.time <= last), None)
-        return lambda: _solve_settled(request, self._kinematics, provisional, observation)
+        observations = [observation for observation in self._observations if first <= observation.time <= last]
+        latest = observations[-1] if observations else None
+        return lambda: _solve_settled(request, self._kinematics, provisional, latest)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
         """Return the SED under forces [N], and whether it is of finite strain; nothing that touches is within reach."""
@@ -152,17 +153,17 @@ class Follower:
         normal, pull = normal / self._scene.finger.width, pull / self._scene.finger.width
         # The traction bound so far [MPa] is, as the analysis has it, the largest T over the contact area.
         bound = self._tangential / self._area if self._tangential > 0.0 else np.inf
-        for one in self._models:
-            one.stepper.mu, one.stepper.tau = self._mu, bound
-        small, *finite = (one.stepper.step(normal, pull) for one in self._models)
+        for model in self._models:
+            model.stepper.mu, model.stepper.tau = self._mu, bound
+        small, *finite = (model.stepper.step(normal, pull) for model in self._models)
         self._reached = bool(finite) and not np.isnan(finite[0])
         return (finite[0], True) if self._reached else (small, False)
 
     def _forget_contact(self) -> None:
         self._mu, self._tangential = LEAST_MU, 0.0
         self._reached = len(self._models) > 1
-        for one in self._models:
-            one.stepper.forget()
+        for model in self._models:
+            model.stepper.forget()
 
 
 def _solve_settled(
@@ -170,17 +171,18 @@ def _solve_settled(
 ) -> SettledSolve:
     """Solve a stroke in full; where that fails, return why, with the last state that was followed in its window."""
     scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
-    why, failed, prediction = tr("The stroke gives no friction."), False, None
+    reason, failed, prediction = tr("The stroke gives no friction."), False, None
     try:
         prediction = None if scene is None else solve(scene)
     except SolveFailure as failure:
-        why, failed = str(failure.in_a_sentence()), True
+        reason, failed = str(failure.in_a_sentence()), True
     if prediction is None:
         row, picture, depth = np.full(len(ROW), np.nan), None, None
         if last is not None:
-            lost = place_of_greatest_shortening(last.rest, last.picture.nodes, last.picture.faces) if failed else None
-            row, picture, depth = last.row, replace(last.picture, lost=lost), last.depth
-        return SettledSolve(request.steady, None, None, provisional, row, picture, depth, kinematics, why)
+            picture = last.picture
+            lost = place_of_greatest_shortening(last.rest_nodes, picture.nodes, picture.faces) if failed else None
+            row, picture, depth = last.row, replace(picture, lost=lost), last.depth
+        return SettledSolve(request.steady, None, None, provisional, row, picture, depth, kinematics, reason)
     fields = fields_of(prediction)
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
@@ -192,24 +194,24 @@ def _solve_settled(
 
 def _greatest_effect(prediction: Prediction) -> str:
     """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
-    sizes = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
-    name = max(sizes, key=lambda one: sizes[one], default="")
-    return name and f"{name} {percent(sizes[name])} of the SED"
+    effects = ((effect["estimate"], name) for name, effect in prediction.model["left_out"].items())
+    size, name = max((pair for pair in effects if pair[0] is not None), default=(0.0, ""))
+    return name and f"{name} {percent(size)} of the SED"
 
 
-def place_of_greatest_shortening(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:
+def place_of_greatest_shortening(undeformed: Array, deformed: Array, faces: Indices) -> tuple[float, float]:
     """Return the middle (x, y) [mm] of the face that is shortened most in any direction.
 
-    `rest` and `moved` are nodes (n, 2) before and after, `faces` (f, 4); each is taken to stretch as its diagonals do.
+    `undeformed` and `deformed` are nodes (n, 2), `faces` (f, 4); each face is taken to stretch as its diagonals do.
 
     >>> square = np.array([[0.0, 0.0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]])
     >>> pressed = square * [1.0, 0.5] + [[0, 0], [0, 0], [-0.8, 0]] * 2
     >>> place_of_greatest_shortening(square, pressed, np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))
     (1.1, 0.25)
     """
-    before, after = (np.stack([at[:, 2] - at[:, 0], at[:, 3] - at[:, 1]], axis=2) for at in (rest[faces], moved[faces]))
-    stretches = np.linalg.svd(after @ np.linalg.inv(before), compute_uv=False)  # the least last
-    x, y = moved[faces[int(np.argmin(stretches[:, -1]))]].mean(axis=0).tolist()
+    new, old = (np.moveaxis(nodes[faces[:, 2:]] - nodes[faces[:, :2]], 1, 2) for nodes in (deformed, undeformed))
+    stretches = np.linalg.svd(new @ np.linalg.inv(old), compute_uv=False)  # the least last
+    x, y = deformed[faces[int(np.argmin(stretches[:, -1]))]].mean(axis=0).tolist()
     return x, y
 
 

@@ -1,6 +1,6 @@
 """The live model's words: measured forces in, the SED and a picture out, and what is said of them. No solver."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live
 from daq_app.window.live_trace import LiveTrace
-from daq_app.wording import errors_words, tr, tr_noop
+from daq_app.wording import errors_text, tr, tr_noop
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.strokes import FrictionParameters
 from sessions.strokes.forces import in_face_frame
@@ -135,61 +135,60 @@ def forces_of(live: Live, frame: Frame) -> Forces | None:
 
 def join_forces(batches: list[Forces]) -> Forces:
     """Return several batches of one stream as one."""
-    time, normal, pull = (np.concatenate([getattr(b, name) for b in batches]) for name in ("time", "normal", "pull"))
-    return Forces(time, normal, pull, batches[-1].received_ns, batches[-1].stream)
+    arrays = {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in ("time", "normal", "pull")}
+    return replace(batches[-1], **arrays)
 
 
 @dataclass(frozen=True, slots=True)
-class ModelWords:
+class ModelText:
     """A line over the picture."""
 
-    words: str
+    text: str
     state: Literal["none", "provisional", "instead", "beyond", "failed", "settled"]
 
 
-def model_words(
+def model_text(
     provisional: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
-) -> ModelWords:
+) -> ModelText:
     """Return what is said of the picture that is shown; where the transducer is `silent`, nothing is measured now."""
     if problem:
-        return ModelWords(tr("No live model: {problem}.", problem=problem), "none")
+        return ModelText(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:
-        return ModelWords(_settled_words(settled), "failed" if settled.sed is None else "settled")
+        return ModelText(_settled_text(settled), "failed" if settled.sed is None else "settled")
     if silent:
-        return ModelWords(tr("Nothing is measured that the model could follow."), "none")
+        return ModelText(tr("Nothing is measured that the model could follow."), "none")
     if provisional is None:
-        return ModelWords(tr("The live model is starting."), "none")
+        return ModelText(tr("The live model is starting."), "none")
     if provisional.beyond:
-        return ModelWords(tr("These forces are beyond the reach of the model."), "beyond")
+        return ModelText(tr("These forces are beyond the reach of the model."), "beyond")
     if provisional.sed[-1] <= 0.0:
-        words = tr("Model at {kinematics}: nothing touches.", kinematics=tr(_KINEMATICS[provisional.kinematics]))
-        return ModelWords(words, "none")
+        text = tr("Model at {kinematics}: nothing touches.", kinematics=tr(_KINEMATICS[provisional.kinematics]))
+        return ModelText(text, "none")
     start = tr(
         "PROVISIONAL  SED {kpa}{errors} · at the measured force, {depth:.1f} mm deep · ",
-        kpa=_kpa(float(provisional.sed[-1])), errors=errors_words(None), depth=provisional.depth,
+        kpa=_kpa(float(provisional.sed[-1])), errors=errors_text(None), depth=provisional.depth,
     )  # fmt: skip
     if provisional.instead[-1]:
-        words = tr("{known}small strain: these forces are beyond the reach of finite strain", known=start)
-        return ModelWords(words, "instead")
-    return ModelWords(start + tr(_KINEMATICS[provisional.kinematics]), "provisional")
+        text = tr("{known}small strain: these forces are beyond the reach of finite strain", known=start)
+        return ModelText(text, "instead")
+    return ModelText(start + tr(_KINEMATICS[provisional.kinematics]), "provisional")
 
 
-def _settled_words(settled: SettledSolve) -> str:
+def _settled_text(settled: SettledSolve) -> str:
     live = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
-    how, picture, depth = tr(_KINEMATICS[settled.kinematics]), settled.picture, settled.depth
+    strain, picture, depth = tr(_KINEMATICS[settled.kinematics]), settled.picture, settled.depth
     if settled.sed is None:
         lost = picture is not None and picture.lost is not None
         note = tr("; ⊗ marks its most squeezed tissue") if lost else ""
         last = tr_noop(" Shown is the last state that was followed, {depth:.1f} mm deep{marked}.")
         last_state = "" if depth is None else tr(last, depth=depth, marked=note)
-        return tr(
-            "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=live, reason=settled.reason, kept=last_state
-        )
-    if (by := settled.difference) is not None:
-        live += f" ({100 * by:+.1f} %)".replace("-", "−")
+        form = tr_noop("No full solve at {how}{shown}. {reason}{kept}")
+        return tr(form, how=strain, shown=live, reason=settled.reason, kept=last_state)
+    if (difference := settled.difference) is not None:
+        live += f" ({100 * difference:+.1f} %)".replace("-", "−")
     return tr(
         "Full solve  SED {kpa}{errors} · at the measured force, {how}{shown}",
-        kpa=_kpa(settled.sed), errors=errors_words(settled.error, settled.effect), how=how, shown=live,
+        kpa=_kpa(settled.sed), errors=errors_text(settled.error, settled.effect), how=strain, shown=live,
     )  # fmt: skip
 
 

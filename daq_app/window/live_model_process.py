@@ -38,12 +38,12 @@ def run(connection: Connection) -> None:
     follower: Follower | None = None
     lock = threading.Lock()
 
-    def say(message: Ready | Provisional | SettledSolve) -> None:
+    def send(message: Ready | Provisional | SettledSolve) -> None:
         with lock, suppress(OSError):  # a window that is gone is noticed below
             connection.send(message)
 
     def solve(solver: Callable[[], SettledSolve]) -> None:
-        say(solver())
+        send(solver())
 
     with suppress(EOFError, OSError):
         while True:
@@ -55,14 +55,14 @@ def run(connection: Connection) -> None:
                         problem = ""
                     except (SceneError, MeshError) as error:
                         follower, problem = None, str(error)
-                    say(Ready(problem))
+                    send(Ready(problem))
                 case Forces() as forces if follower is not None:
-                    say(follower.take(forces))
+                    send(follower.take(forces))
                 case Settle() as request:
                     if follower is not None:  # beside the next stroke, which is followed meanwhile
                         threading.Thread(target=solve, args=(follower.settled_solver(request),), daemon=True).start()
                 case _:
-                    say(Ready(tr("no finger to follow")))
+                    send(Ready(tr("no finger to follow")))
 
 
 class LiveModel:

@@ -38,7 +38,7 @@ class LiveTrace:
         self._capacity = int(self.rate * _LONGEST * 1.05) + 16
         self._time = np.full(2 * self._capacity, np.nan)
         self._values = np.full((channels, 2 * self._capacity), np.nan, np.float32)
-        self._end = 0  # one behind the newest; the ring is written from left to right and moved when full
+        self._stop = 0  # one behind the newest; the ring is written from left to right and moved when full
         self._start = 0
         self._full = False  # whether readings were dropped for newer ones
         self._columns = self._no_columns()
@@ -46,24 +46,24 @@ class LiveTrace:
     def add(self, time: Array, values: Array) -> None:
         """Take readings: time (n,) [s, device time, rising] and values (channels, n)."""
         n = len(time)
-        self._full |= self._end - self._start + n > self._capacity
+        self._full |= self._stop - self._start + n > self._capacity
         if n > self._capacity:
             time, values, n = time[-self._capacity :], values[:, -self._capacity :], self._capacity
-        if self._end + n > len(self._time):
-            rest = min(self._end - self._start, self._capacity - n)
-            source = slice(self._end - rest, self._end)
-            self._time[:rest] = self._time[source].copy()
-            self._values[:, :rest] = self._values[:, source].copy()
-            self._start, self._end = 0, rest
-        self._time[self._end : self._end + n] = time
-        self._values[:, self._end : self._end + n] = values
-        self._end += n
-        self._start = max(self._start, self._end - self._capacity)
+        if self._stop + n > len(self._time):
+            kept_count = min(self._stop - self._start, self._capacity - n)
+            source = slice(self._stop - kept_count, self._stop)
+            self._time[:kept_count] = self._time[source].copy()
+            self._values[:, :kept_count] = self._values[:, source].copy()
+            self._start, self._stop = 0, kept_count
+        self._time[self._stop : self._stop + n] = time
+        self._values[:, self._stop : self._stop + n] = values
+        self._stop += n
+        self._start = max(self._start, self._stop - self._capacity)
 
     @property
     def newest(self) -> float | None:
         """Return the time of the newest reading [s]; None before the first."""
-        return float(self._time[self._end - 1]) if self._end > self._start else None
+        return float(self._time[self._stop - 1]) if self._stop > self._start else None
 
     def holds(self, first: float) -> bool:
         """Return whether no reading since `first` [s] was dropped for a newer one."""
@@ -71,15 +71,15 @@ class LiveTrace:
 
     def clear(self) -> None:
         """Forget every reading, as at a new connection."""
-        self._start = self._end = 0
+        self._start = self._stop = 0
         self._full = False
         self._columns = self._no_columns()
 
     def between(self, first: float, last: float, every: int = 1) -> tuple[Array, Array]:
         """Return time (n,) [s] and values (channels, n) from `first` to `last` [s]: each `every`, and the newest."""
-        a, b = self._positions(first, last)
-        at = slice(a + (b - a - 1) % every if b > a else a, b, every)
-        return self._time[at], self._values[:, at].astype(np.float64)
+        start, stop = self._positions(first, last)
+        rows = slice(start + (stop - start - 1) % every if stop > start else start, stop, every)
+        return self._time[rows], self._values[:, rows].astype(np.float64)
 
     def columns(self, first: float, last: float, count: int) -> Columns:
         """Return about `count` columns of the readings from `first` to `last` [s]; few readings one by one.
@@ -87,24 +87,24 @@ class LiveTrace:
         Columns lie at whole multiples of their width from time 0, so that a picture that moves on does not shimmer, and
         only those that are new since the last call are made: a frame costs the same however long the stretch is.
         """
-        a, b = self._positions(first, last)
-        if b - a <= 2 * count:
-            time, values = self._time[a:b].copy(), self._values[:, a:b].astype(np.float64)
+        start, stop = self._positions(first, last)
+        if stop - start <= 2 * count:
+            time, values = self._time[start:stop].copy(), self._values[:, start:stop].astype(np.float64)
             return Columns(*with_gaps(time, values, np.flatnonzero(np.diff(time) > self._gap) + 1))
         width = (last - first) / count
         if self._columns.width != width or self._columns.first > first:
             self._columns = self._no_columns(width, first)
         begin, _ = self._positions(self._columns.open_from, last)
-        self._columns = self._columns.onward(self._time[begin:b], self._values[:, begin:b], first)
+        self._columns = self._columns.advance(self._time[begin:stop], self._values[:, begin:stop], first)
         return self._columns.envelope(self._gap)
 
     def _no_columns(self, width: float = 0.0, first: float = 0.0) -> "_Columns":
         return _Columns(width, first, np.empty(0, np.int64), np.empty((len(self._values), 0), np.float32))
 
     def _positions(self, first: float, last: float) -> tuple[int, int]:
-        times = self._time[self._start : self._end]
-        a, b = np.searchsorted(times, [first, last], side="left")
-        return self._start + int(a), self._start + int(b)
+        times = self._time[self._start : self._stop]
+        start, stop = np.searchsorted(times, [first, last], side="left")
+        return self._start + int(start), self._start + int(stop)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,20 +121,20 @@ class _Columns:
         """From which time on readings are needed [s]."""
         return float(self.numbers[-1]) * self.width if len(self.numbers) else self.first
 
-    def onward(self, time: Array, values: NDArray[np.float32], first: float) -> "_Columns":
+    def advance(self, time: Array, values: NDArray[np.float32], first: float) -> "_Columns":
         """Return the columns with the readings since `open_from`, without those before `first` [s]."""
         column = np.floor(time / self.width).astype(np.int64)
         starts = np.flatnonzero(np.diff(column, prepend=-1) > 0)
         keep = slice(int(np.searchsorted(self.numbers, first // self.width)), max(len(self.numbers) - 1, 0))
-        old = self.pairs[:, 2 * keep.start : 2 * keep.stop] if keep.stop > keep.start else self.pairs[:, :0]
+        earlier = self.pairs[:, 2 * keep.start : 2 * keep.stop] if keep.stop > keep.start else self.pairs[:, :0]
         numbers = np.concatenate([self.numbers[keep], column[starts]])
-        return _Columns(self.width, first, numbers, np.hstack([old, _pairs(values, starts)]))
+        return _Columns(self.width, first, numbers, np.hstack([earlier, _pairs(values, starts)]))
 
     def envelope(self, gap: float) -> Columns:
         """Return the least and the greatest value of each column, with gaps where readings are missing."""
         behind = np.flatnonzero(np.diff(self.numbers) > 1 + gap / self.width)
-        at = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
-        return Columns(*with_gaps(at, self.pairs.astype(np.float64), 2 * (behind + 1)))
+        times = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
+        return Columns(*with_gaps(times, self.pairs.astype(np.float64), 2 * (behind + 1)))
 
 
 def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -144,19 +144,19 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
         return pairs
     least = np.fmin.reduceat(values, starts, axis=1)
     greatest = np.fmax.reduceat(values, starts, axis=1)
-    ends = np.append(starts[1:], values.shape[1]) - 1
-    rising = values[:, ends] >= values[:, starts]
+    stops = np.append(starts[1:], values.shape[1]) - 1
+    rising = values[:, stops] >= values[:, starts]
     pairs[:, 0::2] = np.where(rising, least, greatest)
     pairs[:, 1::2] = np.where(rising, greatest, least)
     return pairs
 
 
-def with_gaps(time: Array, values: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return times (n,) and values (channels, n) with a nan before the places `at`: a line there is no reading."""
-    if not len(at):
+def with_gaps(time: Array, values: Array, gaps: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return times (n,) and values (channels, n) with a nan before the places `gaps`: a line there is no reading."""
+    if not len(gaps):
         return time, values
-    times: Array = np.insert(time, at, time[at])
-    return times, np.insert(values, at, np.nan, axis=1)
+    times: Array = np.insert(time, gaps, time[gaps])
+    return times, np.insert(values, gaps, np.nan, axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +203,7 @@ def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
     """
     values: list[float] = []
     for value in (high, 0.0, low, high / 2, low / 2):  # the more informative first
-        apart = min((abs(value - other) for other in values), default=np.inf)
+        apart = min((abs(value - placed_value) for placed_value in values), default=np.inf)
         if low <= value <= high and apart * room >= high - low:
             values.append(value)
     return tuple(sorted(values))

@@ -69,7 +69,7 @@ class Enrolment:
     """What the study that a form names says of its subject."""
 
     protocol: str  # the study's own, which holds for all its sessions
-    words: str
+    sentence: str
     may_enrol: bool = False  # the subject is a code that nobody in the study has borne
     enrolled: bool = False  # the subject's session can begin
 
@@ -79,7 +79,7 @@ class UnfinishedSession:
     """A session that was cut short and can go on."""
 
     folder: Path
-    words: str
+    description: str
 
 
 def bench_of(bench: BenchState) -> Bench:
@@ -109,14 +109,14 @@ def check_form(
     if wrong := _refusals(form, bench):
         return wrong
     phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
-    phases: list[Phase] = [phase for phase, on in phases_wanted.items() if on]
+    phases: list[Phase] = [phase for phase, included in phases_wanted.items() if included]
     frame, area = (bench.frame, _number(form.area)) if form.forces else (None, None)
     setting = VisitSetting(frame, area, form.stroking_hand, form.answering_hand, form.language or None)
     try:
-        session_protocol, seed, body, place = _choose_protocol(form, new_seed)
+        session_protocol, seed, body, study_place = _choose_protocol(form, new_seed)
         session_plan = plan(
             session_protocol, form.subject.strip(), seed, forces=form.forces, setting=setting,
-            phases=phases if len(phases) > 1 else None, body=body, place=place,
+            phases=phases if len(phases) > 1 else None, body=body, place=study_place,
         )  # fmt: skip
     except StudyError as error:
         return Refusal({"subject": _sentence(error)})
@@ -128,15 +128,15 @@ def check_form(
     if form.forces and form.normal in SIGNED_AXES:
         session_plan = replace(session_plan, frame=replace(session_plan.frame, normal=form.normal, normal_origin="set"))
     # In a study the folder's name tells what the visit is for: the protocol is the same in all.
-    what = session_plan.protocol if place is None else "forces" if session_plan.forces else "scores"
+    purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)
-    folder = parent / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
+    folder = parent / f"{form.subject.strip()}_{purpose}_{now.strftime('%Y%m%dT%H%M%S')}"
     hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
     people = People("simulated people" if form.simulated else hand, seed, session_protocol.simulated_friction)
-    own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
+    page_settings = [Setting("seed", seed, "", "set" if form.seed.strip() and study_place is None else "default")]
     if form.study.strip() and not form.pilot:
-        own.append(Setting("study", form.study.strip(), "", "set"))
-    return StartSession(session_plan, str(folder), people, (*own, *settings))
+        page_settings.append(Setting("study", form.study.strip(), "", "set"))
+    return StartSession(session_plan, str(folder), people, (*page_settings, *settings))
 
 
 def refusals(form: SessionForm, bench: Bench) -> Refusal:
@@ -151,7 +151,7 @@ def refusals(form: SessionForm, bench: Bench) -> Refusal:
         except (SettingsError, OSError) as error:
             wrong["protocol"] = _sentence(error)
     elif not record.enrolled:
-        wrong.setdefault("subject" if record.protocol else "study", record.words)
+        wrong.setdefault("subject" if record.protocol else "study", record.sentence)
     if wrong:
         return wrong
     session = check_form(form, bench, datetime.now(), 0)
@@ -197,18 +197,18 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     if not is_code(subject.strip()):
         return Enrolment(name, tr("A study of protocol {name}: give the code of one of its subjects.", name=name))
     if subject not in study.members:
-        words = tr("{subject} is not enrolled in this study ({name}) yet.", subject=subject, name=name)
-        return Enrolment(name, words, may_enrol=True)
+        sentence_text = tr("{subject} is not enrolled in this study ({name}) yet.", subject=subject, name=name)
+        return Enrolment(name, sentence_text, may_enrol=True)
     try:
         member = study.member(subject)
     except StudyError as error:
         return Enrolment(name, _sentence(error))
     remark = "" if study.key_sha256 is None or study.unblinded else tr("; blinded: codes alone are shown")
-    words = tr(
+    sentence_text = tr(
         "{subject} is enrolled: protocol {name}, row {row}{blinded}.",
         subject=subject, name=name, row=study.row(member.slot), blinded=remark,
     )  # fmt: skip
-    return Enrolment(name, words, enrolled=True)
+    return Enrolment(name, sentence_text, enrolled=True)
 
 
 def enrol_subject(form: SessionForm) -> str:
@@ -260,28 +260,28 @@ def _protocol(form: SessionForm) -> Protocol:
 def unfinished_sessions(folder: Path) -> tuple[UnfinishedSession, ...]:
     """Return the sessions below a folder (or a study in it) that were cut short and can go on, the newest first."""
     unfinished: list[UnfinishedSession] = []
-    places: dict[Path, float] = {}
+    modified: dict[Path, float] = {}
     with suppress(OSError):  # a folder that cannot be read, or that goes meanwhile
-        for place in (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")):
-            places[place] = place.stat().st_mtime
-    for place in sorted(places, key=lambda place: -places[place]):
+        for file in (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")):
+            modified[file] = file.stat().st_mtime
+    for file in sorted(modified, key=lambda file: -modified[file]):
         if len(unfinished) == _LONGEST_LIST:
             break
         try:
-            if is_sealed(place.parent) or is_in_use(place):
+            if is_sealed(file.parent) or is_in_use(file):
                 continue
-            recording = Recording.open(place.parent)
+            recording = Recording.open(file.parent)
             check_resumable(recording)
         except (RecordingError, OSError):
             continue
         subject, trials = recording.plan.subject, recording.trials
         number = sum(record.outcome not in ("open", "skipped") for record in trials)
         start = _local_time(recording.provenance.get("created_utc"))
-        words = tr(
+        description = tr(
             "{subject}, {begun}: trials done {done} of {count}",
             subject=subject, begun=start, done=number, count=len(trials),
         )  # fmt: skip
-        unfinished.append(UnfinishedSession(place.parent, words))
+        unfinished.append(UnfinishedSession(file.parent, description))
     return tuple(unfinished)
 
 
@@ -328,16 +328,16 @@ def _refusals(form: SessionForm, bench: Bench) -> Refusal:
     return wrong
 
 
-def _why_unusable(place: Path) -> str:
+def _why_unusable(folder: Path) -> str:
     """Return why no session can be kept below a folder, "" where it can."""
     try:
-        nearest = next((p for p in (place, *place.parents) if p.exists()), place)
+        nearest = next((path for path in (folder, *folder.parents) if path.exists()), folder)
         if not nearest.is_dir():
             return tr("{place} is a file: choose a folder.", place=nearest)
     except OSError as error:
         return _sentence(error)
-    if str(place).startswith("~") or not os.access(nearest, os.W_OK):
-        return tr("Nothing can be written in {place}: choose another folder.", place=place)
+    if str(folder).startswith("~") or not os.access(nearest, os.W_OK):
+        return tr("Nothing can be written in {place}: choose another folder.", place=folder)
     return ""
 
 

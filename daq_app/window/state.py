@@ -120,8 +120,8 @@ def _fold_link(bench: BenchState, message: Message) -> BenchState:
         case m.LinkBack(same=True):
             return replace(bench, link="open", problem=None)
         case m.LinkBack(info):
-            words = tr("another transducer answers now, with serial number {serial}", serial=info.serial)
-            return replace(bench, link="lost", problem=words)
+            problem = tr("another transducer answers now, with serial number {serial}", serial=info.serial)
+            return replace(bench, link="lost", problem=problem)
         case m.SessionEnded(end=end) if end.cause == "device":
             return replace(bench, link="lost", problem=end.reason)
         case m.Gone(requested=False):
@@ -198,7 +198,7 @@ def _fold_window(state: AppState, message: Message) -> AppState:
             return replace(state, session=begin_session(message, state.now), failure=None)
         case m.StartSession() | m.ResumeSession():
             return replace(state, failure=None)
-        case NewSession() if state.session is not None and state.session.over:
+        case NewSession() if state.session is not None and state.session.is_over:
             return replace(state, session=None)
         case m.Failed():
             return replace(state, failure=message)

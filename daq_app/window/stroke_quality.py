@@ -98,9 +98,9 @@ def _fell(stroke: Stroke) -> float | None:
 class Judge:
     """Watches the takes that pass, and says of each stroke how good it was."""
 
-    def __init__(self, say: Callable[[Judged | DrawingFailed], None]) -> None:
-        """Tell by `say`, from another thread."""
-        self._say = say
+    def __init__(self, send: Callable[[Judged | DrawingFailed], None]) -> None:
+        """Tell by `send`, from another thread."""
+        self._send = send
         self._worker: ProcessPoolExecutor | None = None
         self._take: tuple[int, int] | None = None  # trial and take in hand
         self._offset = 0.0  # of the times in the log to those of the stream [s]
@@ -144,16 +144,16 @@ class Judge:
         if session is None or info is None or self._take is None:
             return
         number, take = self._take
-        trial = session.of(number)
+        trial = session.trial_state(number)
         block = feed.take()
         if trial is None or not len(block):
             return
-        words = block, session.plan, in_newtons(info), trial.trial
+        arguments = block, session.plan, in_newtons(info), trial.trial
         try:
-            future = self.prepare().submit(stroke_quality, *words)
+            future = self.prepare().submit(stroke_quality, *arguments)
         except BrokenProcessPool:  # it ended while it had nothing to do
             self._worker = None
-            future = self.prepare().submit(stroke_quality, *words)
+            future = self.prepare().submit(stroke_quality, *arguments)
         future.add_done_callback(lambda answer: self._report_quality(number, take, answer))
 
     def _report_quality(self, number: int, take: int, answer: "Future[Quality]") -> None:
@@ -162,9 +162,9 @@ class Judge:
         if error := answer.exception():
             self._worker = None  # the next stroke gets another
             name = type(error).__name__
-            self._say(DrawingFailed(tr("the last stroke was not looked at: {name} {error}", name=name, error=error)))
+            self._send(DrawingFailed(tr("the last stroke was not looked at: {name} {error}", name=name, error=error)))
             return
-        self._say(Judged(number, take, answer.result()))
+        self._send(Judged(number, take, answer.result()))
 
 
 def _warm() -> None:

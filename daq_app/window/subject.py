@@ -141,23 +141,21 @@ def mirror_view(session: SessionState, translate: Translate = str) -> SubjectVie
     """
     plan = session.plan
     hidden = {"forces", *({"trial count"} - set(plan.shown.experimenter))}
-    visibility = replace(plan.shown, subject=tuple(one for one in plan.shown.subject if one not in hidden))
+    visibility = replace(plan.shown, subject=tuple(element for element in plan.shown.subject if element not in hidden))
     return subject_view(replace(session, plan=replace(plan, shown=visibility)), translate)
 
 
 @dataclass(frozen=True, slots=True)
 class _Page:
-    """What a session in hand shows."""
-
     session: SessionState
-    say: Translate
+    translate: Translate
 
     def view(self) -> SubjectView:
         session, visible = self.session, self.session.plan.shown.subject
         phase = "ended" if session.phase == "closing" else session.phase
         match phase:
             case "mounting" | "taring":
-                return self._read(self.say(SubjectText.WAIT), self._notice(self.say(SubjectText.HANDS_OFF)))
+                return self._read(self.translate(SubjectText.WAIT), self._notice(self.translate(SubjectText.HANDS_OFF)))
             case "ready" | "stroking":
                 force = session.plan.forces and "forces" in visible
                 instruction = session.block.instruction if session.block and "instruction" in visible else ""
@@ -166,44 +164,45 @@ class _Page:
                 return self._question()
             case _:
                 title, text = _PLAIN["paused" if session.resumable else phase]
-                return self._read(self.say(title), self.say(text))
+                return self._read(self.translate(title), self.translate(text))
 
     def _read(self, title: str, text: str = "") -> SubjectView:
         return SubjectView("read", title, text, hand=self.session.plan.answering_hand or "right")
 
     def _stroke(self) -> str:
-        trial = self.session.of(self.session.trial)
+        trial = self.session.trial_state(self.session.trial)
         limit = 1 if trial is None else self.session.plan.stroke_limit(trial.trial)
-        return self.say(SubjectText.STROKE) if limit == 1 else self.say(SubjectText.STROKES).format(number=limit)
+        return self.translate(SubjectText.STROKE if limit == 1 else SubjectText.STROKES).format(number=limit)
 
     def _notice(self, to_do: str) -> str:
         """Return the instruction for the finger, and the progress that the protocol shows the subject."""
         session = self.session
-        visible, trial = session.plan.shown.subject, session.of(session.trial)
-        parts = [to_do]
+        visible, trial = session.plan.shown.subject, session.trial_state(session.trial)
+        sentences = [to_do]
         if session.block is not None and session.block.phase == "practice":
-            parts.insert(0, self.say(SubjectText.PRACTICE))
+            sentences.insert(0, self.translate(SubjectText.PRACTICE))
         if trial is not None and "trial count" in visible:
-            parts.append(self.say(SubjectText.COUNT).format(number=trial.trial.number, count=len(session.trials)))
+            number, count = trial.trial.number, len(session.trials)
+            sentences.append(self.translate(SubjectText.COUNT).format(number=number, count=count))
         if trial is not None and "code" in visible:
-            parts.append(self.say(SubjectText.SAMPLE).format(code=trial.trial.stimulus.code))
-        return " ".join(part for part in parts if part)
+            sentences.append(self.translate(SubjectText.SAMPLE).format(code=trial.trial.stimulus.code))
+        return " ".join(sentence for sentence in sentences if sentence)
 
     def _question(self) -> SubjectView:
-        trial, page = self.session.of(self.session.trial), self._read(self.say(SubjectText.WAIT))
+        trial, page = self.session.trial_state(self.session.trial), self._read(self.translate(SubjectText.WAIT))
         if trial is None:
             return page
         # A descriptor is a word of the protocol's own language.
         usual = usual_question(trial.trial.stimulus.descriptor)
-        judge = usual if self.session.plan.language == ENGLISH else self.say(SubjectText.JUDGE)
+        judge = usual if self.session.plan.language == ENGLISH else self.translate(SubjectText.JUDGE)
         page = replace(page, key=(trial.trial.number, trial.takes))
         match self.session.command:
-            case steps.AskScore(_, ends, ticks, question):
-                return replace(page, kind="line", title=question or judge, ends=ends, ticks=ticks)
+            case steps.AskScore(_, end_labels, ticks, question):
+                return replace(page, kind="line", title=question or judge, ends=end_labels, ticks=ticks)
             case steps.AskNumber(_, question):
-                return replace(page, kind="number", title=question or judge, text=self.say(SubjectText.NUMBER))
+                return replace(page, kind="number", title=question or judge, text=self.translate(SubjectText.NUMBER))
             case steps.AskChoice(_, _, question):
-                return replace(page, kind="choice", title=question or self.say(SubjectText.WHICH))
+                return replace(page, kind="choice", title=question or self.translate(SubjectText.WHICH))
             case _:
                 return self._read(page.title)
 
@@ -280,7 +279,7 @@ class Answer:
     positions: tuple[tuple[float, float], ...] = ()  # (session clock [s], 0 to 100)
     corrections: int = 0  # how often an answer that stood was changed
     device: Device | None = None  # that gave the last position
-    down: bool = False  # a finger or button is down
+    pressed: bool = False  # a finger or button is down
 
     @property
     def score(self) -> float | None:
@@ -289,24 +288,24 @@ class Answer:
 
     def press(self, time: float, position: float, device: Device) -> "Answer":
         """Return the answer after a touch or click on the line at `time` [s] and `position` [0 to 100]."""
-        again = self.corrections + bool(self.positions)
-        return replace(self._move(time, position, device), corrections=again, down=True)
+        corrections = self.corrections + bool(self.positions)
+        return replace(self._move(time, position, device), corrections=corrections, pressed=True)
 
     def drag(self, time: float, position: float, device: Device) -> "Answer":
         """Return the answer after a movement of what is held down; it stays one answer, however far that goes."""
-        return self._move(time, position, device) if self.down else self
+        return self._move(time, position, device) if self.pressed else self
 
     def release(self) -> "Answer":
         """Return the answer after the release of finger or button."""
-        return replace(self, down=False)
+        return replace(self, pressed=False)
 
-    def step(self, time: float, by: float) -> "Answer":
-        """Return the answer after a key moved the mark by `by`; the first key puts the mark in the middle."""
+    def step(self, time: float, step: float) -> "Answer":
+        """Return the answer after a key moved the mark by `step`; the first key puts the mark in the middle."""
         if not self.positions:
             return self._move(time, _MIDDLE, "keyboard")
-        last, before = self.positions[-1]
-        again = self.corrections + (time - last > PAUSE or self.device != "keyboard")
-        return replace(self._move(time, before + by, "keyboard"), corrections=again)
+        last, position = self.positions[-1]
+        corrections = self.corrections + (time - last > PAUSE or self.device != "keyboard")
+        return replace(self._move(time, position + step, "keyboard"), corrections=corrections)
 
     def judgement(self, hand: Hand | None) -> Scored:
         """Return the answer as the event that a session records."""
@@ -314,10 +313,10 @@ class Answer:
         return Scored(self.score, self.positions, first, self.corrections, hand, self.device)
 
     def _move(self, time: float, position: float, device: Device) -> "Answer":
-        place = min(max(position, 0.0), 100.0)
-        if self.positions and self.positions[-1][1] == place:
+        position = min(max(position, 0.0), 100.0)
+        if self.positions and self.positions[-1][1] == position:
             return replace(self, device=device)
-        return replace(self, positions=(*self.positions, (time, place)), device=device)
+        return replace(self, positions=(*self.positions, (time, position)), device=device)
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,8 +330,8 @@ class Choice:
 
     def choose(self, time: float, value: Which, device: Device) -> "Choice":
         """Return the answer after the choice of one of two at `time` [s]."""
-        again = self.corrections + (self.value not in (None, value))
-        return Choice(value, self._first(time), again, device)
+        corrections = self.corrections + (self.value not in (None, value))
+        return Choice(value, self._first(time), corrections, device)
 
     def type_number(self, time: float, number: float | None) -> "Choice":
         """Return the answer after another number stands in the field at `time` [s]; it counts above 0 only.

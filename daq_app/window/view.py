@@ -11,13 +11,13 @@ from daq_app.window.live_feed import LOADS
 from daq_app.window.state import AppState, BenchState, Dismissed, Message
 from daq_app.window.subject import SubjectView, Translate, mirror_view, subject_view
 from daq_app.window.view_course import CourseView, course_view
-from daq_app.wording import COUNT_WORDS, number, quantity, sentence, tr, tr_noop
+from daq_app.wording import COUNT_LABELS, number, quantity, sentence, tr, tr_noop
 from drivers.calibration_file import AXES
 from drivers.transducer import TransducerInfo
 
 HEALTH_NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 _UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
-COUNTERS = tuple(name for name in COUNT_WORDS if name not in ("received", "off_rate"))  # the rate has its own sentence
+COUNTERS = tuple(name for name in COUNT_LABELS if name not in ("received", "off_rate"))  # the rate has its own sentence
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
@@ -59,7 +59,7 @@ class Bar:
     name: str
     share: float | None  # now; 1 is the rated load; None where no range is stated
     peak: float | None  # since somebody acknowledged
-    over: bool
+    overloaded: bool
     noise: str  # standard deviation with its unit; a dash where no zero was measured
 
 
@@ -68,7 +68,7 @@ class BenchView:
     """Everything about the bench."""
 
     lamp: Literal["off", "well", "look", "wrong"]
-    lamp_words: str
+    lamp_text: str
     name: str
     serial: str
     calibration: str
@@ -82,7 +82,7 @@ class BenchView:
     life: tuple[tuple[str, str], ...]  # of its serial number
     devices: tuple[tuple[str, str], ...]  # address and words of each that can be connected
     searching: bool
-    search_words: str  # what a search came to; empty before the first
+    search_text: str  # what a search came to; empty before the first
     uri: str
     connect: Message | None  # what Disconnect or Connect would send; None while neither is possible
     can_tare: bool
@@ -92,28 +92,28 @@ class BenchView:
 def bench_summary(view: BenchView) -> str:
     """Return what the card of the transducer says: which it is, its zero, noise and life."""
     if view.lamp == "off":
-        return f"{view.name}: {view.lamp_words}."
+        return f"{view.name}: {view.lamp_text}."
     zero = tr("Zero: {zero}.", zero=view.tare.rsplit("\n", 1)[-1])
     life = ", ".join(f"{tr(name)} {text}" for name, text in view.life if text != "–") or "–"
     noise = tr("Noise: {noise}.", noise=view.noise)
-    return "\n".join((f"{view.name}: {view.lamp_words}.", zero, noise, tr("Life: {life}.", life=life)))
+    return "\n".join((f"{view.name}: {view.lamp_text}.", zero, noise, tr("Life: {life}.", life=life)))
 
 
 def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> BenchView:
     """Return what is shown of the bench; `recording` keeps it connected. It was `unheard` for so long [s]."""
     info = bench.info
-    lamp, words = _bench_lamp(bench, recording=recording)
+    lamp, lamp_text = _bench_lamp(bench, recording=recording)
     counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"
     open_now = bench.link == "open"
     return BenchView(
         lamp=lamp,
-        lamp_words=words,
+        lamp_text=lamp_text,
         name=tr("no transducer") if info is None else info.model,
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
         silent=bench.link != "open" or _is_silent(bench) or unheard > SILENT,
-        counters=(*((COUNT_WORDS[name], f"{counts[name]}") for name in ("received", *COUNTERS)), ("lag", lag)),
+        counters=(*((COUNT_LABELS[name], f"{counts[name]}") for name in ("received", *COUNTERS)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
         drift=_drift(bench),
@@ -121,15 +121,15 @@ def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> B
         life=life_rows(info, bench.life),
         devices=_devices(bench),
         searching=bench.searching,
-        search_words=_search_words(bench),
+        search_text=_search_text(bench),
         uri=bench.uri,
         connect=m.Disconnect() if open_now and not recording else None,
         can_tare=open_now and not recording and not bench.taring,
-        can_acknowledge=bool(bench.peak.over or bench.saturated),
+        can_acknowledge=bool(bench.peak.overloads or bench.saturated),
     )
 
 
-def _search_words(bench: BenchState) -> str:
+def _search_text(bench: BenchState) -> str:
     if bench.searching:
         return tr("Looking for transducers.")
     if not bench.searched:
@@ -151,12 +151,12 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
             pass
     if _is_silent(bench):
         return "wrong" if recording else "look", tr("no readings for {age:.0f} s", age=bench.silence)
-    if bench.peak.over:
+    if bench.peak.overloads:
         return "wrong", tr("overloaded")
     if bench.saturated:
         flags = ", ".join(bench.health.flagged)
         return "wrong", tr("invalid readings: {said}", said=flags) if flags else tr("invalid readings")
-    if near := bench.peak.near:
+    if near := bench.peak.near_limits:
         return "look", tr("near the rated load: {axes}", axes=", ".join(tr(axis) for axis in near))
     return _losses(bench)
 
@@ -164,7 +164,7 @@ def _bench_lamp(bench: BenchState, *, recording: bool) -> tuple[Literal["off", "
 def _losses(bench: BenchState) -> tuple[Literal["well", "look"], str]:
     """Return what was counted of the stream, in words."""
     counts = asdict(bench.health)
-    troubles = [f"{counts[name]} {tr(COUNT_WORDS[name])}" for name in COUNTERS if counts[name]]
+    troubles = [f"{counts[name]} {tr(COUNT_LABELS[name])}" for name in COUNTERS if counts[name]]
     rate = [bench.health.rate_words] if bench.health.off_rate else []
     if troubles := [*troubles, *bench.health.flagged, *rate]:
         return "look", ", ".join(troubles)
@@ -185,10 +185,10 @@ def _rate(bench: BenchState) -> str:
 
 
 def _bars(bench: BenchState) -> tuple[Bar, ...]:
-    over = set(bench.peak.over)
-    noise = ["–"] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, _UNITS, strict=True)]
+    overloads = set(bench.peak.overloads)
+    noise = ["–"] * 6 if bench.zero is None else [*map(_noise, bench.zero.noise, _UNITS)]
     rows = zip(LOADS, bench.load.shares, bench.peak.shares, (*noise, ""), strict=True)
-    return tuple(Bar(name, _share(now), _share(peak), name in over, text) for name, now, peak, text in rows)
+    return tuple(Bar(name, _share(now), _share(peak), name in overloads, text) for name, now, peak, text in rows)
 
 
 def _share(value: float) -> float | None:
@@ -224,7 +224,7 @@ def _drift(bench: BenchState) -> str:
         return "–"
     if bench.zero is bench.first_zero:
         return tr("first zero")
-    drift = max(abs(a - b) for a, b in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
+    drift = max(abs(zero - first) for zero, first in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
     return tr("{moved} since the first", moved=quantity(1000 * drift, 0, "mN"))
 
 
@@ -242,7 +242,7 @@ class Lamp:
     """Whether what happens is being written down; fed by the store's acknowledgement alone."""
 
     grade: Literal["off", "on", "wrong"]
-    words: str
+    text: str
     age: str  # how old the last acknowledged thing is; empty where there is no session
 
 
@@ -285,7 +285,7 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
         lamp=_lamp(state),
         banner=_banner(state),
         course=None if session is None else course_view(session, state.bench, state.now),
-        bench=bench_view(state.bench, recording=session is not None and not session.over, unheard=_unheard(state)),
+        bench=bench_view(state.bench, recording=session is not None and not session.is_over, unheard=_unheard(state)),
         subject=subject_view(session, translate, state.language),
         mirror=None if session is None else mirror_view(session, translate),
     )
@@ -308,40 +308,40 @@ def _lamp(state: AppState) -> Lamp:
     if session.saved_at is None:
         return Lamp("off", tr("starting {running}", running=running), tr("not saved yet"))
     age = state.now - session.saved_at
-    words = tr("saved {age:.1f} s ago", age=age)
+    saved_text = tr("saved {age:.1f} s ago", age=age)
     if age > UNSAVED or state.exit_reason is not None:
-        return Lamp("wrong", tr("NOT RECORDING {running}", running=running), words)
-    return Lamp("on", tr("recording {running}", running=running), words)
+        return Lamp("wrong", tr("NOT RECORDING {running}", running=running), saved_text)
+    return Lamp("on", tr("recording {running}", running=running), saved_text)
 
 
 def _banner(state: AppState) -> Banner | None:
     """Return the worst that is to be said; one at a time."""
     session, bench = state.session, state.bench
-    running = session is not None and not session.over
-    if session is not None and (words := _cut_short(state, session)):
-        again = m.ResumeSession(session.folder) if session.resumable else None
-        return Banner("wrong", words, tr("Resume session") if again else "", again)
+    running = session is not None and not session.is_over
+    if session is not None and (sentence_text := _cut_short(state, session)):
+        resume = m.ResumeSession(session.folder) if session.resumable else None
+        return Banner("wrong", sentence_text, tr("Resume session") if resume else "", resume)
     if state.exit_reason is not None and session is not None and session.sealing == "cut short":
-        words = tr(
+        sentence_text = tr(
             "The recorder has ended while it sealed. Everything is kept: 'daq-app resume --end {folder}' seals it.",
             folder=session.folder,
         )
-        return Banner("wrong", words)
+        return Banner("wrong", sentence_text)
     if state.exit_reason is not None:
         return Banner("wrong", sentence(state.exit_reason))
-    if words := _no_readings(bench, running=running):
-        return Banner("wrong", words)
+    if sentence_text := _no_readings(bench, running=running):
+        return Banner("wrong", sentence_text)
     if running and (age := _unheard(state)) > SILENT:
         return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=age))
-    if over := bench.peak.over:
-        axes = ", ".join(tr(axis) for axis in over)
-        words = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
-        return Banner("wrong", words, tr("Acknowledge"), m.AcknowledgeOverloads())
+    if overloads := bench.peak.overloads:
+        axes = ", ".join(tr(axis) for axis in overloads)
+        warning = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
+        return Banner("wrong", warning, tr("Acknowledge"), m.AcknowledgeOverloads())
     if state.failure is not None:
         return Banner("look", sentence(state.failure.sentence), tr("Dismiss"), Dismissed())
     if state.drawing_error is not None:
-        words = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing_error)
-        return Banner("look", words, tr("Dismiss"), Dismissed())
+        warning = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing_error)
+        return Banner("look", warning, tr("Dismiss"), Dismissed())
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
     return None
@@ -354,29 +354,29 @@ def _no_readings(bench: BenchState, *, running: bool) -> str:
         problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # which the banner says itself
         return tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost)
     if running and _is_silent(bench):
-        words = tr("No readings for {age:.0f} s: check power and cable of the transducer.", age=bench.silence)
-        return words + tr(" What came before is kept.")
+        text = tr("No readings for {age:.0f} s: check power and cable of the transducer.", age=bench.silence)
+        return text + tr(" What came before is kept.")
     return ""
 
 
 def _cut_short(state: AppState, session: SessionState) -> str:
     """Return why a session ended before its time; empty where it ended as somebody wished, or is being taken up."""
-    end, bench, rest = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
+    end, bench, safe = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
     if session.phase == "resuming":
         return ""
     if session.resumable and state.failure is not None and state.failure.request == "ResumeSession":
-        why = state.failure.sentence.rstrip(".")
-        return tr("The session was not taken up again: {why}. {kept}", why=why, kept=rest)
+        reason = state.failure.sentence.rstrip(".")
+        return tr("The session was not taken up again: {why}. {kept}", why=reason, kept=safe)
     if session.fault is not None:
-        return tr("The recording has stopped: {why}. {kept}", why=session.fault.rstrip("."), kept=rest)
+        return tr("The recording has stopped: {why}. {kept}", why=session.fault.rstrip("."), kept=safe)
     if end is None or end.cause in ("finished", "aborted", "stopped"):
         return ""
-    why = end.reason
+    reason = end.reason
     if end.cause == "device":
-        why = tr("the transducer fell silent; it answers again") if bench.link == "open" else bench.problem or why
+        reason = tr("the transducer fell silent; it answers again") if bench.link == "open" else bench.problem or reason
     if end.cause == "disk":  # its reason says what is safe
-        return tr("The session was cut short: {why}.", why=why)
-    return tr("The session was cut short: {why}. Everything until then is kept.", why=why)
+        return tr("The session was cut short: {why}.", why=reason)
+    return tr("The session was cut short: {why}. Everything until then is kept.", why=reason)
 
 
 def duration(seconds: float) -> str:
@@ -385,5 +385,5 @@ def duration(seconds: float) -> str:
     >>> duration(761.4)
     '00:12:41'
     """
-    whole = max(int(seconds), 0)
-    return f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+    total_s = max(int(seconds), 0)
+    return f"{total_s // 3600:02d}:{total_s // 60 % 60:02d}:{total_s % 60:02d}"

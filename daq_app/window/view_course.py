@@ -17,7 +17,7 @@ NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot say
     steps.AskNumber: steps.MagnitudeEstimate(None),
     steps.AskChoice: steps.PairedChoice(None),
 }
-_WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
+_DIRECTIONS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
 TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
 TILES: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state without colour, and the state in words
     "done": ("✓", tr_noop("done")),
@@ -40,10 +40,10 @@ class Tile:
     kind: TileKind
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Return the trial and its state for a screen reader.
 
-        >>> Tile(3, "D86", "flawed").words
+        >>> Tile(3, "D86", "flawed").description
         'trial 3, D86: done, its stroke has a flaw'
         """
         return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(TILES[self.kind][1]))
@@ -88,7 +88,7 @@ class StrokeView:
     """What is said of the last stroke."""
 
     grade: Literal["none", "good", "doubtful", "refused"]
-    words: str
+    text: str
     details: str = ""  # at length, for a hover or a screen reader
     redo: steps.Redo | None = None  # sent by one key where something is wrong
 
@@ -111,20 +111,20 @@ class CourseView:
 
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
     """Return what is shown of a session."""
-    (headline, primary), over = _to_do(session, bench), session.over
-    again = redo_targets(session)
-    stroke, trial = _stroke(session, again), session.of(session.trial)
+    (headline, primary), over = _to_do(session, bench), session.is_over
+    targets = redo_targets(session)
+    stroke, trial = _stroke(session, targets), session.trial_state(session.trial)
     wait_s = max(int(now - session.since), 0)
     return CourseView(
         headline=headline,
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
         timer="" if over else f"{wait_s // 60}:{wait_s % 60:02d}",
-        notice=tr("It is kept in {folder}", folder=session.folder) if over else session.notice or _undo_words(session),
+        notice=tr("It is kept in {folder}", folder=session.folder) if over else session.notice or _undo_text(session),
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
-        buttons=_buttons(session, trial) | {"redo": _redo(again, stroke.redo), "undo": _undo(session)},
+        buttons=_buttons(session, trial) | {"redo": _redo(targets, stroke.redo), "undo": _undo(session)},
         no_forces=_no_forces(session.plan),
     )
 
@@ -144,20 +144,20 @@ def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Butto
     return {
         "skip": Button(tr("Skip"), "S", trial is not None and phase in IN_A_TRIAL, question=why_skip),
         "pause": Button(tr("Resume"), "P", sends=steps.Resume()) if phase == "paused" else pause,
-        "note": Button(tr("Note"), "N", not session.over, question=tr("Note, kept with its time:")),
+        "note": Button(tr("Note"), "N", not session.is_over, question=tr("Note, kept with its time:")),
         "no answer": Button(
             tr("No answer"), "" if by_digits else "0", phase == "scoring", NO_ANSWER.get(type(session.command))
         ),
-        "end": Button(tr("New"), "Ctrl+N", sends=NewSession()) if session.over else end,
+        "end": Button(tr("New"), "Ctrl+N", sends=NewSession()) if session.is_over else end,
     }
 
 
-def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
+def _redo(targets: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     """Return the button that names what it discards."""
-    if not again:
+    if not targets:
         return Button(tr("Redo"), "R", enabled=False)
-    numbers = "–".join(str(trial.trial.number) for trial in again)
-    question = tr("Why redo {trials}? What was recorded there no longer counts.", trials=_name_trials(again))
+    numbers = "–".join(str(trial.trial.number) for trial in targets)
+    question = tr("Why redo {trials}? What was recorded there no longer counts.", trials=_name_trials(targets))
     return Button(tr("Redo {numbers}", numbers=numbers), "R", sends=sends, question=question)
 
 
@@ -168,7 +168,7 @@ def _undo(session: SessionState) -> Button:
     return Button(label, "Ctrl+Z", bool(numbers) and session.phase in ("mounting", "taring", "ready"), steps.UndoRedo())
 
 
-def _undo_words(session: SessionState) -> str:
+def _undo_text(session: SessionState) -> str:
     trials = tuple(trial for trial in session.trials if trial.trial.number in session.redone)
     if not trials:
         return ""
@@ -190,7 +190,7 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
         case "paused":
             return tr("Paused. Press Space to go on."), Button(tr("Resume"), "Space", sends=steps.Resume())
         case "resting":
-            return _rest(session)
+            return _to_do_in_rest(session)
         case "resuming":
             return tr("Wait: the session is being taken up again."), None
         case "closing":
@@ -199,7 +199,7 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
         case "ended":
             return _to_do_at_end(session)
         case _:
-            trial = session.of(session.trial)
+            trial = session.trial_state(session.trial)
             return ("", None) if trial is None else _to_do_in(trial.trial, session)
 
 
@@ -207,14 +207,14 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
     code = trial.stimulus.code
     match session.phase:
         case "mounting":
-            then = tr("to zero") if session.plan.forces else tr("to go on")
+            next_step = tr("to zero") if session.plan.forces else tr("to go on")
             label = tr("Zero") if session.plan.forces else tr("Mounted")
             practice = "" if trial.phase == "main" else f"{trial.phase.capitalize()}: "
-            words = tr(
+            sentence = tr(
                 "{practice}mount sample {code}, its arrow {way}. Then press Space {then}.",
-                practice=practice, code=code, way=tr(_WAYS[trial.direction]), then=then,
+                practice=practice, code=code, way=tr(_DIRECTIONS[trial.direction]), then=next_step,
             )  # fmt: skip
-            return words[:1].upper() + words[1:], Button(label, "Space", sends=steps.StimulusMounted(code))
+            return sentence[:1].upper() + sentence[1:], Button(label, "Space", sends=steps.StimulusMounted(code))
         case "taring":
             return tr("Hands off: zero is being measured with sample {code} on.", code=code), None
         case "ready":
@@ -239,7 +239,7 @@ def _answer_sentence(session: SessionState, code: str) -> str:
             return tr("The subject scores sample {code}.", code=code)
 
 
-def _rest(session: SessionState) -> tuple[str, Button]:
+def _to_do_in_rest(session: SessionState) -> tuple[str, Button]:
     duration = session.command.duration if isinstance(session.command, steps.AskRest) else None
     by_itself = "" if duration is None else tr(" It goes on by itself after {duration:g} s.", duration=duration)
     return tr("The subject rests.{by_itself}", by_itself=by_itself), Button(tr("Go on"), "Space", sends=steps.Resume())
@@ -248,18 +248,18 @@ def _rest(session: SessionState) -> tuple[str, Button]:
 def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     hand = session.plan.stroking_hand
     finger = tr("{hand} index finger", hand=hand) if hand else tr("index finger")
-    way = tr("away from the body") if trial.direction == PROXIMAL_TO_DISTAL else tr("towards the body")
+    heading = tr("away from the body") if trial.direction == PROXIMAL_TO_DISTAL else tr("towards the body")
     limit = session.plan.stroke_limit(trial)
     often = tr("once") if limit == 1 else tr("at most {allowed}×", allowed=limit)
     sentence = tr(
         "Subject strokes {code} {often}, {way}, with the {finger}.",
-        code=trial.stimulus.code, often=often, way=way, finger=finger,
+        code=trial.stimulus.code, often=often, way=heading, finger=finger,
     )  # fmt: skip
     return sentence if session.plan.forces else tr("{sentence} Then press Space.", sentence=sentence)
 
 
 def _to_do_at_end(session: SessionState) -> tuple[str, Button | None]:
-    if not session.over:
+    if not session.is_over:
         return tr("The session is being ended."), None
     if session.resumable:
         resume = Button(tr("Resume session"), "Space", sends=m.ResumeSession(session.folder))
@@ -272,9 +272,9 @@ def _to_do_at_end(session: SessionState) -> tuple[str, Button | None]:
 def _rows(session: SessionState) -> tuple[PlanRow, ...]:
     rows: list[PlanRow] = []
     for block in session.plan.blocks:
-        way = tr("↑ away") if block.direction == PROXIMAL_TO_DISTAL else tr("↓ towards")
+        heading = tr("↑ away") if block.direction == PROXIMAL_TO_DISTAL else tr("↓ towards")
         name = block.name if block.phase == "main" else f"{block.name}, {block.phase}"
-        rows.append(PlanRow("block", "", name, way))
+        rows.append(PlanRow("block", "", name, heading))
         numbers = {trial.number for trial in block.trials}
         rows += [_row(session, trial) for trial in session.trials if trial.trial.number in numbers]
     return tuple(rows)
@@ -292,7 +292,7 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
     quality = trial.quality
     mu = _mu(quality.stroke) if quality is not None and "forces" in visible else ""
     answer = trial.answer if "answer" in visible else ""
-    mark = "!" if quality is not None and quality.words else ""
+    mark = "!" if quality is not None and quality.texts else ""
     return PlanRow("done", "✓", name, "   ".join(filter(None, (mu, answer, mark))))
 
 
@@ -304,38 +304,38 @@ def _mu(stroke: Stroke | None) -> str:
     return f"µ {low:.2f}–{high:.2f}" if f"{low:.2f}" != f"{high:.2f}" else f"µ {stroke.mu_dynamic:.2f}"
 
 
-def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
-    trial = session.of(session.judged_trial)
+def _stroke(session: SessionState, targets: tuple[TrialState, ...]) -> StrokeView:
+    trial = session.trial_state(session.judged_trial)
     if trial is None or trial.quality is None:
         return StrokeView("none", tr("No stroke yet."))
     quality, code = trial.quality, trial.trial.stimulus.code
-    parts, share = [tr("Stroke on {code}", code=code)], 100 * (quality.fell or 0.0)
+    texts, share = [tr("Stroke on {code}", code=code)], 100 * (quality.fell or 0.0)
     if (stroke := quality.stroke) is not None:
         steady = stroke.steady
-        parts += [] if steady is None else [tr("steady {duration:.1f} s", duration=steady[1] - steady[0])]
-        parts += [] if stroke.mu_dynamic is None else [_mu(stroke)]
-        parts += [] if stroke.speed is None else [quantity(stroke.speed, 0, "mm/s")]
+        texts += [] if steady is None else [tr("steady {duration:.1f} s", duration=steady[1] - steady[0])]
+        texts += [] if stroke.mu_dynamic is None else [_mu(stroke)]
+        texts += [] if stroke.speed is None else [quantity(stroke.speed, 0, "mm/s")]
     if quality.fell is not None:
-        words = tr_noop("N fell {share:.0f} %") if share >= 0 else tr_noop("N rose {share:.0f} %")
-        parts.append(tr(words, share=abs(share)))
-    parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
-    redo = steps.Redo(quality.words[0]) if quality.words and trial in again else None
-    return StrokeView(quality.grade, " · ".join(parts), quality.sentences, redo)
+        template = tr_noop("N fell {share:.0f} %") if share >= 0 else tr_noop("N rose {share:.0f} %")
+        texts.append(tr(template, share=abs(share)))
+    texts.append(tr("good") if quality.grade == "good" else "; ".join(tr(text) for text in quality.texts))
+    redo = steps.Redo(quality.texts[0]) if quality.texts and trial in targets else None
+    return StrokeView(quality.grade, " · ".join(texts), quality.sentences, redo)
 
 
 def tiles(session: SessionState) -> tuple[Tile, ...]:
     """Return a tile for each trial, in the order of the plan."""
-    return tuple(Tile(t.trial.number, t.code, _kind(session, t)) for t in session.trials)
+    return tuple(Tile(t.trial.number, t.code, _tile_kind(session, t)) for t in session.trials)
 
 
 def inspection(session: SessionState, number: int) -> Inspection | None:
     """Return what is shown of a trial; None where the session has no trial of that number."""
-    trial = session.of(number)
+    trial = session.trial_state(number)
     if trial is None:
         return None
-    again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
-    state = tr(TILES[_kind(session, trial)][1])
-    heading = tr("Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=state)
+    take = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
+    state = tr(TILES[_tile_kind(session, trial)][1])
+    heading = tr("Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=take, state=state)
     visible = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in visible:
         heading = f"{heading}, {trial.answer}"
@@ -358,15 +358,15 @@ def verdict(quality: Quality) -> str:
         return tr("Good")
     worst = quality.remarks[0]
     mends = worst.grade == "refused" or (worst.advice and worst.grade == "doubtful")
-    return f"{tr('Redo') if mends else tr('Doubtful')}: {tr(worst.words).rstrip('.')}. {tr(worst.advice)}".strip()
+    return f"{tr('Redo') if mends else tr('Doubtful')}: {tr(worst.text).rstrip('.')}. {tr(worst.advice)}".strip()
 
 
-def _kind(session: SessionState, trial: TrialState) -> TileKind:
+def _tile_kind(session: SessionState, trial: TrialState) -> TileKind:
     if trial.trial.number == session.trial and session.phase != "ended":
         return "current"
     if trial.outcome != "done":
         return trial.outcome
-    if trial.quality is not None and trial.quality.words:
+    if trial.quality is not None and trial.quality.texts:
         return "flawed"
     return "redone" if trial.takes > 1 else "done"
 

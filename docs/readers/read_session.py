@@ -5,6 +5,7 @@ session.h5 is for programs that have a library for HDF5. docs/session-format.md 
 """
 
 import json
+import operator
 import sqlite3
 import struct
 import sys
@@ -14,8 +15,8 @@ import zlib
 def read(folder):
     """Return a dict: simulated, plan, transducer, readings (a list of tuples), events (a list of dicts), damaged."""
     file = sqlite3.connect(f"file:{folder}/session.sqlite?mode=ro", uri=True)
-    head = dict(file.execute("SELECT name, value FROM head"))
-    transducer = json.loads(head["transducer"])
+    header = dict(file.execute("SELECT name, value FROM head"))
+    transducer = json.loads(header["transducer"])
     matrix = transducer["calibration"]["matrix"] if transducer else None
     readings, damaged = [], []
     for number, n, crc, *blobs in file.execute(
@@ -24,21 +25,21 @@ def read(folder):
         if zlib.crc32(b"".join(blobs)) != crc:
             damaged.append(f"block {number}")
             continue
-        columns = [struct.unpack(f"<{n}{kind}", blob) for kind, blob in zip("qqqdq", blobs)]
-        for *whole, raw in zip(*columns, struct.iter_unpack("<6d", blobs[5])):
-            wrench = tuple(sum(m * r for m, r in zip(row, raw)) for row in matrix)  # nothing subtracted
-            readings.append((*whole, raw, wrench))
+        columns = [struct.unpack(f"<{n}{code}", blob) for code, blob in zip("qqqdq", blobs)]
+        for *integers, raw in zip(*columns, struct.iter_unpack("<6d", blobs[5])):
+            wrench = tuple(sum(map(operator.mul, row, raw)) for row in matrix)  # nothing subtracted
+            readings.append((*integers, raw, wrench))
     events = []
-    for number, time_ns, kind, trial, before, data, crc in file.execute("SELECT * FROM events ORDER BY number"):
-        line = "\n".join(map(str, (number, time_ns, kind, "" if trial is None else trial, before, data)))
+    for number, time_ns, kind, trial, count, data, crc in file.execute("SELECT * FROM events ORDER BY number"):
+        line = "\n".join(map(str, (number, time_ns, kind, "" if trial is None else trial, count, data)))
         if zlib.crc32(line.encode()) != crc:
             damaged.append(f"event {number}")
             continue
         events.append({"time_ns": time_ns, "kind": kind, "trial": trial, **json.loads(data)})
     file.close()
     return {
-        "simulated": None if head["simulated"] == "no" else head["simulated"],
-        "plan": json.loads(head["plan"]),
+        "simulated": None if header["simulated"] == "no" else header["simulated"],
+        "plan": json.loads(header["plan"]),
         "transducer": transducer,
         "readings": readings,  # sequence, counter, status, time [s], received_ns, raw (6), wrench (6) [N, N mm]
         "events": events,
@@ -52,8 +53,8 @@ if __name__ == "__main__":
         print(session["simulated"])
     print("subject", session["plan"]["subject"], "protocol", session["plan"]["protocol"])
     print(len(session["readings"]), "readings", len(session["events"]), "events")
-    for what in session["damaged"]:
-        print(what, "is damaged and left out")
+    for name in session["damaged"]:
+        print(name, "is damaged and left out")
     for sequence, _, _, time, _, _, wrench in session["readings"][:3]:
         print(f"reading {sequence} at {time:.6f} s:", " ".join(f"{number:.9g}" for number in wrench))
     for event in session["events"]:

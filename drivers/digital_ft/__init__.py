@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 
-from drivers.address import Address, Driver, at, check_options
+from drivers.address import Address, Driver, check_options, prefix_failures
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline, Link
@@ -30,9 +30,7 @@ _OPTIONS = frozenset({"baud", "parity", "calibration"})
 
 
 @dataclass(frozen=True, slots=True)
-class _Where:
-    """What an address says."""
-
+class _Target:
     address: Address
     port: str
     baud: int
@@ -42,46 +40,46 @@ class _Where:
 
 def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the transducer at `address`, calibrated, not streaming. Raises SetupError, LinkLost or DeviceFault."""
-    place = _where(address)
-    with at(address), contextlib.closing(_line(place, deadline)) as link:
+    target = _target_of(address)
+    with prefix_failures(address), contextlib.closing(_line(target, deadline)) as link:
         bound = deadline.bound(link)
         word = hold(bound)
-        stored = _read_calibration(place, bound)
-        conversation = _DigitalConversation(place.number, stored)
+        stored = _read_calibration(target, bound)
+        conversation = _DigitalConversation(target.number, stored)
         rate = measured_rate(link, conversation, clock, _MEASURED, deadline, wire.STREAM_RATE)
-    info = _info(place, stored, word, rate)
-    return StreamingTransducer(info, partial(_line, place), conversation, clock, opening=deadline)
+    info = _info(target, stored, word, rate)
+    return StreamingTransducer(info, partial(_line, target), conversation, clock, opening=deadline)
 
 
 def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing: a stream left over from before goes on. An answer takes 0.2 s at most."""
-    place = _where(address)
-    with at(address), contextlib.closing(deadline.bound(_line(place, deadline))) as link:
+    target = _target_of(address)
+    with prefix_failures(address), contextlib.closing(deadline.bound(_line(target, deadline))) as link:
         word = status_word(link)
         if word is None:
             streams = link.receive(0.05) is not None
             raise LinkLost("it streams, and nobody reads; open it to end that" if streams else "no transducer answers")
-        return _info(place, _read_calibration(place, link), word, math.nan)
+        return _info(target, _read_calibration(target, link), word, math.nan)
 
 
-def _line(place: _Where, _deadline: Deadline) -> SerialLink:
-    return SerialLink(place.port, place.baud, place.parity)
+def _line(target: _Target, _deadline: Deadline) -> SerialLink:
+    return SerialLink(target.port, target.baud, target.parity)
 
 
-def _read_calibration(place: _Where, link: Link) -> wire.StoredCalibration:
-    registers = read(link, wire.calibration_address(place.number), wire.CALIBRATION_SIZE)
+def _read_calibration(target: _Target, link: Link) -> wire.StoredCalibration:
+    registers = read(link, wire.calibration_address(target.number), wire.CALIBRATION_SIZE)
     try:
         return wire.parse_calibration(registers)
     except SetupError as error:
-        raise SetupError(f"{place.address.uri}: calibration {place.number} {error}") from None
+        raise SetupError(f"{target.address.uri}: calibration {target.number} {error}") from None
 
 
-def _info(place: _Where, calibration: wire.StoredCalibration, status: int | None, rate: float) -> TransducerInfo:
+def _info(target: _Target, calibration: wire.StoredCalibration, status: int | None, rate: float) -> TransducerInfo:
     as_stated = math.isnan(rate) or abs(rate / wire.STREAM_RATE - 1.0) < _AS_STATED
     day = calibration.calibrated or "on a day not stated"
     settings = {
-        "line": f"{place.baud} baud, 8 data bits, parity {place.parity}, 1 stop bit",
-        "calibration": f"number {place.number}, {calibration.part_number}, calibrated {day}",
+        "line": f"{target.baud} baud, 8 data bits, parity {target.parity}, 1 stop bit",
+        "calibration": f"number {target.number}, {calibration.part_number}, calibrated {day}",
         "gauge gains and offsets": calibration.gains_and_offsets.hex(" ", 2),
         "bias": "none in the transducer",
         "filter": "none",
@@ -91,10 +89,10 @@ def _info(place: _Where, calibration: wire.StoredCalibration, status: int | None
     if status is not None:
         settings["status at opening"] = "; ".join(wire.status_words(status)) or "healthy"
     if not math.isnan(rate):
-        how = "as stated by the maker to 0.5 %" if as_stated else "as measured, not as stated by the maker"
-        settings["rate"] = f"{how}; {rate:.0f} Hz measured at opening"
+        origin = "as stated by the maker to 0.5 %" if as_stated else "as measured, not as stated by the maker"
+        settings["rate"] = f"{origin}; {rate:.0f} Hz measured at opening"
     return TransducerInfo(
-        uri=place.address.uri,
+        uri=target.address.uri,
         driver="digital-ft",
         model=f"Digital F/T {calibration.part_number}".strip(),
         serial=calibration.calibration.serial,
@@ -107,9 +105,9 @@ def _info(place: _Where, calibration: wire.StoredCalibration, status: int | None
     )
 
 
-def _where(address: Address) -> _Where:
+def _target_of(address: Address) -> _Target:
     check_options(address, _OPTIONS)
-    return _Where(
+    return _Target(
         address,
         port_of(address),
         address.number("baud", 1_250_000, 300, 4_000_000),
@@ -191,14 +189,14 @@ def read(link: Link, first: int, count: int) -> bytes:
     return read_so_far
 
 
-def _carry_out(link: Link, request: bytes, what: str) -> None:
+def _carry_out(link: Link, request: bytes, action: str) -> None:
     """Carry out a request whose answer says success or repeats what was written."""
-    answer = _answer(link, request, what)
+    answer = _answer(link, request, action)
     if request[1] == wire.UNLOCK and answer != b"\x01":
-        raise DeviceFault(f"the transducer was asked {what} and refused; switch it off and on")
+        raise DeviceFault(f"the transducer was asked {action} and refused; switch it off and on")
 
 
-def _answer(link: Link, request: bytes, what: str) -> bytes:
+def _answer(link: Link, request: bytes, action: str) -> bytes:
     """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault for want of one."""
     for times in _PATIENCE:
         answer = wire.answer_in(_response(link, request, b"", times * _ANSWER), request)
@@ -206,10 +204,10 @@ def _answer(link: Link, request: bytes, what: str) -> bytes:
             while link.receive(_ANSWER) is not None:
                 pass
         if isinstance(answer, str):
-            raise DeviceFault(f"the transducer was asked {what} and refused: {answer}")
+            raise DeviceFault(f"the transducer was asked {action} and refused: {answer}")
         if answer is not None:
             return answer
-    raise LinkLost(f"the transducer was asked {what} and did not answer; check the cable")
+    raise LinkLost(f"the transducer was asked {action} and did not answer; check the cable")
 
 
 def _response(link: Link, request: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:

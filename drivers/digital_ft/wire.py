@@ -113,12 +113,12 @@ def answer_in(response: bytes, request: bytes) -> bytes | str | None:
     will not carry it out, it is a text: why. Raises nothing.
     """
     function = request[1]
-    size, head = 5, bytes([ADDRESS, function])
+    size, prefix = 5, bytes([ADDRESS, function])
     if function == READ:
-        size, head = 5 + 2 * request[5], bytes([ADDRESS, READ, 2 * request[5]])
+        size, prefix = 5 + 2 * request[5], bytes([ADDRESS, READ, 2 * request[5]])
     elif function == WRITE:
-        size, head = 8, request[:6]
-    for frame in _frames(response, head, size):
+        size, prefix = 8, request[:6]
+    for frame in _frames(response, prefix, size):
         if frame != request:  # an adapter may repeat what we send
             return frame[3:-2] if function == READ else frame[2:-2]
     for frame in _frames(response, bytes([ADDRESS, function | _EXCEPTION]), 5):
@@ -133,7 +133,7 @@ def calibration_address(number: int) -> int:
 
 def parse_calibration(registers: bytes) -> StoredCalibration:
     """Return what the registers of a calibration say. Raises SetupError, half a sentence, where it makes no sense."""
-    serial, part, _, day, *numbers = _CALIBRATION.unpack(registers)
+    serial, part_field, _, day, *numbers = _CALIBRATION.unpack(registers)
     basic = np.array(numbers[:36], np.float64).reshape(6, 6)
     force, torque = _FORCE.get(numbers[36]), _TORQUE.get(numbers[37])
     ratings = np.array(numbers[38:44], np.float64)
@@ -150,7 +150,7 @@ def parse_calibration(registers: bytes) -> StoredCalibration:
     if not sound:
         raise SetupError("holds a matrix that does not tell forces and torques apart; have the transducer calibrated")
     rated = np.where(np.isfinite(ratings) & (ratings > 0.0), ratings, np.nan) * units
-    day_text, part_text = _text(day), _text(part)
+    day_text, part_text = _text(day), _text(part_field)
     source = f"registers of the transducer: {part_text}, calibrated {day_text or 'on a day not stated'}"
     calibration = Calibration(name, "counts", matrix, rated, source)
     return StoredCalibration(calibration, part_text, day_text, registers[2 * 121 :])
@@ -234,17 +234,17 @@ def _with_crc(frame: bytes) -> bytes:
     return frame + struct.pack("<H", crc16(frame))
 
 
-def _frames(response: bytes, head: bytes, size: int) -> Iterator[bytes]:
-    """Yield the sound frames of `size` bytes in `response` that begin with `head`."""
-    at = response.find(head)
-    while 0 <= at <= len(response) - size:
-        frame = response[at : at + size]
+def _frames(response: bytes, prefix: bytes, size: int) -> Iterator[bytes]:
+    """Yield the sound frames of `size` bytes in `response` that begin with `prefix`."""
+    position = response.find(prefix)
+    while 0 <= position <= len(response) - size:
+        frame = response[position : position + size]
         if _with_crc(frame[:-2]) == frame:
             yield frame
-        at = response.find(head, at + 1)
+        position = response.find(prefix, position + 1)
 
 
 def _text(field: bytes) -> str:
     """Return stored text without its padding, and without anything that cannot be shown."""
     plain = field.split(b"\0")[0].decode("ascii", "replace")
-    return "".join(c for c in plain if c.isprintable() and c != "\ufffd").strip()
+    return "".join(character for character in plain if character.isprintable() and character != "\ufffd").strip()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from drivers.address import Address, AddressError, Driver, at, check_options
+from drivers.address import Address, AddressError, Driver, check_options, prefix_failures
 from drivers.calibration_file import CalibrationFile, read_calibration_file
 from drivers.clock import Clock
 from drivers.clock_recovery import ScanCount
@@ -24,9 +24,7 @@ _OPTIONS = frozenset({"serial", "cal", "rate"})
 
 
 @dataclass(frozen=True, slots=True)
-class _Where:
-    """What an address says."""
-
+class _Target:
     uri: str
     serial: int  # of the converter; 0: whichever is alone
     rate: int  # scans a second
@@ -35,67 +33,67 @@ class _Where:
 
 def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the transducer at `address`, identified, not streaming. Raises SetupError, LinkLost, DeviceFault."""
-    place = _where(address)
-    if place.calibration is None:
-        raise AddressError(f"{place.uri} names no calibration; add cal=FILE, the transducer's own .cal file")
-    link, identity = _open_link(place, deadline)
-    with at(address), contextlib.closing(link):
+    target = _target_of(address)
+    if target.calibration is None:
+        raise AddressError(f"{target.uri} names no calibration; add cal=FILE, the transducer's own .cal file")
+    link, identity = _open_link(target, deadline)
+    with prefix_failures(address), contextlib.closing(link):
         constants = _constants(deadline.bound(link))
-    scans = wire.scan_clock(place.rate)
+    scans = wire.scan_clock(target.rate)
     conversation = _GaugeConversation(identity.serial, constants, scans)
-    info = _info(place, place.calibration, identity, constants, scans)
-    same = replace(place, serial=identity.serial)  # wherever it is plugged in when it is opened anew
-    return StreamingTransducer(info, lambda limit: _open_link(same, limit)[0], conversation, clock, opening=deadline)
+    info = _info(target, target.calibration, identity, constants, scans)
+    target = replace(target, serial=identity.serial)  # wherever it is plugged in when it is opened anew
+    return StreamingTransducer(info, lambda limit: _open_link(target, limit)[0], conversation, clock, opening=deadline)
 
 
 def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError where another program has it or nothing is plugged in."""
-    place = _where(address)
-    link, identity = _open_link(place, deadline)
-    with at(address), contextlib.closing(link):
-        if place.calibration is None:
+    target = _target_of(address)
+    link, identity = _open_link(target, deadline)
+    with prefix_failures(address), contextlib.closing(link):
+        if target.calibration is None:
             raise SetupError(
-                f"{place.uri}: LabJack U6 {identity.serial} is there; add cal=FILE, the transducer's own .cal file"
+                f"{target.uri}: LabJack U6 {identity.serial} is there; add cal=FILE, the transducer's own .cal file"
             )
         constants = _constants(deadline.bound(link))
-    return _info(place, place.calibration, identity, constants, wire.scan_clock(place.rate))
+    return _info(target, target.calibration, identity, constants, wire.scan_clock(target.rate))
 
 
-def _open_link(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
+def _open_link(target: _Target, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
     """Open the converter that the address names, and return its link and identity."""
     matches: dict[int, tuple[Any, wire.Identity]] = {}
     refusals: list[SetupError] = []
-    for one in devices(_VENDOR, _PRODUCT):
+    for device in devices(_VENDOR, _PRODUCT):
         try:
-            link = UsbLink(one, _ENDPOINTS, place.uri)
+            link = UsbLink(device, _ENDPOINTS, target.uri)
         except SetupError as error:
             refusals.append(error)
             continue
         try:
             identity = _identity(deadline.bound(link))
         except (LinkLost, DeviceFault) as error:
-            refusals.append(SetupError(f"{place.uri}: {error}"))
+            refusals.append(SetupError(f"{target.uri}: {error}"))
             continue
         finally:
             link.close()
-        if place.serial in (0, identity.serial):
-            matches[identity.serial] = one, identity
+        if target.serial in (0, identity.serial):
+            matches[identity.serial] = device, identity
     if len(matches) > 1:
-        raise SetupError(f"{place.uri}: several are plugged in; add serial= one of {', '.join(map(str, matches))}")
+        raise SetupError(f"{target.uri}: several are plugged in; add serial= one of {', '.join(map(str, matches))}")
     if not matches:
         if refusals:
             raise refusals[0]
-        which = f"LabJack U6 {place.serial}" if place.serial else "LabJack U6"
-        raise LinkLost(f"{place.uri}: no {which} is plugged in; check its USB cable")
-    ((one, identity),) = matches.values()
-    return UsbLink(one, _ENDPOINTS, place.uri), identity
+        name = f"LabJack U6 {target.serial}" if target.serial else "LabJack U6"
+        raise LinkLost(f"{target.uri}: no {name} is plugged in; check its USB cable")
+    ((device, identity),) = matches.values()
+    return UsbLink(device, _ENDPOINTS, target.uri), identity
 
 
 def _info(
-    place: _Where, file: CalibrationFile, identity: wire.Identity, constants: wire.Constants, scans: wire.ScanClock
+    target: _Target, file: CalibrationFile, identity: wire.Identity, constants: wire.Constants, scans: wire.ScanClock
 ) -> TransducerInfo:
     return TransducerInfo(
-        uri=place.uri,
+        uri=target.uri,
         driver="labjack-u6",
         model=f"{file.body} {file.part_number} on LabJack U6{'-Pro' if identity.pro else ''}".strip(),
         serial=file.calibration.serial,
@@ -118,12 +116,12 @@ def _info(
     )
 
 
-def _where(address: Address) -> _Where:
+def _target_of(address: Address) -> _Target:
     check_options(address, _OPTIONS)
     if address.host:
         raise AddressError(f"{address.uri}: a USB device has no host; write labjack-u6://?serial=...&cal=FILE")
     file = address.options.get("cal")
-    return _Where(
+    return _Target(
         address.uri,
         address.number("serial", 0, 0, 999_999_999),
         address.number("rate", 1000, 3, wire.HIGHEST_RATE),

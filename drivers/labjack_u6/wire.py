@@ -101,8 +101,8 @@ def read_memory(block: int) -> bytes:
 
 def configure_stream(clock: ScanClock) -> bytes:
     """Return the request that sets six differential gauges, one after the other, to be scanned at the clock's rate."""
-    head = struct.pack("<6BH", _GAUGES, 1, _GAUGES * SCANS, 0, 0, clock.flags, clock.interval)
-    return _extended_command(0x11, head + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(_GAUGES)))
+    header = struct.pack("<6BH", _GAUGES, 1, _GAUGES * SCANS, 0, 0, clock.flags, clock.interval)
+    return _extended_command(0x11, header + b"".join(bytes([2 * gauge, _DIFFERENTIAL]) for gauge in range(_GAUGES)))
 
 
 def scan_clock(rate: float) -> ScanClock:
@@ -200,12 +200,12 @@ class StreamDecoder:
     def _packets(self) -> list[bytes]:
         """Take whole sound packets off the front; bytes that begin none are skipped."""
         packets: list[bytes] = []
-        head = bytes([0xF9, 4 + _GAUGES * SCANS, 0xC0])
+        prefix = bytes([0xF9, 4 + _GAUGES * SCANS, 0xC0])
         while True:
-            at = self._bytes.find(head, 1)
-            start = at - 1 if at > 0 else max(len(self._bytes) - len(head), 0)
+            position = self._bytes.find(prefix, 1)
+            start = position - 1 if position > 0 else max(len(self._bytes) - len(prefix), 0)
             self._skip(start)
-            if at < 0 or len(self._bytes) < STREAM_PACKET:
+            if position < 0 or len(self._bytes) < STREAM_PACKET:
                 return packets
             packet = bytes(self._bytes[:STREAM_PACKET])
             if not _is_sound(packet):
@@ -217,8 +217,8 @@ class StreamDecoder:
 
     def _skip(self, count: int) -> None:
         """Drop bytes that are no packet; every packet's length of them, begun, counts as one packet's scans."""
-        before, self._skipped = self._skipped, self._skipped + count
-        self.malformed += SCANS * (-(-self._skipped // STREAM_PACKET) - -(-before // STREAM_PACKET))
+        previous, self._skipped = self._skipped, self._skipped + count
+        self.malformed += SCANS * (-(-self._skipped // STREAM_PACKET) - -(-previous // STREAM_PACKET))
         del self._bytes[:count]
 
 
@@ -239,8 +239,8 @@ def _fixed_points(data: bytes) -> tuple[float, ...]:
 
 
 def _extended_command(command: int, data: bytes) -> bytes:
-    head = struct.pack("<3BH", 0xF8, len(data) // 2, command, sum(data) & 0xFFFF)
-    return bytes([_sum8(head)]) + head + data
+    header = struct.pack("<3BH", 0xF8, len(data) // 2, command, sum(data) & 0xFFFF)
+    return bytes([_sum8(header)]) + header + data
 
 
 def _is_sound(packet: bytes) -> bool:

@@ -22,9 +22,7 @@ _OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
 
 
 @dataclass(frozen=True, slots=True)
-class _Where:
-    """The address of a box and the settings that the address requests."""
-
+class _Target:
     address: Address
     http_port: int
     rdt_port: int
@@ -38,28 +36,28 @@ class _Where:
 
 def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
     """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
-    place = _where(address, deadline)
+    target = _target_of(address, deadline)
     return NetFtTransducer(
-        _prepare(place, deadline),
-        connect=lambda _: UdpLink(place.host, place.rdt_port),
-        who=lambda: _who(place),
+        _prepare(target, deadline),
+        connect=lambda _: UdpLink(target.host, target.rdt_port),
+        identify=lambda: _identify(target),
         clock=clock,
         opening=deadline,
-        request=wire.START_BUFFERED if place.buffered else wire.START,
+        request=wire.START_BUFFERED if target.buffered else wire.START,
     )
 
 
 def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    place = _where(address, deadline)
-    return _info(place, _configuration(place, deadline))
+    target = _target_of(address, deadline)
+    return _info(target, _configuration(target, deadline))
 
 
-def _where(address: Address, deadline: Deadline) -> _Where:
+def _target_of(address: Address, deadline: Deadline) -> _Target:
     check_options(address, _OPTIONS)
     if not address.host:
         raise AddressError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
-    return _Where(
+    return _Target(
         address,
         http_port=address.number("http", 80, 1, 65535),
         rdt_port=address.number("rdt", 49152, 1, 65535),
@@ -72,49 +70,50 @@ def _where(address: Address, deadline: Deadline) -> _Where:
     )
 
 
-def _prepare(place: _Where, deadline: Deadline) -> TransducerInfo:
+def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
     """Set the box as the address asks, and return its description, read back afterwards."""
-    configuration = _configuration(place, deadline)
+    configuration = _configuration(target, deadline)
     if not configuration.streams:
-        raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
-    if place.rate is not None and not _is_rate(configuration, place.rate):
-        path = f"/comm.cgi?comrdtrate={place.rate}"
-        answer = http_get(place.host, place.http_port, path, deadline)
+        uri = target.address.uri
+        raise SetupError(f"{uri}: the box's RDT output is disabled; enable it on its Communications page")
+    if target.rate is not None and not _is_rate(configuration, target.rate):
+        path = f"/comm.cgi?comrdtrate={target.rate}"
+        answer = http_get(target.host, target.http_port, path, deadline)
         if answer.status not in (200, 302) or not _is_rate(
-            configuration := _configuration(place, deadline), place.rate
+            configuration := _configuration(target, deadline), target.rate
         ):
             state = "shows no rate at all" if math.isnan(configuration.rate) else f"stays at {configuration.rate:g} Hz"
             raise SetupError(
-                f"{place.address.uri}: the box was asked for {place.rate} Hz but {state}; "
+                f"{target.address.uri}: the box was asked for {target.rate} Hz but {state}; "
                 "set the rate on its Communications page"
             )
-    results = _command(place, configuration, deadline) if place.set_bias or place.reset_latch else {}
-    if place.buffered:
+    results = _command(target, configuration, deadline) if target.set_bias or target.reset_latch else {}
+    if target.buffered:
         results["streaming"] = "buffered"
-    info = _info(place, configuration)
+    info = _info(target, configuration)
     return replace(info, settings={**info.settings, **results})
 
 
-def _command(place: _Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
+def _command(target: _Target, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
     """Send the commands that the address asks for, and return the results for the record."""
-    units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24, deadline))
+    units = wire.parse_units(_tcp(target, wire.READ_UNITS, 24, deadline))
     if units is None or (units.counts_per_force, units.counts_per_torque) != (
         configuration.counts_per_force,
         configuration.counts_per_torque,
     ):
         raise SetupError(
-            f"{place.address.uri}: the box's command port does not count as its web page says; check the tcp port"
+            f"{target.address.uri}: the box's command port does not count as its web page says; check the tcp port"
         )
     results: dict[str, str] = {}
-    if place.reset_latch:
-        _wrench(place, wire.RESET_LATCH, deadline)
-        still = wire.is_latched(_tcp(place, wire.READ_WRENCH, 16, deadline))
+    if target.reset_latch:
+        _wrench(target, wire.RESET_LATCH, deadline)
+        still = wire.is_latched(_tcp(target, wire.READ_WRENCH, 16, deadline))
         read_back = "and latched again: its condition holds" if still else "and read back as not latched"
         results["monitor condition latch"] = f"reset at opening, as the address asks, {read_back}"
-    if place.set_bias:
-        _wrench(place, wire.SET_BIAS, deadline)
+    if target.set_bias:
+        _wrench(target, wire.SET_BIAS, deadline)
         time.sleep(_SETTLING)
-        counts = np.array(_wrench(place, wire.READ_WRENCH, deadline)) * np.array(units.scales)
+        counts = np.array(_wrench(target, wire.READ_WRENCH, deadline)) * np.array(units.scales)
         force, torque = np.abs(configuration.calibration().matrix @ counts).reshape(2, 3).max(axis=1)
         results["software bias"] = (
             f"set at opening, as the address asks; at most {force:.3g} N and {torque:.3g} N mm left"
@@ -122,28 +121,28 @@ def _command(place: _Where, configuration: Configuration, deadline: Deadline) ->
     return results
 
 
-def _wrench(place: _Where, command: bytes, deadline: Deadline) -> tuple[int, ...]:
-    counts = wire.parse_wrench(_tcp(place, command, 16, deadline))
+def _wrench(target: _Target, command: bytes, deadline: Deadline) -> tuple[int, ...]:
+    counts = wire.parse_wrench(_tcp(target, command, 16, deadline))
     if counts is None:
-        raise SetupError(f"{place.address.uri}: its command port gives no answer that can be read; check the tcp port")
+        raise SetupError(f"{target.address.uri}: its command port gives no answer that can be read; check the tcp port")
     return counts
 
 
-def _tcp(place: _Where, command: bytes, size: int, deadline: Deadline) -> bytes:
-    return tcp_answer(place.host, place.tcp_port, command, size, deadline)
+def _tcp(target: _Target, command: bytes, size: int, deadline: Deadline) -> bytes:
+    return tcp_answer(target.host, target.tcp_port, command, size, deadline)
 
 
-def _who(place: _Where) -> TransducerInfo | None:
+def _identify(target: _Target) -> TransducerInfo | None:
     """Return who answers at once, None when nobody does. Raises SetupError when its page makes no sense."""
     try:
-        return _info(place, _configuration(place, Deadline(_AT_ONCE)))
+        return _info(target, _configuration(target, Deadline(_AT_ONCE)))
     except LinkLost:
         return None
 
 
-def _info(place: _Where, configuration: Configuration) -> TransducerInfo:
+def _info(target: _Target, configuration: Configuration) -> TransducerInfo:
     return TransducerInfo(
-        uri=place.address.uri,
+        uri=target.address.uri,
         driver="net-ft",
         model=" ".join(filter(None, (configuration.product, configuration.model))),
         serial=configuration.serial,
@@ -160,17 +159,17 @@ def _is_rate(configuration: Configuration, rate: int) -> bool:
     return math.isclose(configuration.rate, true_rate(rate, configuration.ticks))
 
 
-def _configuration(place: _Where, deadline: Deadline) -> Configuration:
-    answer = http_get(place.host, place.http_port, "/netftapi2.xml", deadline)
+def _configuration(target: _Target, deadline: Deadline) -> Configuration:
+    answer = http_get(target.host, target.http_port, "/netftapi2.xml", deadline)
     if answer.status != 200:
         raise SetupError(
-            f"{place.address.uri}: its web page answers {answer.status} instead of a configuration; "
+            f"{target.address.uri}: its web page answers {answer.status} instead of a configuration; "
             "check that the address is that of a Net F/T box or an Ethernet Axia"
         )
     try:
         return parse_configuration(answer.body)
     except SetupError as error:
-        raise SetupError(f"{place.address.uri}: {error}") from None
+        raise SetupError(f"{target.address.uri}: {error}") from None
 
 
 DRIVER = Driver("net-ft", open_net_ft, identify_net_ft, ("net-ft://192.168.1.1",))

@@ -47,10 +47,10 @@ class Configuration:
 def parse_configuration(page: bytes) -> Configuration:
     """Return what netftapi2.xml says. Raises SetupError where a needed element is missing, double or makes no sense."""
     elements = _elements(page)
-    product = _one(elements, "prodname")
+    product = _required(elements, "prodname")
     status = AXIA if "axia" in product.lower() else NET_FT
     ticks = _ticks(_optional(elements, "setadcrate")) if status is AXIA else COUNTER_RATE
-    force, torque = _one(elements, "scfgfu"), _one(elements, "scfgtu")
+    force, torque = _required(elements, "scfgfu"), _required(elements, "scfgtu")
     rated = _ratings(elements)
     settings = {
         "configuration": _optional(elements, "cfgnam"),
@@ -71,8 +71,8 @@ def parse_configuration(page: bytes) -> Configuration:
         ticks=ticks,
         serial=_optional(elements, "cfgcalsn"),
         model=_optional(elements, "mfgtxdmdl"),
-        counts_per_force=_positive("cfgcpf", _one(elements, "cfgcpf")),
-        counts_per_torque=_positive("cfgcpt", _one(elements, "cfgcpt")),
+        counts_per_force=_positive("cfgcpf", _required(elements, "cfgcpf")),
+        counts_per_torque=_positive("cfgcpt", _required(elements, "cfgcpt")),
         newtons=_unit("force", force, FORCE),
         newton_millimetres=_unit("torque", torque, TORQUE),
         rated=rated,
@@ -109,12 +109,12 @@ def _elements(page: bytes) -> dict[str, list[str]]:
     return elements
 
 
-def _one(elements: Mapping[str, list[str]], name: str) -> str:
+def _required(elements: Mapping[str, list[str]], name: str) -> str:
     """Return the text of an element that must be there exactly once."""
     texts = elements.get(name, [])
     if len(texts) != 1 or not texts[0]:
-        how = "does not say" if not any(texts) else "says more than once"
-        raise SetupError(f"the box's configuration page {how} what {name} is; check the address and the box's set-up")
+        verb = "does not say" if not any(texts) else "says more than once"
+        raise SetupError(f"the box's configuration page {verb} what {name} is; check the address and the box's set-up")
     return texts[0]
 
 
@@ -133,18 +133,18 @@ def _positive(name: str, text: str) -> float:
     return value
 
 
-def _unit(kind: str, text: str, units: Mapping[str, float]) -> float:
+def _unit(dimension: str, text: str, units: Mapping[str, float]) -> float:
     size = unit(text, units)
     if size is None:
         raise SetupError(
-            f"the box gives {kind} in {text[:20]!r}, a unit unknown here; choose N and N-m on its own page"
+            f"the box gives {dimension} in {text[:20]!r}, a unit unknown here; choose N and N-m on its own page"
         )
     return size
 
 
 def _ratings(elements: Mapping[str, list[str]]) -> tuple[float, ...]:
-    values = tuple(number(part) for part in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if part)
-    return values if len(values) == 6 and all(math.isfinite(v) and v > 0.0 for v in values) else ()
+    values = tuple(number(piece) for piece in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if piece)
+    return values if len(values) == 6 and all(math.isfinite(value) and value > 0.0 for value in values) else ()
 
 
 def _rate(text: str, ticks: float) -> float:
@@ -162,7 +162,7 @@ def _ticks(text: str) -> float:
 
 def _transform(elements: Mapping[str, list[str]]) -> str:
     """Return the tool transform in force with its units, or nothing where there is none."""
-    values = [part for part in re.split(r"[;,\s]+", _optional(elements, "cfgtfx")) if part]
+    values = [piece for piece in re.split(r"[;,\s]+", _optional(elements, "cfgtfx")) if piece]
     if not any(number(value) != 0.0 for value in values):
         return ""
     units = f"{_optional(elements, 'scfgtdu')}, {_optional(elements, 'scfgtau')}".strip(", ")

@@ -27,15 +27,15 @@ _TRANSFORM = "tool transform"  # name of the setting that turns and shifts what 
 class _SettingsWatch:
     """Compares the page with what was read at opening, on a thread of its own."""
 
-    def __init__(self, info: TransducerInfo, who: Callable[[], TransducerInfo | None], clock: Clock) -> None:
-        """Watch the box of `info`. `who` returns who answers there now, soon, None when nobody does."""
+    def __init__(self, info: TransducerInfo, identify: Callable[[], TransducerInfo | None], clock: Clock) -> None:
+        """Watch the box of `info`. `identify` returns who answers there now, soon, None when nobody does."""
         self.fault: Exception | None = None  # what was found, or an error of ours
         self.confirmed_ns = clock.now_ns()  # until then the box counted as before [ns, session clock]
         self._info = info
-        self._who = who
+        self._identify = identify
         self._clock = clock
         self._look = threading.Event()
-        self._over = threading.Event()
+        self._stop = threading.Event()
         self._senseless = 0  # pages in a row that make no sense
         self._thread = threading.Thread(target=self._run, name=f"settings of {info.serial}", daemon=True)
 
@@ -43,7 +43,7 @@ class _SettingsWatch:
         self._thread.start()
 
     def end(self) -> None:
-        self._over.set()
+        self._stop.set()
         self._look.set()
         self._thread.join(_ENDING)
 
@@ -55,7 +55,7 @@ class _SettingsWatch:
         """Tell whether the box answers and counts as before. Raises DeviceFault when another does, or other units."""
         began_ns = self._clock.now_ns()
         try:
-            info = self._who()
+            info = self._identify()
             self._senseless = 0
         except SetupError as error:
             self._senseless += 1
@@ -80,14 +80,14 @@ class _SettingsWatch:
         return True
 
     def _run(self) -> None:
-        while not self._over.is_set():
+        while not self._stop.is_set():
             self._look.clear()
             try:
-                same = self.is_the_same()
+                is_same = self.is_the_same()
             except Exception as fault:  # noqa: BLE001 - units that are watched no more must not look confirmed
                 self.fault = fault
                 return
-            self._look.wait(_EVERY if same else _AGAIN)
+            self._look.wait(_EVERY if is_same else _AGAIN)
 
 
 def _units(info: TransducerInfo) -> str:
@@ -117,7 +117,7 @@ class NetFtTransducer(ThreadedTransducer):
         self,
         info: TransducerInfo,
         connect: Callable[[Deadline], Link],
-        who: Callable[[], TransducerInfo | None],
+        identify: Callable[[], TransducerInfo | None],
         clock: Clock,
         request: bytes = START,
         *,
@@ -125,12 +125,12 @@ class NetFtTransducer(ThreadedTransducer):
     ) -> None:
         """Take an identified box, opened by `opening`. `request` asks for the stream.
 
-        `who` returns who answers there now, soon, None when nobody does; it is asked again and again.
+        `identify` returns who answers there now, soon, None when nobody does; it is asked again and again.
         """
         super().__init__(info, clock, opening)
         self._request = request
         self._connect = connect
-        self._who = who
+        self._identify = identify
         self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
         self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
         self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
@@ -181,7 +181,7 @@ class NetFtTransducer(ThreadedTransducer):
         self._held_back: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
         self._wrong_length = 0
-        self._settings = _SettingsWatch(self.info, self._who, self.clock)
+        self._settings = _SettingsWatch(self.info, self._identify, self.clock)
         self._unconfirmed: deque[tuple[int, int]] = deque()  # when the last of so many readings came, units unsure [ns]
 
     def run(self) -> None:
@@ -310,7 +310,7 @@ class NetFtTransducer(ThreadedTransducer):
 
     def _answers(self) -> bool:
         try:
-            return self._who() is not None
+            return self._identify() is not None
         except SetupError:
             return True
 

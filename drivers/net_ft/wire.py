@@ -3,6 +3,7 @@
 Layouts: maker's manuals 9620-05-NET FT (chapters 10 and 11, section 15.2) and 9610-05-Ethernet Axia (chapter 10).
 """
 
+import itertools
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -102,7 +103,7 @@ def decode(datagrams: Sequence[bytes]) -> DecodedBatch:
     """Return the records of `datagrams`, one or several whole ones in each. Raises nothing."""
     size = RECORD.itemsize
     counts = [0 if len(datagram) % size else len(datagram) // size for datagram in datagrams]
-    records = np.frombuffer(b"".join([d for d, count in zip(datagrams, counts, strict=True) if count]), RECORD)
+    records = np.frombuffer(b"".join(itertools.compress(datagrams, counts)), RECORD)
     return DecodedBatch(records, np.repeat(np.arange(len(counts)), counts), counts.count(0))
 
 

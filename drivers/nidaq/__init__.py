@@ -112,7 +112,7 @@ class _TaskLink:
     def __init__(self, library: Any, device: str, rate: float) -> None:  # noqa: ANN401 - nidaqmx is not always there
         """Acquire the six differential pairs from ai0 on, at `rate` [Hz]. Raises SetupError when the device refuses."""
         self._library = library
-        self._where = device
+        self._device = device
         self._task: Any = None
         try:
             self._task = library.Task()
@@ -143,7 +143,7 @@ class _TaskLink:
         try:
             self._task.start() if data == b"start" else self._task.stop()
         except self._library.DaqError as error:
-            raise LinkLost(f"{self._where}: {_sentence(error)}") from None
+            raise LinkLost(f"{self._device}: {_sentence(error)}") from None
 
     def receive(self, timeout: float) -> bytes | None:
         deadline = time.monotonic() + timeout
@@ -151,7 +151,7 @@ class _TaskLink:
             try:
                 volts = self._task.read(number_of_samples_per_channel=self._library.constants.READ_ALL_AVAILABLE)
             except self._library.DaqError as error:
-                raise LinkLost(f"{self._where}: {_sentence(error)}") from None
+                raise LinkLost(f"{self._device}: {_sentence(error)}") from None
             readings = np.asarray(volts, np.float64).reshape(_GAUGES, -1).T
             if len(readings):
                 return readings.tobytes()
@@ -178,8 +178,6 @@ class _VoltsDecoder:
 
 
 class _TaskConversation:
-    """Begins and ends acquisitions."""
-
     decoder = _VoltsDecoder
     numbering = ScanCount
 

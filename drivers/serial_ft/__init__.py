@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.address import Address, AddressError, Driver, at, check_options
+from drivers.address import Address, AddressError, Driver, check_options, prefix_failures
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
@@ -32,9 +32,7 @@ _OPTIONS = frozenset({"baud", "format", "counts_per_N", "counts_per_Nm", "range_
 
 
 @dataclass(frozen=True, slots=True)
-class _Where:
-    """What an address says."""
-
+class _Target:
     address: Address
     port: str
     bauds: tuple[int, ...]
@@ -44,34 +42,34 @@ class _Where:
 
 def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the controller at `address`, set, its rate watched. Raises SetupError, LinkLost or DeviceFault."""
-    place = _where(address)
-    conversation = _ControllerConversation(binary=place.binary)
-    with at(address):
-        link, baud = _find_controller(place, deadline)
+    target = _target_of(address)
+    conversation = _ControllerConversation(binary=target.binary)
+    with prefix_failures(address):
+        link, baud = _find_controller(target, deadline)
         with contextlib.closing(link):
             reply = banner(deadline.bound(link))
             rate = measured_rate(link, conversation, clock, _MEASURED, deadline)
-    info = _info(place, baud, reply, rate)
-    return StreamingTransducer(info, lambda _: SerialLink(place.port, baud), conversation, clock, opening=deadline)
+    info = _info(target, baud, reply, rate)
+    return StreamingTransducer(info, lambda _: SerialLink(target.port, baud), conversation, clock, opening=deadline)
 
 
 def identify_serial_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing no setting (a stream nobody reads is ended)."""
-    place = _where(address)
-    with at(address):
-        link, baud = _find_controller(place, deadline)
+    target = _target_of(address)
+    with prefix_failures(address):
+        link, baud = _find_controller(target, deadline)
     link.close()
-    return _info(place, baud, "", math.nan)
+    return _info(target, baud, "", math.nan)
 
 
-def _find_controller(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
+def _find_controller(target: _Target, deadline: Deadline) -> tuple[SerialLink, int]:
     """Return an open line on which a controller answers, and its baud rate."""
     bauds: list[int] = []
-    for baud in place.bauds:
+    for baud in target.bauds:
         if deadline.remaining <= 0.0:
             break
         bauds.append(baud)
-        link = SerialLink(place.port, baud)
+        link = SerialLink(target.port, baud)
         try:
             if has_prompt(deadline.bound(link), tries=2):
                 return link, baud
@@ -87,11 +85,11 @@ def _find_controller(place: _Where, deadline: Deadline) -> tuple[SerialLink, int
     raise LinkLost(f"no controller answers (tried {rates} baud); check its power, the cable and the baud rate")
 
 
-def _info(place: _Where, baud: int, reply: str, rate: float) -> TransducerInfo:
-    address = place.address
+def _info(target: _Target, baud: int, reply: str, rate: float) -> TransducerInfo:
+    address = target.address
     settings = {
-        "baud": f"{baud}, {'as the address says' if len(place.bauds) == 1 else 'found by trying'}",
-        "output": "binary, without checksum" if place.binary else "ASCII, without checksum",
+        "baud": f"{baud}, {'as the address says' if len(target.bauds) == 1 else 'found by trying'}",
+        "output": "binary, without checksum" if target.binary else "ASCII, without checksum",
         "bias": "all biases of the controller dropped when a stream begins",
         "filter": "no moving average; set, answered with a prompt, and not to be read back",
         "units": "counts per N and N-m as the address says; the controller cannot be asked",
@@ -104,11 +102,11 @@ def _info(place: _Where, baud: int, reply: str, rate: float) -> TransducerInfo:
         uri=address.uri,
         driver="serial-ft",
         model="SIMULATED F/T Controller" if _is_simulated(address, reply) else "F/T Controller",
-        serial=place.calibration.serial,
+        serial=target.calibration.serial,
         simulated=_is_simulated(address, reply),
         rate=rate,
         counter_rate=math.nan,
-        calibration=place.calibration,
+        calibration=target.calibration,
         settings=settings,
         status=wire.STATUS_BITS,
     )
@@ -118,7 +116,7 @@ def _is_simulated(address: Address, reply: str) -> bool:
     return "SIMULATED" in reply.upper() or "simulated" in address.options
 
 
-def _where(address: Address) -> _Where:
+def _target_of(address: Address) -> _Target:
     check_options(address, _OPTIONS)
     port = port_of(address)
     form = address.word("format", ("binary", "ascii"))
@@ -137,13 +135,11 @@ def _where(address: Address) -> _Where:
         ranges,
         "counts per unit as the address says",
     )
-    return _Where(address, port, (baud,) if baud else _BAUDS, form == "binary", calibration)
+    return _Target(address, port, (baud,) if baud else _BAUDS, form == "binary", calibration)
 
 
 @dataclass(eq=False)
 class _ControllerConversation:
-    """Prompts, settings and streams of one controller."""
-
     binary: bool
     numbering = ClockRecovery
 
@@ -187,8 +183,8 @@ class _ControllerConversation:
         deadline = time.monotonic() + _ANSWER
         while time.monotonic() < deadline:
             response += link.receive(_SETTLED) or b""
-            _, echo, rest = response.partition(wire.STREAM)
-            _, line_end, first = rest.partition(b"\n")
+            _, echo, after_echo = response.partition(wire.STREAM)
+            _, line_end, first = after_echo.partition(b"\n")
             if echo and line_end:
                 return first
         raise LinkLost("the controller does not begin to stream; switch it off and on")
@@ -211,7 +207,7 @@ def banner(link: Link) -> str:
             "answer it from a terminal program once"
         )
     text = reply.rstrip().removesuffix(wire.PROMPT).decode("ascii", "replace")
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return " ".join("".join(character if character.isprintable() else " " for character in text).split())
 
 
 def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True) -> bytes:
@@ -224,10 +220,10 @@ def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True)
     reply = b""
     deadline = time.monotonic() + patience
     while True:
-        over = time.monotonic() >= deadline
+        expired = time.monotonic() >= deadline
         data = link.receive(_SETTLED)  # once more where this computer was busy until now
         reply += data or b""
-        if over or (reply.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
+        if expired or (reply.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
             return reply
 
 

@@ -62,7 +62,7 @@ class AsciiDecoder:
         raw: list[tuple[int, ...]] = []
         status: list[int] = []
         damaged: list[int] = []
-        *lines, rest = self._buffer.split(b"\n")
+        *lines, remainder = self._buffer.split(b"\n")
         for line in lines:
             values = _ascii_values(bytes(line) + b"\n")
             if values is None:
@@ -72,10 +72,10 @@ class AsciiDecoder:
             raw.append(values[1:])
             damaged.append(self._damaged)
             self._damaged = 0
-        while len(rest) > 2 * ASCII_SIZE:  # garbage without any line end
-            del rest[:ASCII_SIZE]
+        while len(remainder) > 2 * ASCII_SIZE:  # garbage without any line end
+            del remainder[:ASCII_SIZE]
             self._spoil(ASCII_SIZE)
-        self._buffer = rest
+        self._buffer = remainder
         return Records.of(raw, status, damaged)
 
     def _spoil(self, size: int) -> None:
@@ -99,7 +99,7 @@ class BinaryDecoder:
         """Expect the first record to begin with the first byte."""
         self.malformed = 0
         self._buffer = bytearray()
-        self._at = 0  # where the next record is expected in it
+        self._position = 0  # where the next record is expected in it
         self._doubt = 0  # records to come that are so near behind a break that they must prove themselves
         self._skipped = 0  # bytes since the last good record that belong to none
         self._last: Indices | None = None  # values of the last good record
@@ -110,9 +110,9 @@ class BinaryDecoder:
         records: list[tuple[int, ...]] = []
         status: list[int] = []
         damaged: list[int] = []
-        self._at = 0
+        self._position = 0
         while (shift := self._shift()) is not None:
-            record = np.frombuffer(bytes(self._buffer[self._at : self._at + BINARY_SIZE]), _BINARY)
+            record = np.frombuffer(bytes(self._buffer[self._position : self._position + BINARY_SIZE]), _BINARY)
             values = record["values"][0].astype(np.int64)
             if not shift and self._is_doubtful(values):
                 shift = BINARY_SIZE
@@ -121,7 +121,7 @@ class BinaryDecoder:
                 self._doubt = _DOUBT
             if shift:
                 self._skipped += shift
-                self._at += shift
+                self._position += shift
                 continue
             self._doubt = max(self._doubt - 1, 0)
             self._last = values
@@ -131,13 +131,13 @@ class BinaryDecoder:
             records.append(tuple(values.tolist()))
             status.append(int(record["error"][0]))
             damaged.append(loss)
-            self._at += BINARY_SIZE
-        del self._buffer[: self._at]
+            self._position += BINARY_SIZE
+        del self._buffer[: self._position]
         return Records.of(records, status, damaged)
 
     def _shift(self) -> int | None:
         """Return how many bytes at the head belong to no record; None while more bytes must come to tell."""
-        window = bytes(self._buffer[self._at : self._at + _WINDOW])
+        window = bytes(self._buffer[self._position : self._position + _WINDOW])
         if len(window) < _NEAR * BINARY_SIZE:
             return None
         near = np.frombuffer(window, _BINARY, _NEAR)
@@ -173,20 +173,20 @@ def _best_shift(gains: list[float]) -> int:
     """
     size = len(gains)
     value = [0.0] * (size + BINARY_SIZE)  # the best that can be made of all from a byte on
-    after = [0.0] * (size + 1)  # the same, with that byte skipped
-    for at in range(size - 1, -1, -1):
-        after[at] = max(after[at + 1], gains[at + 1] + value[at + 1 + BINARY_SIZE] if at + 1 < size else 0.0)
-        value[at] = max(gains[at] + value[at + BINARY_SIZE], after[at] - _BREAK)
+    skip_value = [0.0] * (size + 1)  # the same, with that byte skipped
+    for i in range(size - 1, -1, -1):
+        skip_value[i] = max(skip_value[i + 1], gains[i + 1] + value[i + 1 + BINARY_SIZE] if i + 1 < size else 0.0)
+        value[i] = max(gains[i] + value[i + BINARY_SIZE], skip_value[i] - _BREAK)
 
-    def breaks(at: int) -> bool:
-        return gains[at] + value[at + BINARY_SIZE] < after[at] - _BREAK
+    def breaks(position: int) -> bool:
+        return gains[position] + value[position + BINARY_SIZE] < skip_value[position] - _BREAK
 
     if not breaks(0):
-        end = next((at for at in range(BINARY_SIZE, size, BINARY_SIZE) if breaks(at)), size)
-        doubtful = end == BINARY_SIZE or (end < size and gains[0] < _gain(_AWAY))
+        stop = next((position for position in range(BINARY_SIZE, size, BINARY_SIZE) if breaks(position)), size)
+        doubtful = stop == BINARY_SIZE or (stop < size and gains[0] < _gain(_AWAY))
         return BINARY_SIZE if doubtful else 0
     shift = 1
-    while shift < BINARY_SIZE and gains[shift] + value[shift + BINARY_SIZE] < after[shift - 1]:
+    while shift < BINARY_SIZE and gains[shift] + value[shift + BINARY_SIZE] < skip_value[shift - 1]:
         shift += 1
     return shift
 

@@ -185,5 +185,5 @@ def _coarse_jumps(raw: Array, settings: SignalSettings) -> Mask:
 def saturated_readings(block: ReadingBlock, info: TransducerInfo) -> Mask:
     """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
     calibration = info.calibration
-    wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
+    wrench = calibration.in_own_frame(calibration.wrench(block.raw, np.zeros(6)))
     return info.status.doubtful(block.status) | (np.abs(wrench) > calibration.rated).any(axis=1)

@@ -15,12 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import compare_reports, finger_words
-from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, Parts
+from daq_app.analyst.finger_words import compare_reports, finger_text
+from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, FrameMesh
 from daq_app.analyst.process import Analyst
-from daq_app.analyst.session_words import lineage, numbers, points, progress_words, session_pictures, words_of
+from daq_app.analyst.session_words import lineage, numbers, points, progress_text, row_text, session_pictures
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
-from daq_app.analyst.stroke import EDGE_DISTANCE, EDGES, RawFile, decision_of, edges_of, history, reversal, within
+from daq_app.analyst.stroke import EDGE_DISTANCE, EDGES, RawFile, clamp_edge, decision_of, edges_of, history, reversal
 from daq_app.analyst.work import Work, sentence_of
 from sessions.recording import Recording
 from sessions.recording.derived import set_gain_error
@@ -31,12 +31,12 @@ from sessions.strokes.decisions import Decision, Decisions, read
 from solver.prediction import Skin
 from tests.sessions.report_example import example
 
-undo, redo = partial(reversal, again=False), partial(reversal, again=True)
+undo, redo = partial(reversal, redo=False), partial(reversal, redo=True)
 
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
 NOTHING = np.empty(0)
 FINGER = Finger(
-    Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64)),
+    FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64)),
     Frame(np.zeros((1, 2)), {"sed": np.zeros(1)}, {}, np.zeros((1, 2)), Skin(*[NOTHING] * 4, ()), NOTHING),
     NOTHING,
 )
@@ -55,7 +55,7 @@ def steady(state):
 def test_every_stroke_has_a_line_that_names_its_trial(state):
     lines = rows(state)
     assert [row.stroke for row in lines if row.stroke] == list(state.report.strokes)
-    for row, words in zip(lines, [words_of(row) for row in rows(state)], strict=True):
+    for row, words in zip(lines, [row_text(row) for row in rows(state)], strict=True):
         assert row.prediction is None or row.stroke is None or row.prediction.stroke == row.stroke.number
         assert row.trial is None or words.startswith(str(row.trial))
 
@@ -72,7 +72,7 @@ def test_every_stroke_has_a_line_that_names_its_trial(state):
 def test_a_line_says_what_the_subject_answered_to_its_trial(state, answer, words):
     finding = AnswerFinding(3, "stickiness", 20, "K20", *answer)
     after = fold(state, m.ReportReady("predicted", replace(state.report, answers=(finding,))))
-    assert [row.trial for row in rows(after) if words in words_of(row)] == [3]
+    assert [row.trial for row in rows(after) if words in row_text(row)] == [3]
 
 
 def test_the_answers_shown_are_those_that_the_session_recorded():
@@ -87,11 +87,11 @@ def test_a_session_of_scores_alone_has_a_line_for_each_answer():
     answers = [AnswerFinding(n, "stickiness", 20, "K20", "scored", 10.0 * n) for n in (1, 2)]
     report = replace(example(), strokes=(), predictions=(), answers=tuple(answers))
     state = fold(AnalystState(Path("x")), m.ReportReady("predicted", report))
-    assert [words_of(row) for row in rows(state)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
+    assert [row_text(row) for row in rows(state)] == ["1  stickiness 20  score 10", "2  stickiness 20  score 20"]
     second = fold(state, m.Choose(1))
     assert selected_row(second).trial == 2
     assert numbers(second) == ()
-    assert [link.place for link in lineage(second)] == ["session", "trial"]
+    assert [link.target for link in lineage(second)] == ["session", "trial"]
 
 
 def test_a_trial_without_a_stroke_stands_at_its_place_and_moves_no_choice(state):
@@ -126,8 +126,8 @@ def test_a_choice_beyond_the_list_is_its_end(state):
 def test_a_number_is_walked_back_to_its_readings_link_by_link(state, steady):
     at = next(i for i, row in enumerate(rows(state)) if row.stroke is steady)
     links = lineage(fold(state, m.Choose(at)))
-    assert [link.place for link in links] == ["session", "trial", "prediction", "friction", "window", "readings"]
-    assert f"{steady.steady[0]:.3f} to {steady.steady[1]:.3f} s" in links[4].words
+    assert [link.target for link in links] == ["session", "trial", "prediction", "friction", "window", "readings"]
+    assert f"{steady.steady[0]:.3f} to {steady.steady[1]:.3f} s" in links[4].text
 
 
 def test_a_number_that_is_withheld_says_why(state):
@@ -157,7 +157,7 @@ def test_nothing_is_shown_of_a_session_before_it_is_open():
     empty = AnalystState(Path("x"))
     assert (rows(empty), numbers(empty), points(empty), session_pictures(empty.report)) == ((), (), (), ())
     assert selected_row(fold(empty, m.Choose(2))) is None
-    assert progress_words(empty.step) == "opening  0 %"
+    assert progress_text(empty.step) == "opening  0 %"
 
 
 # ---- the model's answers come one by one
@@ -170,7 +170,7 @@ def test_answers_are_shown_as_they_come_and_stay_when_the_work_is_stopped(state)
     assert after.report.predictions == (prediction,)
     assert after.fingers == {(prediction.trial, prediction.stroke): FINGER}
     assert after.halted
-    assert "stopped" in finger_words(fold(after, m.Choose(0)))
+    assert "stopped" in finger_text(fold(after, m.Choose(0)))
 
 
 def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady):
@@ -204,7 +204,7 @@ def test_a_stroke_without_a_steady_window_is_offered_one(steady):
 
 @given(at=st.sampled_from(EDGES), time=st.floats(-10.0, 1000.0))
 def test_an_edge_never_passes_its_neighbours(steady, at, time):
-    limit = within(steady, at, time)
+    limit = clamp_edge(steady, at, time)
     times = {one.edge: one.time for one in edges_of(steady)} | {at: limit}
     in_order = [times[edge] for edge in EDGES]
     assert all(b - a >= EDGE_DISTANCE * (1 - 1e-6) for a, b in itertools.pairwise(in_order))
@@ -306,7 +306,7 @@ def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_fol
     work.do(m.Undo("E03"))
     assert states[-1].report.strokes[0].steady == before.steady
     assert states[-1].outcome.startswith("Undone, as decision 2: decision 1 by E02: steady of stroke 1 of trial 1")
-    work.do(m.Undo("E03", again=True))
+    work.do(m.Undo("E03", redo=True))
     assert states[-1].report.strokes[0].steady == after.steady
     assert len(read(tmp_path / "session").lines) == 3
 
@@ -314,7 +314,7 @@ def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_fol
 def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
     work, states = at_work
     work.do(m.Compare(str(SESSION)))
-    other = states[-1].other
+    other = states[-1].comparison
     predictions = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
     assert set(other.fingers) == set(predictions) != set()
     for key, finger in other.fingers.items():
@@ -339,7 +339,7 @@ def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_wor
     work.do(m.ShowReadings(1))
     readings = states[-1].excerpt.readings
     with h5py.File(SESSION / "session.h5") as file:
-        first, last = map(int, readings.place.split("rows ")[1].split(" to "))
+        first, last = map(int, readings.location.split("rows ")[1].split(" to "))
         np.testing.assert_array_equal(file["readings/raw"][first : last + 1], readings.block.raw)
         np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], readings.block.sequence)
         np.testing.assert_array_equal(file["readings/counter"][first : last + 1], readings.block.counter)

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from daq_app.cli.main import run
-from daq_app.console import Console, NotWritten, Parser, Underway, takes_all
+from daq_app.console import Console, EndlessProgress, NotWritten, Parser, accept_any_text
 from solver.progress import listening, report_progress
 
 
@@ -36,7 +36,7 @@ def test_without_json_the_document_stays_unsaid():
 
 def test_an_answer_that_the_output_has_no_letters_for_is_written_with_escapes():
     out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    takes_all(out)
+    accept_any_text(out)
     Console(as_json=False, out=out).say("Ω – 1.5")
     assert out.buffer.getvalue() == rb"\u03a9 \u2013 1.5" + os.linesep.encode()
 
@@ -96,15 +96,15 @@ def test_a_number_that_is_none_never_becomes_json():
 
 
 def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back_nor_ends_before_it():
-    work, states = Underway("solving"), []
+    work, states = EndlessProgress("solving"), []
     for doing, part in [("solving on a mesh", 0.0), ("following", 0.5), ("following", 1.0), ("following", 0.2)]:
         with listening(work.hear):
             report_progress(doing, part)
-        states.append((work.task, work.part))
+        states.append((work.task, work.fraction))
     work.hear("estimating", 0.5)
     work.reach(1.0)
     assert states == [("solving on a mesh", 0.0), ("following", 0.25), ("following", 0.5), ("following", 0.5)]
-    assert (work.task, work.part) == ("estimating", 0.99)
+    assert (work.task, work.fraction) == ("estimating", 0.99)
 
 
 class _Terminal(io.StringIO):

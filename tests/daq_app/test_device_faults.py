@@ -19,7 +19,7 @@ from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connect
 from daq_app.window.state import AppState, BenchState, fold
 from daq_app.window.view import bench_view
-from daq_app.wording import COUNT_WORDS
+from daq_app.wording import COUNT_LABELS
 from drivers.clock import RealClock
 from drivers.transducer import COUNTS, Health
 from sessions.plan.protocols import plan, protocol
@@ -97,15 +97,15 @@ def test_the_window_names_a_fault_of_the_device():
     report = HealthReport(health, 200.0, (0.0,) * 7, (0.0,) * 7, 200)
     view = bench_view(fold(OPEN, report).bench, recording=True)
     assert view.lamp == "wrong"
-    assert "gauge excitation current too low" in view.lamp_words
+    assert "gauge excitation current too low" in view.lamp_text
     assert ("doubtful", "200") in view.counters
 
 
 def test_every_count_of_a_transducer_s_health_is_shown_in_words():
-    assert set(COUNT_WORDS) == {"received", *COUNTS}
+    assert set(COUNT_LABELS) == {"received", *COUNTS}
     report = HealthReport(Health(received=200, off_units=12), 200.0, (0.0,) * 7, (0.0,) * 7, 0)
     view = bench_view(fold(OPEN, report).bench, recording=True)
-    assert view.lamp_words == "12 in other units"
+    assert view.lamp_text == "12 in other units"
     assert "_" not in "".join(name for name, _ in view.counters)
 
 

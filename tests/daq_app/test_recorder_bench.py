@@ -39,7 +39,7 @@ def seat():
 
 def test_a_tare_that_a_session_or_a_lost_transducer_ends_is_reported(seat):
     seat.bench.begin_tare(60.0)
-    seat.bench.lent(0)
+    seat.bench.lend(0)
     seat.bench.stream()
     seat.bench.begin_tare(60.0)
     seat.bench.lose("the cable is out")
@@ -51,7 +51,7 @@ def test_a_transducer_that_refuses_to_stream_after_a_session_is_lost_and_tried_a
     def refuse():
         raise SetupError("another program has it")
 
-    seat.bench.lent(0)
+    seat.bench.lend(0)
     monkeypatch.setattr(seat.bench.connected.transducer, "start", refuse)
     seat.bench.stream()
     assert LinkDown("another program has it") in seat.reports

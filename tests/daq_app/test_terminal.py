@@ -13,7 +13,7 @@ import pytest
 from desk import Desk
 
 from daq_app.cli.terminal import Terminal
-from daq_app.console import Console, takes_all
+from daq_app.console import Console, accept_any_text
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import SessionEnded
 from sessions.plan.protocols import plan, protocol
@@ -103,7 +103,7 @@ def test_a_session_is_ended_for_good_only_with_a_reason():
 
 def test_a_note_in_another_encoding_than_the_terminals_is_kept_with_escapes_and_the_next_line_is_heard():
     lines = io.TextIOWrapper(io.BytesIO("note müde\npause\n".encode("latin-1")), encoding="utf-8")
-    takes_all(lines)
+    accept_any_text(lines)
     terminal = Terminal(Console(as_json=False, err=io.StringIO()), forces=True, lines=lines)
     while not terminal.closed:
         time.sleep(0.001)

@@ -6,12 +6,12 @@ import pytest
 from daq_app.analyst.frame import (
     FIELD_CHOICES,
     Frame,
-    Parts,
+    FrameMesh,
     View,
     along_line,
     along_skin,
     automatic_range,
-    probe_words,
+    probe_text,
     value_at,
 )
 from solver.prediction import Skin, SkinLine
@@ -25,7 +25,7 @@ NODES = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 2.0]])
 TRIANGLES = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
 PLANE = 0.001 * (2.0 * NODES[:, 0] - NODES[:, 1])  # [MPa]
 SIDE = SkinLine(np.array([-1.0, 1.0]), np.array([[0] * 9, [1] * 9]), np.full((2, 9), 1.0 / 9.0))
-PARTS = Parts(TRIANGLES, np.empty((0, 8), np.int64), np.array([0, 1, 2, 2]), SIDE)
+PARTS = FrameMesh(TRIANGLES, np.empty((0, 8), np.int64), np.array([0, 1, 2, 2]), SIDE)
 
 
 def frame(**values):
@@ -37,7 +37,7 @@ def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back
     assert view.per_mm == 10.0
     assert view.visible(10.0, 20.0, 100.0, 200.0) == pytest.approx((-2.0, 8.0, -1.0, 19.0))
     points = np.array([[0.0, 0.0], [3.0, 2.5]])
-    places = [view.place(*pixel) for pixel in view.to_screen(points).tolist()]
+    places = [view.from_screen(*pixel) for pixel in view.to_screen(points).tolist()]
     np.testing.assert_allclose(places, points, atol=1e-12)
 
 
@@ -53,21 +53,21 @@ def test_a_linear_field_is_read_exactly_at_every_place_and_along_every_line():
 
 
 def test_the_probe_names_field_unit_place_and_tissue():
-    words = probe_words(frame(), PARTS, BY_NAME["sed"], 3.5, 2.0)
+    words = probe_text(frame(), PARTS, BY_NAME["sed"], 3.5, 2.0)
     assert words == "SED 5 kPa · x 3.500 mm, y 2.000 mm · dermis"
-    assert probe_words(frame(), PARTS, BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
+    assert probe_text(frame(), PARTS, BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
 
 
 def test_a_finger_without_triangles_has_no_field_anywhere():
-    bare = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
-    assert probe_words(frame(), bare, BY_NAME["sed"], 1.0, 1.0).endswith("no tissue")
+    bare = FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
+    assert probe_text(frame(), bare, BY_NAME["sed"], 1.0, 1.0).endswith("no tissue")
     assert np.isnan(along_line(frame(), bare, BY_NAME["sed"], ((0.0, 0.0), (1.0, 1.0)))[1]).all()
     assert along_skin(frame(), bare, BY_NAME["sed"])[0].size == 0
 
 
 def test_a_strain_has_no_unit_and_a_negative_number_a_minus():
     strained_frame = frame(principal_strain_least=np.full(5, -0.125))
-    words = probe_words(strained_frame, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
+    words = probe_text(strained_frame, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
     assert words == "least principal strain −0.125 · x 2.000 mm, y 0.500 mm · epidermis"
 
 

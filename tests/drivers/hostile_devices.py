@@ -124,7 +124,7 @@ def line(scheme, options, data):
 
     def talk():
         port.receive(0.002)
-        port.say(data() if callable(data) else data)
+        port.send(data() if callable(data) else data)
 
     hostile.serve(talk)
     hostile.at_close(port.close)

@@ -118,7 +118,7 @@ def test_every_byte_goes_through_unchanged_both_ways(terminal):
     terminal_bytes = b""
     while len(terminal_bytes) < 256:
         terminal_bytes += terminal.receive(1.0)
-    terminal.say(all_bytes)
+    terminal.send(all_bytes)
     link_bytes = b""
     while len(link_bytes) < 256:
         link_bytes += link.receive(1.0) or b""
@@ -186,9 +186,9 @@ def test_a_port_that_vanishes_while_its_waiting_time_is_set_is_lost(port_calls, 
 
 @needs_terminals
 def test_what_a_simulated_device_sent_before_its_port_was_opened_is_lost_as_on_a_real_one(terminal):
-    terminal.say(bytes(ROOM))  # more than the system holds
+    terminal.send(bytes(ROOM))  # more than the system holds
     link = SerialLink(terminal.path, 38400)
-    terminal.say(b"new")
+    terminal.send(b"new")
     data = b""
     while not data.endswith(b"new"):
         terminal.receive(0.01)

@@ -66,7 +66,7 @@ def test_it_comes_after_the_files_own_transform():
 def test_a_range_is_that_of_the_transducers_own_axes():
     calibration = info_with("net-ft://box?tool=0,0,100,0,0,90").calibration
     raw = np.linalg.solve(CALIBRATION.matrix, [18.0, 0.0, 0.0, 0.0, 0.0, 0.0])[None]
-    own_wrench = calibration.own(calibration.wrench(raw, np.zeros(6)))
+    own_wrench = calibration.in_own_frame(calibration.wrench(raw, np.zeros(6)))
     np.testing.assert_allclose(loads(own_wrench, calibration.rated)[0], [0.5, 0, 0, 0, 0, 0, 0.5], atol=1e-12)
 
 

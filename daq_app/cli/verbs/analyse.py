@@ -36,10 +36,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
         _print(recording, analysis, console)
     console.say(*(f"* {decision.sentence}" for decision in analysis.decisions))
     if analysis.tilt is not None:
-        console.say(_tilt_words(analysis.tilt, analysis.settings.tilt))
+        console.say(_tilt_text(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:
-        where = "" if flaw.trial is None else f"trial {flaw.trial}: "
-        console.say(f"{flaw.grade}: {where}{flaw.sentence}")
+        prefix = "" if flaw.trial is None else f"trial {flaw.trial}: "
+        console.say(f"{flaw.grade}: {prefix}{flaw.sentence}")
     return FLAWED if analysis.flawed else DONE
 
 
@@ -51,22 +51,22 @@ def _print(recording: Recording, analysis: Analysis, console: Console) -> None:
     report = numbers_alone(recording, analysis, None, Further())
     rows = [
         [
-            f"{one.number}{'*' if one.decided else ''}",
-            number(one.onset, 5),
-            number(one.lift, 5),
-            "–" if one.steady is None else f"{one.steady[0]:.2f} to {one.steady[1]:.2f}",
+            f"{stroke.number}{'*' if stroke.decided else ''}",
+            number(stroke.onset, 5),
+            number(stroke.lift, 5),
+            "–" if stroke.steady is None else f"{stroke.steady[0]:.2f} to {stroke.steady[1]:.2f}",
         ]
-        for one in report.strokes
+        for stroke in report.strokes
     ]
-    console.say(table(rows, head=["stroke", "onset [s]", "lift [s]", "steady [s]"]) if rows else "no stroke")
+    console.say(table(rows, header=["stroke", "onset [s]", "lift [s]", "steady [s]"]) if rows else "no stroke")
     console.say(*table_texts(report, "strokes"))
 
 
-def _tilt_words(tilt: Tilt, angles: tuple[float, float]) -> str:
-    ends = (tilt.x_interval, tilt.y_interval)
+def _tilt_text(tilt: Tilt, angles: tuple[float, float]) -> str:
+    intervals = (tilt.x_interval, tilt.y_interval)
     rows = [
-        f"{number(a)}° ({number(low)} to {number(high)}) to +{axis}"
-        for axis, a, (low, high) in zip("xy", tilt.lean, ends, strict=True)
+        f"{number(angle)}° ({number(low)} to {number(high)}) to +{axis}"
+        for axis, angle, (low, high) in zip("xy", tilt.lean, intervals, strict=True)
     ]
     levelling = f"levelled by {angles[0]:g}° and {angles[1]:g}°" if angles != (0.0, 0.0) else "not levelled"
     return f"tilt of the face, if the hand pressed straight down: {', '.join(rows)}; {tilt.kind}; {levelling}"

@@ -29,33 +29,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
     parser.add_argument("--trial", type=int, metavar="N", help="whose stroke; leave out for a recording without trials")
     parser.add_argument("--stroke", type=int, metavar="K", default=1, help="its number within the trial (1)")
-    what = parser.add_mutually_exclusive_group(required=True)
-    window = partial(what.add_argument, type=float, nargs=2, metavar=("FROM", "TO"))
+    choices = parser.add_mutually_exclusive_group(required=True)
+    window = partial(choices.add_argument, type=float, nargs=2, metavar=("FROM", "TO"))
     window("--steady", help="steady window, for mu_dynamic and speed [s]")
     window("--stick", help="stick phase: its greatest T/N is mu_static, its end break-away [s]")
-    what.add_argument("--onset", type=float, metavar="S", help="contact onset [s]")
-    what.add_argument("--lift", type=float, metavar="S", help="end of contact [s]")
-    what.add_argument("--slide-onset", type=float, metavar="S", help="where the slide begins, for mu_static [s]")
-    what.add_argument("--direction", type=int, choices=[1, -1], help="1 proximal to distal, -1 distal to proximal")
+    choices.add_argument("--onset", type=float, metavar="S", help="contact onset [s]")
+    choices.add_argument("--lift", type=float, metavar="S", help="end of contact [s]")
+    choices.add_argument("--slide-onset", type=float, metavar="S", help="where the slide begins, for mu_static [s]")
+    choices.add_argument("--direction", type=int, choices=[1, -1], help="1 proximal to distal, -1 distal to proximal")
     for name, meaning in (
         ("--drop", "the stroke stays out: it is shown, the model does not get it"),
         ("--keep", "the stroke stays in, its flaws were looked at"),
         ("--choose", "of its trial's strokes the model gets this one"),
         ("--list", "only tell what was decided"),
     ):
-        what.add_argument(name, action="store_true", help=meaning)
+        choices.add_argument(name, action="store_true", help=meaning)
     meaning = "of the session: level a face that leans so far to +x and to +y; without numbers as its presses tell"
-    what.add_argument("--tilt", type=float, nargs="*", metavar="DEGREES", help=meaning)
-    what.add_argument("--undo", type=int, metavar="NUMBER", help="take a decision back")
+    choices.add_argument("--tilt", type=float, nargs="*", metavar="DEGREES", help=meaning)
+    choices.add_argument("--undo", type=int, metavar="NUMBER", help="take a decision back")
     parser.add_argument("--by", metavar="CODE", help="who decides: a code, never a name")
     parser.add_argument("--why", metavar="REASON", help="in a few words")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     recording = Recording.open(options.session)
-    before = read(recording.folder)
+    decisions = read(recording.folder)
     if options.list:
-        return _list(before, console)
+        return _list(decisions, console)
     if options.by is None or options.why is None:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
@@ -63,15 +63,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("--choose is of a trial, whose stroke --stroke names: give --trial N")
     document = stored_document(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
-    analysis = analyse(recording, settings_of(document or {}), before)
+    analysis = analyse(recording, settings_of(document or {}), decisions)
     decision = _decision(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_present(analysis, decision)
-    after = preview(recording, decision, before, analysis)
+    new_analysis = preview(recording, decision, decisions, analysis)
     line = append(recording, decision)
     if document is not None:
         analyse_session(recording, console)
     older = (recording.folder / PREDICTION).is_file()
-    changes = _changes(analysis, after)
+    changes = _changes(analysis, new_analysis)
     console.result({"decision": line.to_dict(), "changes": changes, "prediction_is_older": older})
     console.say(recording.simulated_sentence, line.sentence, *changes)
     if older:
@@ -88,9 +88,9 @@ def _decision(options: argparse.Namespace) -> Decision:
     if options.drop or options.keep:
         return replace(decision, what="kept", new=bool(options.keep))
     names = ("steady", "stick", "onset", "lift", "slide_onset", "direction")
-    what = next(name for name in names if getattr(options, name) is not None)
-    new: Any = getattr(options, what)
-    return replace(decision, what=what, new=tuple(new) if what in ("steady", "stick") else new)
+    target = next(name for name in names if getattr(options, name) is not None)
+    value: Any = getattr(options, target)
+    return replace(decision, what=target, new=tuple(value) if target in ("steady", "stick") else value)
 
 
 def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
@@ -110,22 +110,22 @@ def _list(decisions: Decisions, console: Console) -> int:
     lines = [{**line.to_dict(), "in_force": line.number in in_force} for line in decisions.lines]
     console.result({"decisions": lines, "problems": list(decisions.problems)})
     for line in decisions.lines:
-        over = "" if line.number in in_force or line.undoes is not None else " (no longer in force)"
-        console.say(f"{line.made_utc}  {line.sentence}{over}")
+        remark = "" if line.number in in_force or line.undoes is not None else " (no longer in force)"
+        console.say(f"{line.made_utc}  {line.sentence}{remark}")
     console.say(*decisions.problems, None if decisions.lines else "nothing was decided")
     return FLAWED if decisions.problems else DONE
 
 
-def _changes(before: Analysis, after: Analysis) -> list[str]:
+def _changes(old_analysis: Analysis, new_analysis: Analysis) -> list[str]:
     """Return a sentence for each stroke whose numbers a decision changes."""
     sentences: list[str] = []
-    strokes = [{one.stroke for one in analysis.friction} for analysis in (before, after)]
-    for at, (old, new) in enumerate(zip(before.strokes, after.strokes, strict=False)):
-        numbers = ((name, number(getattr(old, name), 4), number(getattr(new, name), 4)) for name in CHANGING)
-        words = [f"{name} {earlier} -> {later}" for name, earlier, later in numbers if earlier != later]
-        if (at in strokes[0]) != (at in strokes[1]):
-            words.append("the model gets it" if at in strokes[1] else "the model does not get it")
-        if words:
-            trial = "" if new.trial is None else f" of trial {new.trial}"
-            sentences.append(f"stroke {new.number}{trial}: {', '.join(words)}")
+    strokes = [{friction.stroke for friction in analysis.friction} for analysis in (old_analysis, new_analysis)]
+    for index, (old_stroke, new_stroke) in enumerate(zip(old_analysis.strokes, new_analysis.strokes, strict=False)):
+        pairs = ([number(getattr(stroke, name), 4) for stroke in (old_stroke, new_stroke)] for name in CHANGING)
+        texts = [f"{name} {old} -> {new}" for name, (old, new) in zip(CHANGING, pairs, strict=True) if old != new]
+        if (index in strokes[0]) != (index in strokes[1]):
+            texts.append("the model gets it" if index in strokes[1] else "the model does not get it")
+        if texts:
+            trial = "" if new_stroke.trial is None else f" of trial {new_stroke.trial}"
+            sentences.append(f"stroke {new_stroke.number}{trial}: {', '.join(texts)}")
     return sentences

@@ -33,17 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    with recordings_in(out):
-        return _demonstrate(options, out, console)
+    results = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    with recordings_in(results):
+        return _demonstrate(options, results, console)
 
 
-def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> int:
+def _demonstrate(options: argparse.Namespace, results: Path, console: Console) -> int:
     start = time.monotonic()
     clock = clock_at(1.0 if options.real_time else _PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:
-        study = simulated_study(out, options.seed, clock, console)
+        study = simulated_study(results, options.seed, clock, console)
     except StudyCutShort as cut:
         console.note(f"daq-app: {cut}")
         return FLAWED
@@ -58,12 +58,13 @@ def _demonstrate(options: argparse.Namespace, out: Path, console: Console) -> in
     console.progress(0.9, "writing the report")
     scores = [score_table(Recording.open(folder)) for folder in study.scores]
     report = findings(recording, analysis, prediction, scores, study.ground_truth)
-    page, pictures = out / "report.html", out / "pictures"
+    page, pictures = results / "report.html", results / "pictures"
     drawings = plates(report)
     write_report(report, page, drawings)
     write_figures(report, pictures, drawings)
 
-    rows = _rows(study, analysis, prediction, {(m.descriptor, m.index): m.mean for m in mean_scores(scores)})
+    means = {(score.descriptor, score.index): score.mean for score in mean_scores(scores)}
+    rows = _rows(study, analysis, prediction, means)
     summary = {
         "simulated": True,
         "rows": rows,
@@ -105,8 +106,8 @@ def _rows(
 
 
 def _print(summary: Mapping[str, Any], rows: list[dict[str, Any]], console: Console) -> None:
-    head = ["SIMULATED", "true mu", "estimated", "true tau [kPa]", "estimated", "true V [mm/s]", "estimated"]
-    head += ["SED [kPa]", "mean score"]
+    header = ["SIMULATED", "true mu", "estimated", "true tau [kPa]", "estimated", "true V [mm/s]", "estimated"]
+    header += ["SED [kPa]", "mean score"]
     cells = [
         [
             f"{row['descriptor']} {row['index']}",
@@ -123,7 +124,7 @@ def _print(summary: Mapping[str, Any], rows: list[dict[str, Any]], console: Cons
     ]
     console.say(
         "",
-        table(cells, head=head),
+        table(cells, header=header),
         "",
         f"{summary['readings']} readings, {summary['lost']} lost; {summary['seconds']:.1f} s in all",
         *(f"flaw: {sentence}" for sentence in summary["flaws"]),

@@ -13,7 +13,7 @@ import numpy as np
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connect
-from daq_app.wording import COUNT_WORDS, number
+from daq_app.wording import COUNT_LABELS, number
 from drivers.calibration_file import AXES
 from drivers.catalog import DRIVERS, Probe, reachable
 from drivers.clock import Clock, RealClock
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for device in devices
     ]
     rows.append(["sim:", "simulated bench", "–", "always there"])
-    console.say(table(rows, head=["address", "model", "serial", "calibration"]))
+    console.say(table(rows, header=["address", "model", "serial", "calibration"]))
     for line in lines:
         addresses = " or ".join(f"{driver.name}://{line}" for driver in DRIVERS if driver.serial_line)
         console.say(f"{line} is a serial port, which was not opened: ask it as {addresses}")
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             problem = device.problem.removeprefix(f"{device.uri}: ")
             console.say(problem if device.uri in problem else f"{device.uri}: {problem}")
         if device.info is not None and (life := life_of(device.info.serial)) is not None:
-            console.say(f"{device.info.serial}: {_life_words(life)}")
+            console.say(f"{device.info.serial}: {_life_text(life)}")
     return DONE
 
 
@@ -72,7 +72,7 @@ def _description(device: Probe) -> dict[str, Any]:
     }
 
 
-def _life_words(life: Life) -> str:
+def _life_text(life: Life) -> str:
     overloads = f"{life.overloads} overloads, the last on {life.last_overload}" if life.overloads else "no overload"
     if not life.zeros:
         return f"{overloads} since it is known here"
@@ -110,7 +110,7 @@ def _probe(uri: str, console: Console) -> int:
     console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
     console.say(f"calibration: {info.calibration.source}")
     console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
-    counts = ", ".join(f"{words} {getattr(health, name)}" for name, words in COUNT_WORDS.items())
+    counts = ", ".join(f"{label} {getattr(health, name)}" for name, label in COUNT_LABELS.items())
     console.say(f"{counts}, lag {health.lag_ms:.1f} ms")
     if health.flagged:
         console.say(f"the status of readings said: {flagged_words(health.flagged)}")
@@ -118,8 +118,8 @@ def _probe(uri: str, console: Console) -> int:
         console.say(health.rate_words)
     if mean is not None and noise is not None:
         columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
-        rows = [[axis, number(m), number(sd, 2), unit] for axis, m, sd, unit in columns]
-        console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
+        rows = [[axis, number(mean_value), number(sd, 2), unit] for axis, mean_value, sd, unit in columns]
+        console.say(table(rows, header=["axis", "mean", "noise (sd)", "unit"]))
     flawed = any(getattr(health, name) for name in _FLAWS) or not len(readings)
     return FLAWED if flawed else DONE
 

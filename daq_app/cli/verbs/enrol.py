@@ -20,7 +20,7 @@ from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"
 LABELS = "For whoever puts the labels on."  # the first line of their file
-_HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
+_COLUMNS = ["subject", "row", "own finger, angle, depths", "withdrawn"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,7 +80,7 @@ def _write_labels(folder: Path, path: Path) -> None:
 
 
 def _show(study: Study, member: Member | None, console: Console) -> None:
-    rows = [_row(study, one) for one in study.members.values()]
+    rows = [_row(study, entry) for entry in study.members.values()]
     console.result(
         {
             "study": study.name,
@@ -95,12 +95,12 @@ def _show(study: Study, member: Member | None, console: Console) -> None:
     blind = "" if study.key_sha256 is None else ", unblinded" if study.unblinded else ", blinded"
     console.say(f"{study.name}: {study.protocol.name}, {design}{blind}")
     cells = [[row["subject"], str(row["row"]), row["own"] or "–", row["withdrawn"] or "–"] for row in rows]
-    console.say(table(cells, head=_HEAD) if cells else "nobody is enrolled")
+    console.say(table(cells, header=_COLUMNS) if cells else "nobody is enrolled")
 
 
 def _row(study: Study, member: Member) -> dict[str, Any]:
     body = member.body
-    own = {
+    measures = {
         "tip_radius": body.finger.tip_radius,
         "width": body.finger.width,
         "contact_angle": body.contact_angle,
@@ -109,6 +109,6 @@ def _row(study: Study, member: Member) -> dict[str, Any]:
     return {
         "subject": member.subject,
         "row": study.row(member.slot),
-        "own": ", ".join(f"{name} {value:g}" for name, value in own.items() if value is not None),
+        "own": ", ".join(f"{name} {value:g}" for name, value in measures.items() if value is not None),
         "withdrawn": member.withdrawn,
     }

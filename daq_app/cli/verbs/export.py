@@ -30,7 +30,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     recording = reveal(Recording.open(options.session))
     folder = options.out or Path("exports") / f"{options.session.resolve().name}-{options.format}"
     source = _source(recording, console)
-    export(source, options.format, folder, lambda part: console.progress(part, f"writing {options.format}"))
+    export(source, options.format, folder, lambda fraction: console.progress(fraction, f"writing {options.format}"))
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     losses = list(recording.losses)
     console.result({"folder": str(folder), "files": [str(path) for path in files], "losses": losses})

@@ -71,8 +71,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     outcome = _fit(options, recording.plan, curves, settings.gain_uncertainty, console)
     simulated = recording.simulated_sentence
     if options.scene is not None:
-        head = f"# {simulated}\n" if simulated else ""
-        write_whole(options.scene, f"{head}{SCENE_HEAD}\n{toml_text(outcome.scene)}".encode())
+        mark = f"# {simulated}\n" if simulated else ""
+        write_whole(options.scene, f"{mark}{SCENE_HEAD}\n{toml_text(outcome.scene)}".encode())
     assumptions = {
         "mu": options.mu,
         "prior_factor": options.prior,
@@ -116,17 +116,17 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
     curves = press_curves(recording, replace(log, instants=log.instants + shift), settings)
     if not curves.presses:
-        why = curves.left_out[0] if curves.left_out else "It holds no press."
+        reason = curves.left_out[0] if curves.left_out else "It holds no press."
         raise FitError(
-            f"{recording.folder} holds no press that {options.displacement} follows. {why} Press straight down, hold "
-            "for half a second without a slide, and log on the session's clock."
+            f"{recording.folder} holds no press that {options.displacement} follows. {reason} Press straight down, "
+            "hold for half a second without a slide, and log on the session's clock."
         )
     return curves
 
 
 def _relaxation_flaws(curves: PressCurves) -> list[str]:
     """Say where the finger relaxes in a hold, which bends its force over depth."""
-    fall = max((one.fall for one in curves.holds if one is not None), default=0.0)
+    fall = max((hold.fall for hold in curves.holds if hold is not None), default=0.0)
     if fall <= FALL:
         return []
     return [
@@ -148,53 +148,54 @@ def _fit(
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, progress)
     if options.relaxation:
         finger_fit, rate = relaxing_fit(
-            model, [one for one, _ in holds], [one for _, one in holds], gain_error, options.seed
+            model, [press for press, _ in holds], [hold for _, hold in holds], gain_error, options.seed
         )
     else:
         finger_fit, rate = fit(model, curves.presses, gain_error, options.seed), None
-    own = check(model, np.array([one.stiffness.value for one in finger_fit.layers]), finger_fit.deepest)
-    return _Outcome(finger_fit, own, rate)
+    solver_check = check(model, np.array([layer.stiffness.value for layer in finger_fit.layers]), finger_fit.deepest)
+    return _Outcome(finger_fit, solver_check, rate)
 
 
 def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
-    finger_fit, own = outcome.fit, outcome.check
+    finger_fit, solver_check = outcome.fit, outcome.check
     rows = [
         [
-            one.name,
-            number(one.stiffness.value, factor=1e3),
-            _ends(one.stiffness),
-            _ends(one.profile),
-            _ends(one.prior),
+            layer.name,
+            number(layer.stiffness.value, factor=1e3),
+            _interval_text(layer.stiffness),
+            _interval_text(layer.profile),
+            _interval_text(layer.prior),
             f"{100 * share:.0f} %",
         ]
-        for one, share in zip(finger_fit.layers, own.shares, strict=True)
+        for layer, share in zip(finger_fit.layers, solver_check.shares, strict=True)
     ]
-    console.say(table(rows, head=["E [kPa]", "found", "95 % interval", "by likelihood alone", "prior", "share of N"]))
+    console.say(table(rows, header=["E [kPa]", "found", "95 % interval", "by likelihood alone", "prior", "share of N"]))
     overall, (low, high) = finger_fit.overall, (finger_fit.overall.low or 0.0, finger_fit.overall.high or 0.0)
     console.say(
         f"overall stiffness: {number(overall.value)} of the published finger's, 95 % interval {span(low, high)}, from "
         f"{finger_fit.points} points of {len(finger_fit.touch)} presses up to {number(finger_fit.deepest)} mm"
         + (f", and {finger_fit.widths} lengths of contact" if finger_fit.widths else "")
     )
-    console.say(*(one.sentence for one in finger_fit.layers))
+    console.say(*(layer.sentence for layer in finger_fit.layers))
     if outcome.relaxation is not None:
-        part, time = outcome.relaxation.part, outcome.relaxation.time
+        share, time = outcome.relaxation.part, outcome.relaxation.time
         console.say(
-            f"relaxation: part {part.value:.2f} (95 % {_ends(part, 1.0)}), time {number(time.value)} s "
-            f"(95 % {_ends(time, 1.0)}); the stiffness above is that at once"
+            f"relaxation: part {share.value:.2f} (95 % {_interval_text(share, 1.0)}), time {number(time.value)} s "
+            f"(95 % {_interval_text(time, 1.0)}); the stiffness above is that at once"
         )
         console.say(outcome.relaxation.sentence)
     console.say(
         f"Assumed: friction {options.mu:g}, width {finger_fit.scene.finger.width:g} mm, a prior of a factor "
         f"{options.prior:g}. The stiffness is by the width: a finger twice as wide is half as stiff."
     )
-    agree = "agree with" if own.deviation <= AGREE else "DIFFER from"
-    console.say(f"The solver's own forces {agree} those fitted: by {number(own.deviation, 1, factor=100)} % at most.")
+    agree = "agree with" if solver_check.deviation <= AGREE else "DIFFER from"
+    percent = number(solver_check.deviation, 1, factor=100)
+    console.say(f"The solver's own forces {agree} those fitted: by {percent} % at most.")
     if options.scene is not None:
         console.say(f"finger: {options.scene}, for 'daq-app predict SESSION --scene {options.scene}'")
 
 
-def _ends(one: Interval, unit: float = 1e-3) -> str:
+def _interval_text(interval: Interval, unit: float = 1e-3) -> str:
     """Return an interval in a unit, kPa for stiffness."""
-    low, high = ("open" if end is None else number(end / unit) for end in (one.low, one.high))
+    low, high = ("open" if limit is None else number(limit / unit) for limit in (interval.low, interval.high))
     return f"{low} to {high}"

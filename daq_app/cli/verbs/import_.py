@@ -81,12 +81,12 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     from sessions.recording.archive import seal
     from sessions.recording.manifest import list_in_manifest
 
-    units = _parts(options.units)
+    units = _names(options.units)
     if units is not None and len(units) != 2:
         raise WrongValue(f"--units {options.units} is not allowed: give two, of forces and torques, such as N,Nmm")
     import_options = ImportOptions(
         units=None if units is None else (units[0], units[-1]),
-        axes=_parts(options.axes),
+        axes=_names(options.axes),
         normal=options.normal,
         height=options.height,
         rate=options.rate,
@@ -98,7 +98,8 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
         summary = import_csv(options.file, folder, import_options)
         seal(summary.folder)
         list_in_manifest(summary.folder, (ORIGINAL_FILE,))
-    console.result({"session": str(summary.folder), **{k: v for k, v in asdict(summary).items() if k != "folder"}})
+    document = asdict(summary)
+    console.result({"session": str(document.pop("folder")), **document})
     console.say(
         f"{summary.folder}: {summary.readings} readings at {number(summary.rate, 4)} a second",
         *(f"default: {default}" for default in summary.defaults),
@@ -107,5 +108,5 @@ def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     return DONE
 
 
-def _parts(text: str | None) -> tuple[str, ...] | None:
-    return None if text is None else tuple(part.strip() for part in text.split(","))
+def _names(text: str | None) -> tuple[str, ...] | None:
+    return None if text is None else tuple(name.strip() for name in text.split(","))

@@ -64,9 +64,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(recording.simulated_sentence)
     if not console.as_json:
         _print(options, recording, analysis, prediction, afferent, console)
-    for one in firing["afferent"]["parameters"] if firing else ():
-        name, kind = one["name"].replace("_", " "), f"{one['standing']}; {one['basis']}"
-        console.say(f"  {name} = {one['value']:g} {one['unit']} ({kind})")
+    for parameter in firing["afferent"]["parameters"] if firing else ():
+        name, origin = parameter["name"].replace("_", " "), f"{parameter['standing']}; {parameter['basis']}"
+        console.say(f"  {name} = {parameter['value']:g} {parameter['unit']} ({origin})")
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
     return FLAWED if unreadable or any(row.sed is None for row in prediction.trials) else DONE
@@ -85,8 +85,8 @@ def _print(
     from sessions.report import Further, numbers_alone
 
     if not prediction.trials:
-        why = "forces were recorded" if recording.info is None else "stroke was found"
-        console.say(f"nothing to predict: no {why}")
+        missing = "forces were recorded" if recording.info is None else "stroke was found"
+        console.say(f"nothing to predict: no {missing}")
         return
     further = Further()
     if options.afferent:
@@ -97,12 +97,12 @@ def _print(
     if quantity.name != SED.name:
         unit, factor = quantity.shown_unit
         cells = [[trial, *_response(row, quantity.name, factor)] for trial, row in trials]
-        console.say("", table(cells, head=["trial", f"{quantity.label} [{unit}]", "error"]))
+        console.say("", table(cells, header=["trial", f"{quantity.label} [{unit}]", "error"]))
     if options.intervals:
         slopes = [(trial, row.interval or SedInterval(None, None, None)) for trial, row in trials]
-        cells = [[trial, number(one.by_mu, factor=1e4), number(one.by_tau_max, factor=1e3)] for trial, one in slopes]
-        head = ["trial", "SED per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]"]
-        console.say("\nby the solver's tangent:", table(cells, head=head))
+        cells = [[trial, number(sed.by_mu, factor=1e4), number(sed.by_tau_max, factor=1e3)] for trial, sed in slopes]
+        header = ["trial", "SED per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]"]
+        console.say("\nby the solver's tangent:", table(cells, header=header))
 
 
 def _response(row: TrialPrediction, name: str, factor: float) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, repeat, stored_document
-from daq_app.cli.options import add_session, within
+from daq_app.cli.options import add_session, number_in_range
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording
 from sessions.recording.derived import first_sentences
@@ -26,7 +26,7 @@ EXAMPLE = "daq-app replay recordings/P07 --fast"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
     pace = parser.add_mutually_exclusive_group()
-    parse = within("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as it goes")
+    parse = number_in_range("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as it goes")
     meaning = "times as fast as it was recorded (1)"
     pace.add_argument("--speed", type=parse, default=1.0, metavar="X", help=meaning)
     pace.add_argument("--fast", action="store_true", help="as fast as the machine goes")
@@ -42,11 +42,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         except Stopped:
             raise KeyboardInterrupt from None
         wall_s = time.perf_counter() - start
-        differences = [
-            *different_readings(recording, copy),
-            *first_sentences(list(different_events(recording, copy))),
-        ]
-        parts = ["readings", "events", ANALYSIS]
+        differences = [*different_readings(recording, copy), *first_sentences(list(different_events(recording, copy)))]
+        items = ["readings", "events", ANALYSIS]
         decisions = read(recording.folder)  # people decided about the recording, not about its replay
         analysis = stored_document(options.session, ANALYSIS)
         if analysis is None:
@@ -56,14 +53,14 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if prediction is not None:
             console.progress(0.9, f"making {PREDICTION} again")
             differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, copy, decisions, recording))
-            parts.append(PREDICTION)
+            items.append(PREDICTION)
     events = recording.events
     duration_s = (events[-1].time_ns - events[0].time_ns) * 1e-9 if events else 0.0
     notes = list(_notes(recording))
     console.result(
         {
             "session": str(options.session),
-            "compared": parts,
+            "compared": items,
             "differences": differences,
             "notes": notes,
             "duration_s": duration_s,
@@ -75,7 +72,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         recording.simulated_sentence,
         *notes,
         *differences,
-        f"{options.session}: {outcome} ({', '.join(parts)} compared)",
+        f"{options.session}: {outcome} ({', '.join(items)} compared)",
         f"{duration_s:.1f} s of session in {wall_s:.2f} s, the comparison not counted",
     )
     return FLAWED if differences else DONE

@@ -45,15 +45,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
     recording, other_sessions, unreadable = open_visit(options.session, options.subject, console)
     score_only = [reveal(Recording.open(folder)) for folder in options.scores]
-    score_only += [one for one in other_sessions if any(record.score is not None for record in one.trials)]
-    folders = [one.folder.resolve() for one in (recording, *score_only)]
-    if twice := next((folder for at, folder in enumerate(folders) if folder in folders[:at]), None):
+    score_only += [visit for visit in other_sessions if any(record.score is not None for record in visit.trials)]
+    folders = [visit.folder.resolve() for visit in (recording, *score_only)]
+    if twice := next((folder for index, folder in enumerate(folders) if folder in folders[:index]), None):
         raise WrongValue(f"--scores {twice} is not allowed: its scores are in the report already")
-    for one in (recording, *score_only):
-        if one.plan.blinded:
-            raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
-    for one in score_only[: len(options.scores)]:
-        _check_scores(one, recording)
+    for visit in (recording, *score_only):
+        if visit.plan.blinded:
+            raise Blinded(f"{visit.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
+    for visit in score_only[: len(options.scores)]:
+        _check_scores(visit, recording)
     from sessions.report import pages
 
     if options.out is not None:
@@ -67,9 +67,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
     # What was asked before is asked again, so that nothing kept is lost, and what a page shows.
-    before = stored_options(recording) or PredictionOptions()
-    variants = max(before.variants, options.variants, key=("none", "small", "both").index)
-    choices = replace(before, intervals=True, variants=variants, course="history")
+    present_options = stored_options(recording) or PredictionOptions()
+    variants = max(present_options.variants, options.variants, key=("none", "small", "both").index)
+    choices = replace(present_options, intervals=True, variants=variants, course="history")
     prediction = predict_session(recording, analysis, console, choices, afferent)
     from sessions.report import findings
 
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         progress = console.reporter("many paths of the analysis", until=0.9)
         paths = trial_paths(recording, prediction, progress, finite=finite, quantity=quantity)
     further = Further(firing, facts, afferent, options.quantity, paths, unreadable=unreadable)
-    report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)
+    report = findings(recording, analysis, prediction, [score_table(visit) for visit in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = pages.plates(report)
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
@@ -100,5 +100,5 @@ def _check_scores(visit: Recording, recording: Recording) -> None:
     stimuli = {(trial.stimulus.descriptor, trial.stimulus.index) for trial in recording.plan.trials}
     table = score_table(visit)
     if not table.other_answers and stimuli.isdisjoint((score.descriptor, score.index) for score in table.scores):
-        which = "a stimulus of this session" if table.scores else "any stimulus"
-        raise WrongValue(f"--scores {visit.folder} is not allowed: it holds no score of {which}; leave it out")
+        stimulus_text = "a stimulus of this session" if table.scores else "any stimulus"
+        raise WrongValue(f"--scores {visit.folder} is not allowed: it holds no score of {stimulus_text}; leave it out")

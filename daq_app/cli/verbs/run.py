@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
-from daq_app.cli.options import add_body_arguments, add_flag, add_number, add_shared, body_of, own_sentence
+from daq_app.cli.options import add_body_arguments, add_flag, add_number, add_shared, body_of, measures_sentence
 from daq_app.cli.terminal import attend_session, open_device
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
@@ -42,8 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     meaning = "simulated seconds a real second, simulated people only (1)"
     parser.add_argument("--pace", type=float, default=1.0, help=meaning)
     parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
-    words = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
-    add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", words)
+    allowed = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
+    add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", allowed)
     parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     meaning = "that the subject reads, such as de; the protocol must have it (its own)"
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     simulated_bench = options.device is not None and options.device.startswith("sim:")
     _refuse_mixtures(options, simulated_bench=simulated_bench)
-    session_protocol, seed, body, place = _choices(options)
+    session_protocol, seed, body, study_place = _choices(options)
     session_plan = plan(
         session_protocol,
         options.subject,
@@ -66,12 +66,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         ),
         phases=options.phases,
         body=body,
-        place=place,
+        place=study_place,
     )
     stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
-    what = session_plan.protocol if place is None else "forces" if session_plan.forces else "scores"
-    folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{what}_{stamp}"
-    console.note(own_sentence(session_plan))
+    purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
+    folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{purpose}_{stamp}"
+    console.note(measures_sentence(session_plan))
     simulated = options.simulate_subject
     people = (
         People() if simulated is None else People("simulated people", simulated, session_protocol.simulated_friction)
@@ -105,8 +105,8 @@ def _choices(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPla
         return protocol(options.protocol), seed, body_of(options), None
     study = open_study(options.study)
     member = study.member(options.subject)
-    place = study.place(member, study_key(options.study))
-    return study.protocol, study.session_seed(member.slot), member.body, place
+    study_place = study.place(member, study_key(options.study))
+    return study.protocol, study.session_seed(member.slot), member.body, study_place
 
 
 def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> None:

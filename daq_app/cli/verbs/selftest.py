@@ -51,10 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    out: Path = options.out
-    out.mkdir(parents=True, exist_ok=True)
-    warning = unsafe(out)
-    room = Path(tempfile.mkdtemp(prefix="selftest-", dir=out))
+    parent: Path = options.out
+    parent.mkdir(parents=True, exist_ok=True)
+    warning = unsafe(parent)
+    room = Path(tempfile.mkdtemp(prefix="selftest-", dir=parent))
     try:
         certificate = selftest(room, console.progress)
     except SelfTestFailed as failure:
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         shutil.rmtree(room, ignore_errors=True)
         raise
     shutil.rmtree(room)
-    path = write_certificate(out, certificate)
+    path = write_certificate(parent, certificate)
     console.result({"passed": True, "certificate": str(path), "warning": warning, **certificate})
     console.say(certificate["sentence"])
     console.note(None if warning is None else f"all the same, {warning}")
@@ -120,13 +120,13 @@ class _WatchedRecorder:
         self.events: list[LoggedEvent] = []
         self.safe = 0  # readings acknowledged
         self.newest_ns = 0  # when the newest reading shown was received [ns, session clock]
-        self._over = False
+        self._has_ended = False
         self._queue: list[m.Report] = []
 
-    def until(self, kind: type[AReport]) -> AReport:
+    def until(self, report_type: type[AReport]) -> AReport:
         """Return the next report of a kind."""
         for report in self._reports(DEADLINE):
-            if isinstance(report, kind):
+            if isinstance(report, report_type):
                 return report
             if isinstance(report, m.Failed | m.Gone):
                 raise SelfTestFailed(report.sentence)
@@ -155,10 +155,10 @@ class _WatchedRecorder:
                         self.events.append(report)
                     case Status(safe=safe):
                         self.safe = max(self.safe, safe.readings)
-                    case m.Live(received_ns=received_ns) if len(received_ns) and not self._over:
+                    case m.Live(received_ns=received_ns) if len(received_ns) and not self._has_ended:
                         self.newest_ns = int(received_ns[-1])
                     case m.SessionEnded():
-                        self._over = True  # what is shown from now on is not recorded
+                        self._has_ended = True  # what is shown from now on is not recorded
                     case _:
                         pass
                 yield report

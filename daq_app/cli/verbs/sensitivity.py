@@ -74,8 +74,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.design is None:
         design, origin = usual_design(scene), "default: nobody set it"
     else:
-        where = str(options.design)
-        design, origin = check_design(tables_in(text_of(options.design), where), scene, where), "set"
+        file_name = str(options.design)
+        design, origin = check_design(tables_in(text_of(options.design), file_name), scene, file_name), "set"
     progress = console.counter("scenes", samples * (len(design) + 2))
     indices, seds = sensitivity(scene, design, samples, options.seed, progress)
     low, high = float(seds.min()), float(seds.max())
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             "seed": options.seed,
             "design_origin": origin,
             "sed_range": [low, high],
-            "indices": [asdict(one) for one in indices],
+            "indices": [asdict(index) for index in indices],
             "doubts": doubtful,
             "not_varied": constant,
         }
@@ -105,8 +105,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     """Ask all fingers and print the signs of the slope of one quantity, and the shares of all."""
-    at = _NAMES.index(options.quantity)
-    label = QUANTITIES[at].label
+    column_index = _NAMES.index(options.quantity)
+    label = QUANTITIES[column_index].label
     changes = sign_map.single_changes(options.kinematics)
     map_trials = sign_map.map_trials(options.kinematics)
     points = saltelli_points(sign_map.DESIGN, samples, options.seed)
@@ -118,8 +118,8 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     except OSError as error:
         if options.keep is None:
             raise
-        kind = WrongValue if error.errno in (errno.EEXIST, errno.EISDIR) else RecordingError
-        raise kind(f"--keep {options.keep} cannot be used ({error.strerror}); {remedy(error, new=True)}") from error
+        failure = WrongValue if error.errno in (errno.EEXIST, errno.EISDIR) else RecordingError
+        raise failure(f"--keep {options.keep} cannot be used ({error.strerror}); {remedy(error, new=True)}") from error
     single = dict(zip(changes, answers, strict=False))
     radii = dict(zip(map_trials, answers[len(changes) :], strict=False))
     random = answers[len(changes) + len(map_trials) :]
@@ -127,29 +127,29 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     assert not isinstance(published, str)  # a finger that can be
     signs = sign_map.same_signs(random, published)
     shares = {name: sign_map.share(column) for name, column in zip(_NAMES, signs.T, strict=True)}
-    indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
-    without_answer = int(np.isnan(signs[:, at]).sum())
+    indices = {name: sign_map.slope_indices(random, name, column_index, options.seed) for name in SERIES}
+    without_answer = int(np.isnan(signs[:, column_index]).sum())
     console.result(
         {
             "quantity": options.quantity,
             "kinematics": options.kinematics,
             "quantities": _NAMES,
             "changes": single,
-            "map": {"places": sign_map.PLACES, "radii": {f"{radius:g}": one for radius, one in radii.items()}},
+            "map": {"places": sign_map.PLACES, "radii": {f"{radius:g}": answer for radius, answer in radii.items()}},
             "design": sign_map.DESIGN,
             "samples": samples,
             "seed": options.seed,
             "fingers": len(random),
             "without_answer": without_answer,
             "shares": shares,
-            "indices": {name: [asdict(one) for one in sobol] for name, (sobol, _) in indices.items()},
+            "indices": {name: [asdict(index) for index in sobol] for name, (sobol, _) in indices.items()},
         }
     )
-    _print_changes(single, at, console)
-    _print_map(radii, at, console)
+    _print_changes(single, column_index, console)
+    _print_map(radii, column_index, console)
     _print_shares(shares, len(random), without_answer, console)
     if parameter := next((sobol[0].name for sobol, _ in indices.values() if sobol), None):
-        _print_thirds(parameter, points, signs[:, at], label, console)
+        _print_thirds(parameter, points, signs[:, column_index], label, console)
     for name, (sobol, count) in indices.items():
         console.say(f"\nWhat moves the change of the {label} over {name} (Sobol indices, {count} fingers):")
         if sobol:
@@ -168,60 +168,62 @@ def _print_shares(
         "Share of the others that keep both published signs:"
     )
     rows = [
-        [one.label, f"{100 * share[0]:.0f} %", f"{100 * share[1]:.0f} to {100 * share[2]:.0f} %"]
-        for one, share in zip(QUANTITIES, shares.values(), strict=True)
+        [quantity.label, f"{100 * share[0]:.0f} %", f"{100 * share[1]:.0f} to {100 * share[2]:.0f} %"]
+        for quantity, share in zip(QUANTITIES, shares.values(), strict=True)
         if share is not None
     ]
-    console.say(table(rows, head=["quantity", "share", "95 % interval"]))
+    console.say(table(rows, header=["quantity", "share", "95 % interval"]))
 
 
-def _print_changes(single: dict[str, Answer | str], at: int, console: Console) -> None:
+def _print_changes(single: dict[str, Answer | str], column: int, console: Console) -> None:
+    label = QUANTITIES[column].label
     console.say(
-        f"{QUANTITIES[at].label}: correlation r with the makers' index over the published surfaces, and change from "
+        f"{label}: correlation r with the makers' index over the published surfaces, and change from "
         "the least to the greatest mu by the mean"
     )
     rows = [
-        [name, *(text for series in SERIES for text in _cells(answer, series, at))] for name, answer in single.items()
+        [name, *(text for series in SERIES for text in _cells(answer, series, column))]
+        for name, answer in single.items()
     ]
-    head = ["the published finger, but", *(text for series in SERIES for text in (f"r {series}", "change"))]
-    console.say(table(rows, head=head))
+    header = ["the published finger, but", *(text for series in SERIES for text in (f"r {series}", "change"))]
+    console.say(table(rows, header=header))
 
 
-def _cells(answer: Answer | str, series: str, at: int) -> tuple[str, str]:
+def _cells(answer: Answer | str, series: str, column: int) -> tuple[str, str]:
     if isinstance(answer, str):
         return "–", "–"
-    with_index, change = (part[0][at] for part in answer[series])
+    with_index, change = (statistic[0][column] for statistic in answer[series])
     if with_index is None or change is None:
         return "no slide", "–"
     return f"{with_index:+.2f}", f"{100 * change:+.0f} %"
 
 
-def _print_map(radii: dict[float, Answer | str], at: int, console: Console) -> None:
+def _print_map(radii: dict[float, Answer | str], column: int, console: Console) -> None:
     console.say(
-        f"\nSigns of r of the {QUANTITIES[at].label} with stickiness and with slipperiness, over the receptor's place "
-        "along the skin [mm, positive to the tip] and the tip radius [mm]:"
+        f"\nSigns of r of the {QUANTITIES[column].label} with stickiness and with slipperiness, over the receptor's "
+        "place along the skin [mm, positive to the tip] and the tip radius [mm]:"
     )
     rows = [
-        [f"{radius:g}", *(_mark(answer, place, at) for place in range(len(sign_map.PLACES)))]
+        [f"{radius:g}", *(_mark(answer, position, column) for position in range(len(sign_map.PLACES)))]
         for radius, answer in radii.items()
     ]
-    console.say(table(rows, head=["", *(f"{place:g}" for place in sign_map.PLACES)]))
+    console.say(table(rows, header=["", *(f"{position:g}" for position in sign_map.PLACES)]))
 
 
-def _mark(answer: Answer | str, place: int, at: int) -> str:
+def _mark(answer: Answer | str, position: int, column: int) -> str:
     if isinstance(answer, str):
         return "··"
-    numbers = [answer[series][0][place][at] for series in SERIES]
-    return "".join("·" if one is None else "+" if one > 0.0 else "\N{MINUS SIGN}" for one in numbers)
+    numbers = [answer[series][0][position][column] for series in SERIES]
+    return "".join("·" if r is None else "+" if r > 0.0 else "\N{MINUS SIGN}" for r in numbers)
 
 
 def _print_thirds(name: str, points: Array, signs: Array, label: str, console: Console) -> None:
     """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
     values = points[:, list(sign_map.DESIGN).index(name)]
     rows = [
-        f"{100 * part:.0f} % at {number(low)} to {number(high)}"
-        for low, high, part in sign_map.shares_by_thirds(signs, values)
-        if part is not None
+        f"{100 * kept_share:.0f} % at {number(low)} to {number(high)}"
+        for low, high, kept_share in sign_map.shares_by_thirds(signs, values)
+        if kept_share is not None
     ]
     console.say(f"The {label} keeps both signs, by {name}: {', '.join(rows)}.")
 
@@ -229,11 +231,11 @@ def _print_thirds(name: str, points: Array, signs: Array, label: str, console: C
 def _index_table(indices: Sequence[Index]) -> str:
     rows = [
         [
-            one.name,
-            f"{number(one.low)} to {number(one.high)}",
-            f"{one.first:.2f} ± {one.first_error:.2f}",
-            f"{one.total:.2f} ± {one.total_error:.2f}",
+            index.name,
+            f"{number(index.low)} to {number(index.high)}",
+            f"{index.first:.2f} ± {index.first_error:.2f}",
+            f"{index.total:.2f} ± {index.total_error:.2f}",
         ]
-        for one in indices
+        for index in indices
     ]
-    return table(rows, head=["number", "varied", "alone", "with others"])
+    return table(rows, header=["number", "varied", "alone", "with others"])

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
-_UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (one.shown_unit for one in QUANTITIES)]
+_UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (quantity.shown_unit for quantity in QUANTITIES)]
 # What a course tells beside the quantities, and the units of both.
 _COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
 COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *_UNITS]
@@ -51,18 +51,18 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     scene = load_toml(options.scene, Scene)
     deep = _row_receptor(scene, options.row)
-    before: list[Prediction] = []
+    rough_predictions: list[Prediction] = []
     try:
         with console.working("solving") as progress:
-            prediction = solve(scene, progress, rough=before.append)
+            prediction = solve(scene, progress, rough=rough_predictions.append)
     except SolveFailure as failure:
         console.result(failure.to_dict())
         raise
     except KeyboardInterrupt:
-        if not before:
+        if not rough_predictions:
             raise
         deep = None
-        prediction = replace(before[-1], warnings=(*before[-1].warnings, UNFINISHED))
+        prediction = replace(rough_predictions[-1], warnings=(*rough_predictions[-1].warnings, UNFINISHED))
         _print(prediction, scene.title or options.scene.name, console)
         return STOPPED
     _print(prediction, scene.title or options.scene.name, console, deep)
@@ -92,10 +92,10 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     plain = prediction.to_dict()
     console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
     console.say(title)
-    best, off_by = number(prediction.sed_ending_corrected, 5, factor=1e3), _percent(plain["corrected_error"])
-    corrected = ["corrected", best, "kPa", off_by]
-    off = "–" if plain["shift_error"] is None else f"{number(plain['shift_error'], 2)} mm"
-    shift = ["sideways shift", number(prediction.shift, 4), "mm", off]
+    best, corrected_error = number(prediction.sed_ending_corrected, 5, factor=1e3), _percent(plain["corrected_error"])
+    corrected = ["corrected", best, "kPa", corrected_error]
+    shift_error = "–" if plain["shift_error"] is None else f"{number(plain['shift_error'], 2)} mm"
+    shift = ["sideways shift", number(prediction.shift, 4), "mm", shift_error]
     rows = [
         ["SED at the ending", number(prediction.sed_ending, 5, factor=1e3), "kPa", _percent(plain["error_estimate"])],
         *([corrected] if prediction.nested else []),
@@ -110,15 +110,15 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
         ["setting up took", number(prediction.setup_s, factor=1e3), "ms", ""],
         ["estimating errors took", number(prediction.estimate_s, factor=1e3), "ms", ""],
     ]
-    console.say(table(rows, head=["", "", "", "error, estimated"]))
+    console.say(table(rows, header=["", "", "", "error, estimated"]))
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
     responses = [
-        [one.label, _with_error(*prediction.responses[one.name], factor), unit]
-        for one, (unit, factor) in zip(QUANTITIES, _UNITS, strict=True)
+        [quantity.label, _with_error(*prediction.responses[quantity.name], factor), unit]
+        for quantity, (unit, factor) in zip(QUANTITIES, _UNITS, strict=True)
     ]
-    console.say(table(responses, head=["", "", ""]).lstrip("\n"))
+    console.say(table(responses, header=["", "", ""]).lstrip("\n"))
     if course is not None:
-        _say_course(*course, console)
+        _print_course(*course, console)
     if row is not None and deep is not None:
         console.say(f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; kPa, shares):")
         cells = [
@@ -126,57 +126,57 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
             for pairs in zip(row.values.T, row.errors.T, strict=True)
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
-        console.say(table(lines, head=["arc [mm]", *NAMES]).lstrip("\n"))
+        console.say(table(lines, header=["arc [mm]", *NAMES]).lstrip("\n"))
     effects = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
     )
-    console.say(table(effects, head=["", ""]).lstrip("\n"))
+    console.say(table(effects, header=["", ""]).lstrip("\n"))
     console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")
     audits = [
         [label, number(prediction.audits[name] + 0.0, 2)] for name, label in AUDITS.items() if name in prediction.audits
     ]
-    console.say(table(audits, head=["", ""]).lstrip("\n"))
+    console.say(table(audits, header=["", ""]).lstrip("\n"))
     console.note(*(f"note: {warning}" for warning in prediction.warnings))
 
 
 def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
     from solver.response.rates import COURSE_NUMBERS, INSTANTS
 
-    parts = zip(INSTANTS, _plain(numbers.value), _plain(errors.value), strict=True)
+    instants = zip(INSTANTS, _plain(numbers.value), _plain(errors.value), strict=True)
     rates = zip(NAMES, _plain(numbers.rate.T), _plain(errors.rate.T), strict=True)
     return {
         "instants": {
-            part: {
+            instant: {
                 name: {"value": value, "error": error}
-                for name, value, error in zip((*COURSE_NUMBERS, *NAMES), values, off, strict=True)
+                for name, value, error in zip((*COURSE_NUMBERS, *NAMES), values, value_errors, strict=True)
             }
-            for part, values, off in parts
+            for instant, values, value_errors in instants
         },
         "rates": {
-            name: {**dict(zip(INSTANTS, values, strict=True)), "errors": dict(zip(INSTANTS, off, strict=True))}
-            for name, values, off in rates
+            name: {**dict(zip(INSTANTS, values, strict=True)), "errors": dict(zip(INSTANTS, value_errors, strict=True))}
+            for name, values, value_errors in rates
         },
     }
 
 
-def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
-    labels = [*_COURSE, *(one.label for one in QUANTITIES)]
-    ends = "At the ends of the press, of the break-away (full slip) and of the slide:"
-    paces = "Mean rates in the press, the break-away and the slide:"
-    parts = (
-        (ends, numbers.value, errors.value, labels, ""),
-        (paces, numbers.rate, errors.rate, labels[len(_COURSE) :], "/s"),
+def _print_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
+    labels = [*_COURSE, *(quantity.label for quantity in QUANTITIES)]
+    instants_title = "At the ends of the press, of the break-away (full slip) and of the slide:"
+    rates_title = "Mean rates in the press, the break-away and the slide:"
+    sections = (
+        (instants_title, numbers.value, errors.value, labels, ""),
+        (rates_title, numbers.rate, errors.rate, labels[len(_COURSE) :], "/s"),
     )
-    for title, values, off, names, per in parts:
+    for title, values, section_errors, names, per_second in sections:
         lines = [
-            [name, *(_with_error(*pair, factor) for pair in zip(value, error, strict=True)), f"{unit}{per}"]
+            [name, *(_with_error(*pair, factor) for pair in zip(value, error, strict=True)), f"{unit}{per_second}"]
             for name, value, error, (unit, factor) in zip(
-                names, values.T, off.T, COURSE_UNITS[-len(names) :], strict=True
+                names, values.T, section_errors.T, COURSE_UNITS[-len(names) :], strict=True
             )
         ]
         console.say(f"\n{title}")
-        console.say(table(lines, head=["", "press", "break-away", "slide", ""]).lstrip("\n"))
+        console.say(table(lines, header=["", "press", "break-away", "slide", ""]).lstrip("\n"))
     if not isfinite(errors.value[0, 0]):
         console.say("Their errors are not known: the nested mesh has no such course.")
 
@@ -198,5 +198,5 @@ def _row_in_json(row: "Row") -> dict[str, object]:
     return {"arc": ROW.tolist(), **values, "errors": errors}
 
 
-def _percent(part: float | None) -> str:
-    return "–" if part is None else f"{number(part, 2, factor=100)} %"
+def _percent(fraction: float | None) -> str:
+    return "–" if fraction is None else f"{number(fraction, 2, factor=100)} %"

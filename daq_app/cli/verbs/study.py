@@ -25,8 +25,8 @@ from daq_app.cli.options import (
     add_seed,
     add_shared,
     area_law,
+    number_in_range,
     numbers_by_key,
-    within,
 )
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from daq_app.wording import number, span
@@ -48,12 +48,12 @@ RIVAL_SUBJECTS, RIVAL_SURFACES, RIVAL_STUDIES = (12, 24), (5, 8), 40
 
 def add_power(parser: argparse.ArgumentParser) -> None:
     """Declare --power and what goes with it."""
-    defaults = ", ".join(f"{one.name}={one.default:g}" for one in fields(AssumedEffects))
+    defaults = ", ".join(f"{field.name}={field.default:g}" for field in fields(AssumedEffects))
     meaning = f"how many subjects and surfaces a study needs, by simulation; what it assumes may be set: {defaults}"
     parser.add_argument("--power", nargs="*", metavar="NAME=VALUE", help=meaning)
     meaning = "with --power: how often a study whose subjects press each surface to these depths tells --quantity from"
     meaning += " its rivals; some minutes"
-    parse = within("--depths", float, 0.5, 3.0)
+    parse = number_in_range("--depths", float, 0.5, 3.0)
     parser.add_argument("--depths", nargs="+", type=parse, metavar="MM", help=meaning)
     add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated per design (400)", 400, "N")
     add_seed(parser, "with --power: of the simulated studies (0)")
@@ -65,24 +65,24 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
     effects = _assumed_effects(options.power)
     powers = power(
-        effects, _SUBJECTS, SURFACES, options.studies, options.seed, lambda part: console.progress(part, "designs")
+        effects, _SUBJECTS, SURFACES, options.studies, options.seed, lambda share: console.progress(share, "designs")
     )
     recoveries = _recovery(options, effects, console)
-    designs = [{**asdict(one), "power": one.share} for one in powers]
+    designs = [{**asdict(row), "power": row.share} for row in powers]
     console.result({"planted": asdict(effects), "designs": designs, "recovery": msgspec.to_builtins(recoveries)})
     rows = [
-        [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in powers if one.subjects == people)]
-        for people in _SUBJECTS
+        [str(count), *(f"{100 * row.share:.0f} ± {100 * row.half:.0f} %" for row in powers if row.subjects == count)]
+        for count in _SUBJECTS
     ]
-    values = ", ".join(f"{one.name} = {getattr(effects, one.name):g}" for one in fields(effects))
+    values = ", ".join(f"{name} = {value:g}" for name, value in asdict(effects).items())
     console.say(f"Assumed: {values}. The usual values are not measured.")
-    console.say(table(rows, head=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
+    console.say(table(rows, header=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
     console.say(
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
         f"surfaces, of {options.studies} each. They speak of these surfaces, not of others."
     )
     if recoveries:
-        _say_recovery(recoveries, options, console)
+        _print_recovery(recoveries, options, console)
     else:
         console.say("--depths 1.25 1.75 2.25 simulates how often such a study tells which quantity its scores follow.")
     return DONE
@@ -105,18 +105,18 @@ def _recovery(options: argparse.Namespace, effects: AssumedEffects, console: Con
     return recoveries
 
 
-def _say_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, console: Console) -> None:
+def _print_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, console: Console) -> None:
     label = BY_NAME[options.quantity].label
     depths = ", ".join(f"{depth:g}" for depth in options.depths)
     console.say(f"Scores that follow {label} with that effect over its range, surfaces pressed to {depths} mm:")
     rows = [
         [
-            f"{one.people} × {one.surfaces} × {len(one.depths)}",
-            *(f"{100 * share:.0f} %" for share in (one.preferred, one.family)),
+            f"{design.people} × {design.surfaces} × {len(design.depths)}",
+            *(f"{100 * share:.0f} %" for share in (design.preferred, design.family)),
         ]
-        for one in recoveries
+        for design in recoveries
     ]
-    console.say(table(rows, head=["subjects × surfaces × depths", "preferred", "it or a twin"]))
+    console.say(table(rows, header=["subjects × surfaces × depths", "preferred", "it or a twin"]))
     twins = ", ".join(recoveries[-1].twins) or "none"
     console.say(
         f"Share of {RIVAL_STUDIES} simulated studies in which it has the greatest Akaike weight of all rivals. Its "
@@ -182,7 +182,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return _pool(options, folder, folder / "pooled", console)
 
 
-def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console) -> int:
+def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Console) -> int:
     sessions = session_folders(folder)
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
@@ -192,7 +192,7 @@ def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, options.calibration_error, along)
     # What is wrong with these is said before hours of work.
     exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
-    shelf = Shelf(out / "results", visit_options)
+    shelf = Shelf(output / "results", visit_options)
     results, failures = visits(
         sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers
     )
@@ -202,10 +202,10 @@ def _pool(options: argparse.Namespace, folder: Path, out: Path, console: Console
         truth["relation"] = population_relations(truth["people"], visit_options.prediction, visit_options.area)
     study = pool_visits(results, failures, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
-    files = _write(study, folder.resolve().name, out)
+    files = _write(study, folder.resolve().name, output)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
     _print(study, files, console)
-    flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
+    flawed = any(visit.losses or any(row.flaws for row in visit.rows) for visit in study.visits)
     return FLAWED if failures or flawed else DONE
 
 
@@ -220,7 +220,7 @@ def _load_ground_truth(folder: Path) -> dict[str, Any] | None:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without its ground truth") from damaged
 
 
-def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
+def _write(study: StudyFindings, name: str, output: Path) -> dict[str, str]:
     from sessions.report import pages  # drawing is slow to load
 
     files = {
@@ -233,8 +233,8 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     if study.options.paths != "none":
         files["paths"] = ("paths.csv", pages.paths_csv(study))
     for file, text in files.values():
-        pages.swap_in(out / file, text)
-    return {what: str(out / file) for what, (file, _) in files.items()}
+        pages.swap_in(output / file, text)
+    return {key: str(output / file) for key, (file, _) in files.items()}
 
 
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
@@ -243,10 +243,10 @@ def _print(study: StudyFindings, files: dict[str, str], console: Console) -> Non
     console.say(
         study.simulated or None, *summary(study), *distinctions(study), *exclusion_sentences(study), *remarks(study)
     )
-    for one in study.effects:
-        inside = "inside" if one.covered else "OUTSIDE"
+    for effect in study.effects:
+        inside = "inside" if effect.covered else "OUTSIDE"
         console.say(
-            f"{one.descriptor}, {one.effect} [{UNITS[one.effect]}]: true {number(one.true_value)}, "
-            f"estimated {number(one.estimate)} ({span(one.low, one.high)}): {inside}"
+            f"{effect.descriptor}, {effect.effect} [{UNITS[effect.effect]}]: true {number(effect.true_value)}, "
+            f"estimated {number(effect.estimate)} ({span(effect.low, effect.high)}): {inside}"
         )
-    console.say(*(f"{what:8}  {path}" for what, path in files.items()))
+    console.say(*(f"{name:8}  {path}" for name, path in files.items()))

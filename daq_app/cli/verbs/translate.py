@@ -57,8 +57,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
             raise WrongValue(f"--out {options.out} is there already: give a new file, or move that away")
         with name_failure(RecordingError, f"{options.out} cannot be written", new=True):
             write_whole(options.out, text.encode())
-    where = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
-    console.result({"language": options.language, "missing": gaps, **where})
+    destination = {"out": None, "text": text} if options.out is None else {"out": str(options.out)}
+    console.result({"language": options.language, "missing": gaps, **destination})
     console.note(f"texts yet to be translated: {gaps}" if gaps else "every text is translated")
     return DONE
 
@@ -67,19 +67,19 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
     """Return the tables of a language, and how many blocks have none yet. Raises WrongValue for the protocol's own."""
     if language == source.language:
         raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
-    earlier = {one.block: one for one in source.translations if one.language == language}
-    texts = [
-        Translation(language, one.name, one.instruction, one.scale_ends, one.question or usual_question(one.descriptor))
-        for one in source.blocks
-    ]
+    earlier = {text.block: text for text in source.translations if text.language == language}
+    texts: list[Translation] = []
+    for block in source.blocks:
+        question = block.question or usual_question(block.descriptor)
+        texts.append(Translation(language, block.name, block.instruction, block.scale_ends, question))
     if source.pre_evaluation is not None:
         texts.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))
     lines: list[str] = []
-    for one in texts:
-        mark = "" if one.block in earlier else f"# to be translated from {source.language}\n"
-        table = toml_text(earlier.get(one.block, one)).replace('question = ""\n', "")
+    for text in texts:
+        mark = "" if text.block in earlier else f"# to be translated from {source.language}\n"
+        table = toml_text(earlier.get(text.block, text)).replace('question = ""\n', "")
         lines.append(f"[[translations]]\n{mark}{table}")
-    return "\n".join(lines), sum(one.block not in earlier for one in texts)
+    return "\n".join(lines), sum(text.block not in earlier for text in texts)
 
 
 def window_texts() -> list[str]:
@@ -89,8 +89,8 @@ def window_texts() -> list[str]:
     for source in sorted(PROGRAM.rglob("*.py")):
         for node in ast.walk(ast.parse(source.read_text("utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("tr", "tr_noop"):
-                constants = [one.value for one in ast.walk(node.args[0]) if isinstance(one, ast.Constant)]
-                texts |= dict.fromkeys(text for text in constants if isinstance(text, str))
+                constants = (part for part in ast.walk(node.args[0]) if isinstance(part, ast.Constant))
+                texts |= dict.fromkeys(constant.value for constant in constants if isinstance(constant.value, str))
     return list(texts)
 
 

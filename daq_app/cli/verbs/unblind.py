@@ -27,23 +27,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     path: Path = options.path
     check_code("--by", options.by)
-    whole = is_study(path)
-    folder = path if whole else options.study or path.resolve().parent
-    sessions, unreadable = sessions_of(path) if whole else ((Recording.open(path),), ())
-    if not whole and sessions[0].plan.blinded and not is_study(folder):
+    is_study_folder = is_study(path)
+    folder = path if is_study_folder else options.study or path.resolve().parent
+    sessions, unreadable = sessions_of(path) if is_study_folder else ((Recording.open(path),), ())
+    if not is_study_folder and sessions[0].plan.blinded and not is_study(folder):
         raise StudyError(f"{folder} is no study: name the folder of the study that {path.name} belongs to with --study")
-    key = study_key(folder) if whole or sessions[0].plan.blinded else None
+    key = study_key(folder) if is_study_folder or sessions[0].plan.blinded else None
     if key is None:
         raise StudyError(f"{path} is not blinded: there is nothing to open")
     recordings, refusals = _select(sessions, key)
     refusals += unreadable
-    if not whole and refusals:
+    if not is_study_folder and refusals:
         raise RecordingError(refusals[0])
-    if whole and open_study(folder).unblinded and not recordings:
-        rest = f": {'; '.join(refusals)}" if refusals else ", and so was each of its sessions"
-        raise StudyError(f"{folder} was unblinded before{rest}")
+    if is_study_folder and open_study(folder).unblinded and not recordings:
+        refusals_text = f": {'; '.join(refusals)}" if refusals else ", and so was each of its sessions"
+        raise StudyError(f"{folder} was unblinded before{refusals_text}")
     utc = datetime.now(UTC).isoformat(timespec="seconds")
-    note(folder, "unblinded", {"by": options.by, "session": None if whole else path.resolve().name})
+    note(folder, "unblinded", {"by": options.by, "session": None if is_study_folder else path.resolve().name})
     names: list[str] = []
     for recording in recordings:
         # Numbers and pages that were made of it while it was blinded.
@@ -55,12 +55,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
             store_derived(recording.folder, UNBLINDING, document)
             names.append(recording.folder.name)
         except RecordingError as error:
-            if not whole:
+            if not is_study_folder:
                 raise
             refusals.append(str(error))
     console.result({"study": str(folder), "sessions": names, "left_out": refusals, "by": options.by, "utc": utc})
     console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refusals)
-    if not whole:
+    if not is_study_folder:
         console.say("labels are the same throughout the study: whoever saw this session's stimuli knows them all")
     return FLAWED if refusals else DONE
 

@@ -28,12 +28,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     flaws = list(problems(folder))
     recording = Recording.open(folder)
     flaws += doubtful_readings(recording)
-    parts = ["files"]
+    checks = ["files"]
     decisions = read(folder)
     flaws += decisions.problems
-    parts += [DECISIONS] if decisions.lines or decisions.problems else []
+    checks += [DECISIONS] if decisions.lines or decisions.problems else []
     try:
-        parts += [] if gain_error_set(folder) is None else [GAIN_ERROR]
+        checks += [] if gain_error_set(folder) is None else [GAIN_ERROR]
     except RecordingError as damaged:
         flaws.append(str(damaged))
     for name in (ANALYSIS, PREDICTION):
@@ -49,8 +49,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
             flaws.append(" ".join(str(damaged).split()))
             continue
         flaws += changes(name, document, fresh)
-        parts.append(name)
-    console.result({"session": str(folder), "checked": parts, "problems": flaws})
+        checks.append(name)
+    console.result({"session": str(folder), "checked": checks, "problems": flaws})
     outcome = "readable, with the above" if flaws else "whole"
-    console.say(*flaws, f"{folder}: {outcome} ({', '.join(parts)} checked)")
+    console.say(*flaws, f"{folder}: {outcome} ({', '.join(checks)} checked)")
     return FLAWED if flaws else DONE

@@ -191,7 +191,7 @@ def driver(application, one_window, tmp_path):
     yield driver
     one_window.resize(1440, 900)
     if driver.session is not None:
-        if not driver.session.over:
+        if not driver.session.is_over:
             one_window.bridge.send(Stop())
         driver.sealed()
         one_window.bridge.send(NewSession())

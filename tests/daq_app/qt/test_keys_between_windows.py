@@ -172,7 +172,7 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
     window = driver.window
     driver.begin()
     driver.go_on("scoring")
-    driver.until(lambda: driver.session.of(1).quality is not None, "what is said of the stroke")
+    driver.until(lambda: driver.session.trial_state(1).quality is not None, "what is said of the stroke")
     assert not window.middle.undo.isVisible()
     QTest.keyClick(window, Qt.Key.Key_R)
     if window.course.asking:
@@ -187,7 +187,7 @@ def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_ag
     driver.until(lambda: driver.session.trial == 1 and window.middle.undo.isVisible(), "the first trial again")
     QTest.mouseClick(window.middle.undo, Qt.MouseButton.LeftButton)
     driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the second trial")
-    assert driver.session.of(1).quality is not None
+    assert driver.session.trial_state(1).quality is not None
     recording = driver.abort()
     first = recording.trials[0]
     assert (first.outcome, first.score, first.take.number) == ("scored", 50.0, 1)
@@ -204,7 +204,7 @@ def test_the_page_of_the_next_session_has_no_code_proposes_the_next_and_enter_be
     assert driver.window.page.subject.text() == ""
     assert driver.window.page.subject.placeholderText() == "e.g. P08"  # after P07
     QTest.keyClick(driver.window.page.subject, ENTER)
-    assert "never a name" in driver.window.page.frames["Subject"].words.text()
+    assert "never a name" in driver.window.page.frames["Subject"].message.text()
     assert driver.session is None
 
 
@@ -220,7 +220,7 @@ def test_the_enter_that_keeps_the_rulers_length_begins_no_session(driver):
     driver.until(lambda: time.monotonic() > end)
     settings().clear()
     assert driver.session is None
-    assert driver.view.lamp.words == "not recording"
+    assert driver.view.lamp.text == "not recording"
 
 
 def test_enter_in_the_address_connects_what_was_typed_and_a_wrong_one_is_named_and_can_be_mended(driver):

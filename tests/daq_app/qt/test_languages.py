@@ -42,10 +42,10 @@ def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(subject_pa
     page = subject_page(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
     line = page.line
     assert page.layoutDirection() == Qt.LayoutDirection.RightToLeft
-    assert line.place_of(0.0).x() > line.place_of(100.0).x()
-    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(25.0).toPoint())
+    assert line.point_at(0.0).x() > line.point_at(100.0).x()
+    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.point_at(25.0).toPoint())
     assert line.answer.score == pytest.approx(25.0, abs=0.5)
-    low, high = (shown_end for shown_end in page._scale._ends)
+    low, high = (shown_end for shown_end in page._scale._labels)
     assert low.geometry().center().x() > high.geometry().center().x()
     before = line.answer.score
     QTest.keyClick(line, Qt.Key.Key_Left)  # away from 0, which lies at the right
@@ -56,7 +56,7 @@ def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(subject_pa
 def test_back_in_english_the_line_is_as_it_was(subject_page):
     page = subject_page(SubjectView("line", "كم؟", "", ("a", "b"), 0, (1, 1), "right", "ar"))
     page.show_view(SubjectView("line", "How?", "", ("a", "b"), 0, (2, 1)), None)
-    assert page.line.place_of(0.0).x() < page.line.place_of(100.0).x()
+    assert page.line.point_at(0.0).x() < page.line.point_at(100.0).x()
     assert page.next.text() == "Next"
 
 

@@ -36,7 +36,7 @@ from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import FY
 from daq_app.window.course_state import Judged, Mark
-from daq_app.window.live_model import ModelWords
+from daq_app.window.live_model import ModelText
 from daq_app.window.live_trace import CHANNELS, Columns
 from daq_app.window.new_session import SessionForm
 from daq_app.window.subject import preview, translator
@@ -129,14 +129,14 @@ def test_the_outline_of_what_can_be_ticked_stands_out_in_both_themes(themed, kin
 def test_review_can_be_read_after_the_theme_was_changed_while_a_session_is_open(themed):
     window = AnalystWindow(SESSION, tokens.LIGHT, Nobody())
     window.take(m.ReportReady("predicted", example()))
-    words = window.stroke.stroke._plots[0].words
+    words = window.stroke.stroke._plots[0].readout
     words.setText("HHHH 12")
     words.adjustSize()
     themed(window)
     words.show()
     assert painted_contrast(words, words.rect()) >= 4.5
     ground = window.grab().toImage().pixelColor(2, 2).name()
-    assert {contrast(colour, ground) >= 4.5 for colour in re.findall("#[0-9a-f]{6}", window.way.text())} == {True}
+    assert {contrast(colour, ground) >= 4.5 for colour in re.findall("#[0-9a-f]{6}", window.lineage.text())} == {True}
     window.close()
 
 
@@ -270,7 +270,7 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
     for messages in (MOUNT, (*SCORE, Judged(1, 1, BAD)), PAUSED, CLOSING):
         window.show_view(derive_view(after(*messages)))
         for words in MODEL_SAYS:
-            window.live.finger.show_model(None, np.empty(0), ModelWords(words, "failed"), 0.0)
+            window.live.finger.show_model(None, np.empty(0), ModelText(words, "failed"), 0.0)
             window.live.toggle_drawer()
             settle(driver.application)
             assert cut_off(window) == []
@@ -302,7 +302,7 @@ def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, sc
             tabs = {1: window.stroke.tabs, 2: window.model.tabs}.get(column)
             if tabs is not None:
                 tabs.setCurrentIndex(at)
-            window.model.fields.which.setCurrentIndex(LONGEST_FIELD)
+            window.model.fields.field_choice.setCurrentIndex(LONGEST_FIELD)
             settle(application)
             assert cut_off(window) == []
             assert cut_axes(window) == []

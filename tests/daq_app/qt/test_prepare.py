@@ -47,7 +47,7 @@ def test_what_is_below_the_top_stays_in_place_while_the_transducer_says_more(dri
             for _ in range(3):  # until the rows at the top have found their heights
                 driver.application.processEvents()
             for lamp_words in words:
-                bench = replace(driver.view.bench, name="SIMULATED Net F/T SI-36-0.5", lamp_words=lamp_words)
+                bench = replace(driver.view.bench, name="SIMULATED Net F/T SI-36-0.5", lamp_text=lamp_words)
                 window.header.show_view(replace(driver.view, bench=bench, heading="subject P07 · sensotact-friction"))
                 driver.application.processEvents()
                 places.setdefault(width, set()).add(window.to_do.mapTo(window, window.to_do.rect().topLeft()).y())
@@ -72,16 +72,16 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     driver.until(lambda: driver.state.bench.zero is not None and not driver.state.bench.taring, "a zero")
     zero = driver.state.bench.zero
     driver.until(
-        lambda: row.words.text().startswith("SIMULATED Net F/T SI-36-0.5: nothing lost.\n"), "readings in time"
+        lambda: row.summary.text().startswith("SIMULATED Net F/T SI-36-0.5: nothing lost.\n"), "readings in time"
     )
-    lines = row.words.text().split("\n")
+    lines = row.summary.text().split("\n")
     assert lines[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
     noise, unit = lines[2].removeprefix("Noise: ").split(",")[0].split()
     assert (float(noise), unit) == (float(f"{1000 * max(zero.noise[:3]):.2g}"), "mN")
     assert lines[3].startswith("Life: ")
     row.connect_button.click()
     driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
-    assert row.words.text() == "no transducer: not connected."
+    assert row.summary.text() == "no transducer: not connected."
     assert window.to_do.primary.text().startswith("Connect")
     QTest.keyClick(window.page.subject, Qt.Key.Key_Return)
     driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
@@ -119,7 +119,7 @@ def test_start_lights_when_every_card_is_ready_and_a_card_that_is_mended_says_so
     assert page.frames["Subject"].accessibleName() == "Subject: ready."
     page.seed.setText("many")
     assert not window.to_do.primary.isEnabled()
-    assert "whole number" in page.frames["Study and protocol"].words.text()
+    assert "whole number" in page.frames["Study and protocol"].message.text()
     page.seed.clear()
     assert window.to_do.primary.isEnabled()
 
@@ -127,16 +127,16 @@ def test_start_lights_when_every_card_is_ready_and_a_card_that_is_mended_says_so
 def test_a_search_that_finds_nothing_says_so_and_what_to_do(driver):
     bridge, bench = driver.window.bridge, driver.window.bench
     bridge.send(Searching())
-    assert "Looking" in bench._search_words.text()
+    assert "Looking" in bench._search_label.text()
     bridge.send(DevicesFound(()))
-    assert bench._search_words.text().startswith("No transducer answered. Check power and cable")
-    assert bench._search_words.isVisibleTo(bench)
+    assert bench._search_label.text().startswith("No transducer answered. Check power and cable")
+    assert bench._search_label.isVisibleTo(bench)
 
 
 def test_a_session_that_was_cut_short_is_offered_above_every_card(driver, tmp_path):
     page = driver.window.page
     page.cut_short.show_sessions((UnfinishedSession(tmp_path, "P03: 2 of 10 trials done"),))
-    assert page.cut_short._words.text() == "P03: 2 of 10 trials done"  # on as many lines as they need
+    assert page.cut_short._description.text() == "P03: 2 of 10 trials done"  # on as many lines as they need
     assert not page.cut_short._sessions.isVisible()  # of one session there is no choice
     driver.application.processEvents()
     offer = page.cut_short.go_on.mapTo(page, page.cut_short.go_on.rect().bottomLeft()).y()
@@ -274,4 +274,4 @@ def test_a_pilot_and_a_preview_of_a_protocol_that_cannot_be_read_say_why(driver,
     page.add_protocol(str(tmp_path / "wrong.toml"))
     QTest.mouseClick(getattr(page, button), Qt.MouseButton.LeftButton)
     assert driver.session is None
-    assert "wrong.toml" in window.notice._words.text()
+    assert "wrong.toml" in window.notice._label.text()

@@ -45,11 +45,11 @@ def test_keys_buttons_and_list_turn_the_pages(open_preview):
         "the surface is changed",
         "stickiness: stroke",
     ]
-    QTest.mouseClick(dialog.on, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(dialog.forward, Qt.MouseButton.LeftButton)
     assert dialog.picture.accessibleName().startswith("the subject's page: Judge the stickiness")
     assert not dialog.picture.page.next.isHidden()  # as after an answer
     dialog.list.setCurrentRow(dialog.list.count() - 1)
-    assert not dialog.on.isEnabled()
+    assert not dialog.forward.isEnabled()
     QTest.keyClick(dialog.list, Qt.Key.Key_Escape)
     assert not dialog.isVisible()
 

@@ -72,7 +72,7 @@ class Walk:
         subject = self.window.subject
         key = self.random.choice(ANSWER)
         if subject.asks == "line" and self.random.random() < 0.3:
-            place = subject.line.place_of(100.0 * self.random.random())
+            place = subject.line.point_at(100.0 * self.random.random())
             QTest.mouseClick(subject.line, LEFT, pos=QPointF(place).toPoint())
             return "line"
         QTest.keyClick(subject.line if subject.asks == "line" else subject, key)
@@ -185,7 +185,9 @@ class Walk:
         session = self.driver.session
         if session is None:
             not_ready = [frame for frame in window.page.frames.values() if "not ready" in frame.accessibleName()]
-            reasons = [frame for frame in not_ready if frame.words.isVisibleTo(frame) and frame.words.text().strip()]
+            reasons = [
+                frame for frame in not_ready if frame.message.isVisibleTo(frame) and frame.message.text().strip()
+            ]
             return "" if not_ready and reasons == not_ready else "Start is not lit, and no card says why"
         if window.subject.scoring:
             answer = window.course.buttons["no answer"].isEnabled()
@@ -212,7 +214,7 @@ class Walk:
             assert time.monotonic() < deadline, f"seed {self.seed}, after {self.steps[-12:]}: {what}"
             if session is None:
                 self.plug()
-            elif session.over:
+            elif session.is_over:
                 if session.end is not None and session.sealing == "running":
                     driver.until(lambda: driver.session.sealing != "running", "the seal")
                 window.bridge.send(NewSession())
@@ -252,7 +254,7 @@ def walk_randomly(driver, seed, files, steps):
 def test_a_walk_notices_a_start_that_is_dark_without_a_reason_and_a_dialog_in_the_way(driver, files):
     walk = Walk(driver, 0, files)
     assert walk.dead_end() == ""  # the card says that the subject's code is missing
-    words = driver.window.page.frames["Subject"].words
+    words = driver.window.page.frames["Subject"].message
     sentence = words.text()
     words.setText("")
     assert "no card says why" in walk.dead_end()

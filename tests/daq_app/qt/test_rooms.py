@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from daq_app.analyst.state import Choose
 from daq_app.qt import preferences, tokens
-from daq_app.qt.rooms import about_words
+from daq_app.qt.rooms import about_text
 from daq_app.recorder.messages import Stop
 from tests.daq_app.qt.review.examples import SESSION
 
@@ -51,7 +51,7 @@ def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
         actions["150 %"].trigger()
         assert preferences.preferred_scale() == 1.5
         assert preferences.type_scale() == 1.0  # until the next start: no part of a window is larger than the rest
-        assert "next start" in window.notice._words.text()
+        assert "next start" in window.notice._label.text()
     finally:
         actions["System"].trigger()
         preferences.choose(preferences.SCALE, None)
@@ -221,6 +221,6 @@ def test_a_window_opens_for_the_first_time_as_large_as_it_likes_where_the_screen
 
 
 def test_about_names_the_versions_it_stands_on():
-    words = about_words()
+    words = about_text()
     assert "unknown" not in words
     assert all(name in words for name in ("daq-app", "Python 3", "Qt 6", "numpy", "numba"))

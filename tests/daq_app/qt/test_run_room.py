@@ -181,7 +181,7 @@ def test_a_picture_is_held_only_once_there_is_one_and_no_longer_than_its_transdu
 
     def ends_after(first, last):
         feed_readings(first, last)
-        return panel.plots[0]._end, panel.plots[4]._end, panel.bar.hold.isChecked()
+        return panel.plots[0]._end_label, panel.plots[4]._end_label, panel.bar.hold.isChecked()
 
     assert ends_after(100.0, 105.0) == ("now", "now", False)
     click(panel.bar.hold)
@@ -194,13 +194,13 @@ def test_a_transducer_that_sends_nothing_now_has_no_number_now(own_panel):
     _, panel, feed_readings = own_panel
     feed_readings(0.0, 1.0, lambda time: np.full(len(time), 3.0))
     assert panel.bar.values["N"].text() == "3.00 N"
-    assert (len(panel.map._trail), panel.plots[0]._end) == (50, "now")
+    assert (len(panel.map._trail), panel.plots[0]._end_label) == (50, "now")
     panel.draw((), 2.5, silent=True)
     assert panel.bar.values["N"].text() == "–"
-    assert (len(panel.map._trail), panel.plots[0]._end) == (0, "last reading")
+    assert (len(panel.map._trail), panel.plots[0]._end_label) == (0, "last reading")
     assert panel.finger.toolTip() == "Nothing is measured that the model could follow."
     feed_readings(2.5, 3.0)
-    assert panel.plots[0]._end == "now"
+    assert panel.plots[0]._end_label == "now"
 
 
 def test_a_visit_of_scores_only_has_no_force_plots_that_stay_empty(driver):

@@ -29,9 +29,11 @@ def one_trial(driver, *, presses=3, stays=True):
     """Mount, let the simulated hand stroke, score with the arrow keys; a stroke that is `stays` stays meanwhile."""
     window, number = driver.window, driver.session.trial
     driver.go_on("scoring")
-    driver.until(lambda: driver.session.of(number).quality is not None, "what is said of the stroke")
+    driver.until(lambda: driver.session.trial_state(number).quality is not None, "what is said of the stroke")
     if stays:
-        driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", "the stroke stays while its score is awaited")
+        driver.until(
+            lambda: window.live.plots[0]._end_label == "lift + 1 s", "the stroke stays while its score is awaited"
+        )
     driver.answer(*[Qt.Key.Key_Right] * presses)
 
 
@@ -105,11 +107,11 @@ def test_a_subject_is_enrolled_by_key_and_a_session_of_its_study_runs_by_itself_
     assert [page.studies.itemText(at) for at in range(page.studies.count())] == ["", "pilot"]
     QTest.keyClick(page.studies, Qt.Key.Key_Down)
     assert page.form().study == "pilot"
-    assert "not enrolled" in page.frames["Subject"].words.text()
+    assert "not enrolled" in page.frames["Subject"].message.text()
     assert not driver.window.to_do.primary.isEnabled()
     assert not page.protocol.isEnabled()
     QTest.keyClick(page._enrol, SPACE)
-    assert "S01 is enrolled" in page.frames["Subject"].words.text()
+    assert "S01 is enrolled" in page.frames["Subject"].message.text()
     assert not page._enrol.isVisible()
     QTest.keyClick(page.subject, ENTER)
     driver.sealed()
@@ -139,7 +141,7 @@ def test_a_wrong_form_begins_nothing_and_typing_goes_to_the_wrong_field(driver):
     QTest.keyClicks(window.page.subject, "Ada Lovelace")
     QTest.keyClick(window.page.subject, ENTER)
     assert driver.session is None
-    words = window.page.frames["Subject"].words
+    words = window.page.frames["Subject"].message
     assert "never a name" in words.text()
     assert words.isVisible()
     assert words.property("grade") == "wrong"
@@ -154,16 +156,16 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
     window = driver.window
     window.close()
     assert window.isVisible()
-    assert "close once more" in window.notice._words.text()
+    assert "close once more" in window.notice._label.text()
     driver.go_on("scoring")
-    driver.until(lambda: window.notice._words.text() == "", "the session goes on: nothing is asked any more")
+    driver.until(lambda: window.notice._label.text() == "", "the session goes on: nothing is asked any more")
     monkeypatch.setattr(window.bridge, "end", lambda: None)
     monkeypatch.setattr(QGuiApplication, "quit", lambda: None)
     for leaves in (False, True):
         event = QCloseEvent()
         window.closeEvent(event)
         assert event.isAccepted() is leaves
-        assert "close once more" in window.notice._words.text()
+        assert "close once more" in window.notice._label.text()
 
 
 @pytest.mark.usefixtures("application")
@@ -185,15 +187,15 @@ def test_the_warning_of_a_tablet_gives_way_to_others_and_goes_when_it_answers_ag
     driver.begin("P13")
     monkeypatch.setattr(window, "tablet", SimpleNamespace(server=server))
     window.show_view(driver.view)
-    assert "tablet does not answer" in window.notice._words.text()
+    assert "tablet does not answer" in window.notice._label.text()
     window.close()
     window.show_view(driver.view)
-    assert "close once more" in window.notice._words.text()
+    assert "close once more" in window.notice._label.text()
     window.notice.warn("")
     window.show_view(driver.view)
     server.connected = True
     window.show_view(driver.view)
-    assert "tablet" not in window.notice._words.text()
+    assert "tablet" not in window.notice._label.text()
 
 
 def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_the_keyboard_stays(driver, monkeypatch):
@@ -206,7 +208,7 @@ def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_th
     assert "Keep your fingers off" in window.subject._text.text()
     assert window.subject.testAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
     window.subject.close()
-    assert "F6 brings it again" in window.notice._words.text()
+    assert "F6 brings it again" in window.notice._label.text()
     driver.go_on("ready", "stroking")
     assert not window.subject.isVisible()  # whoever closed it is not contradicted before an answer is due
     driver.phase("scoring")
@@ -244,10 +246,10 @@ def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says
     for seconds in (2, 3):  # the banner counts
         sentence = f"The transducer does not answer: no readings for {seconds} s."
         notice.show_view(replace(banner, sentence=sentence), "", "Mount")
-        assert "does not answer" in notice._words.text()
-        assert notice._words.text().endswith("Close once more.")
+        assert "does not answer" in notice._label.text()
+        assert notice._label.text().endswith("Close once more.")
     notice.show_view(None, "Done again: trial 5 (K50).", "Mount")
-    assert notice._words.text() == "Done again: trial 5 (K50)."
+    assert notice._label.text() == "Done again: trial 5 (K50)."
 
 
 def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_kept(driver):
@@ -307,7 +309,7 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     driver.begin("P30")
     assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
     one_trial(driver, stays=False)
-    stroke = driver.session.of(1).quality.stroke
+    stroke = driver.session.trial_state(1).quality.stroke
     first = middle.strip.tiles[0]
     click(first)
     assert middle.trial.isVisible()

@@ -59,7 +59,7 @@ def test_the_words_of_each_end_stand_beneath_it_and_are_seen_whole(subject_page,
     for position, words in zip((0.0, 100.0), ends, strict=True):
         (label,) = (candidate for candidate in window.findChildren(QLabel) if candidate.text() == words)
         assert label.width() > 0
-        end = line.mapTo(window, line.place_of(position).toPoint())
+        end = line.mapTo(window, line.point_at(position).toPoint())
         assert box(label).center().x() == pytest.approx(end.x(), abs=2)
 
 

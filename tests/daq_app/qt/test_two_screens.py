@@ -33,7 +33,7 @@ lengths = []
 for screen in (desk, tablet, desk):
     subject.move(screen.geometry().topLeft() + QPoint(40, 40))
     application.processEvents()
-    length = (subject.line.place_of(100.0) - subject.line.place_of(0.0)).x()
+    length = (subject.line.point_at(100.0) - subject.line.point_at(0.0)).x()
     lengths.append([subject.screen().name(), length * screen.devicePixelRatio(), screen.devicePixelRatio()])
 print(json.dumps({"lengths": lengths, "dots": [s.physicalDotsPerInch() for s in (desk, tablet)]}))
 """

@@ -192,7 +192,7 @@ def shown_line(driver):
     line = driver.window.subject.line
     driver.window.subject.show()
     driver.window.subject._pages.setCurrentIndex(1)
-    driver.window.subject._ways.setCurrentWidget(driver.window.subject._scale)
+    driver.window.subject._answer_fields.setCurrentWidget(driver.window.subject._scale)
     driver.application.processEvents()
     line.begin(("low", "high"))
     return line
@@ -202,7 +202,7 @@ def test_a_click_is_answered_where_it_was_seen_at_every_place_of_the_line(driver
     line = shown_line(driver)
     half_a_pixel = 100 * 0.5 / (answer_fields.LENGTH * line._pixels_per_mm)
     for position in (0.0, 12.5, 50.0, 87.5, 100.0):
-        QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(position).toPoint())
+        QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.point_at(position).toPoint())
         assert line.answer.score == pytest.approx(position, abs=half_a_pixel + 0.06)
     assert line.answer.device == "mouse"
     assert line.answer.corrections == 4
@@ -213,7 +213,7 @@ def test_there_is_no_mark_before_the_first_touch_and_no_next_without_an_answer(d
     empty = line.grab().toImage()
     driver.window.subject._answer_changed()
     assert not driver.window.subject.next.isVisibleTo(driver.window.subject)
-    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(30.0).toPoint())
+    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.point_at(30.0).toPoint())
     assert line.grab().toImage() != empty
     assert driver.window.subject.next.isVisibleTo(driver.window.subject._pages.widget(1))
     line.begin(("low", "high"))
@@ -223,7 +223,7 @@ def test_there_is_no_mark_before_the_first_touch_and_no_next_without_an_answer(d
 def test_a_touch_is_recorded_as_a_touch(driver):
     line = shown_line(driver)
     device = QTest.createTouchDevice()
-    place = line.place_of(25.0).toPoint()
+    place = line.point_at(25.0).toPoint()
     QTest.touchEvent(line, device).press(0, place, line).commit()
     QTest.touchEvent(line, device).release(0, place, line).commit()
     assert line.answer.device == "touch"
@@ -237,7 +237,7 @@ def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     assert preferences.store_ruler_length(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
     assert fit_line(subject).pixels == pytest.approx(before * 100 / 80)
     assert fit_line(subject).checked
-    length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
+    length = subject.line.point_at(100.0) - subject.line.point_at(0.0)
     assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
     assert preferences.store_ruler_length(screen, 3.0) is None
     preferences.settings().clear()

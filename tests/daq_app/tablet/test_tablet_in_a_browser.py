@@ -34,9 +34,9 @@ def desk(application, tmp_path, monkeypatch):  # noqa: F811  the fixture
     browser = Browser(tmp_path / "browser", application.processEvents)
     yield driver, browser
     browser.close()
-    if driver.session is not None and not driver.session.over:
+    if driver.session is not None and not driver.session.is_over:
         window.bridge.send(Stop())
-        driver.until(lambda: driver.session.over, "the end")
+        driver.until(lambda: driver.session.is_over, "the end")
     window.tablet.server.close()
     window.bridge.end()
     for widget in (window.subject, window):
@@ -45,8 +45,8 @@ def desk(application, tmp_path, monkeypatch):  # noqa: F811  the fixture
 
 
 def answer_to(driver, number):
-    driver.until(lambda: driver.session.of(number).answer is not None, f"the answer to {number}")
-    return driver.session.of(number).answer
+    driver.until(lambda: driver.session.trial_state(number).answer is not None, f"the answer to {number}")
+    return driver.session.trial_state(number).answer
 
 
 def ask(driver):
@@ -88,7 +88,7 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
         if card.name == "Subject's screen"
     )
     assert not card.ready
-    assert server.code in card.words
+    assert server.code in card.text
     browser.call("Page.navigate", url=server.url)
     browser.until("document.readyState == 'complete' && !!document.getElementById('code')")
     browser.click("code")
@@ -100,7 +100,7 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     browser.type("80")
     browser.value("document.getElementById('ruler').requestSubmit()")
     browser.until("document.getElementById('title').textContent == 'Welcome'")
-    driver.until(lambda: "checked with a ruler" in window.tablet.words and "not" not in window.tablet.words)
+    driver.until(lambda: "checked with a ruler" in window.tablet.status and "not" not in window.tablet.status)
     window.act("primary")
     driver.phase("idle")
     assert not window.subject.isVisible()
@@ -146,7 +146,7 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     browser.touch("line", 0.3)
     browser.click("next")
     browser.until("document.body.innerText.includes('kept on this device')")
-    assert driver.session.of(3).answer is None
+    assert driver.session.trial_state(3).answer is None
     browser.call("Page.reload")  # and it is back
     assert answer_to(driver, 3) == "score 30"
     browser.until("pending.length == 0", "the acknowledgement")

@@ -34,14 +34,14 @@ def test_a_subject_that_is_not_enrolled_is_named_before_start_and_no_more_once_i
     create_study(tmp_path / "pilot", protocol_file("sensotact-friction").read_text(encoding="utf-8"), 11, blinded=False)
     inside = replace(form, study="pilot")
     assert not card(inside, "Subject").ready
-    assert "P07 is not enrolled" in card(inside, "Subject").words
+    assert "P07 is not enrolled" in card(inside, "Subject").text
     enrol(tmp_path / "pilot", "P07", Body())
     assert card(inside, "Subject").ready
 
 
 def test_a_study_that_is_not_in_the_folder_is_named_with_those_that_are(form, tmp_path):
     create_study(tmp_path / "pilot", protocol_file("sensotact-friction").read_text(encoding="utf-8"), 11, blinded=False)
-    words = card(replace(form, study="pilto"), "Study and protocol").words
+    words = card(replace(form, study="pilto"), "Study and protocol").text
     assert "“pilto” is no study" in words
     assert "pilot" in words.removeprefix("“pilto”")
 
@@ -51,15 +51,15 @@ def test_a_study_that_is_damaged_keeps_start_from_lighting(form, tmp_path):
     (tmp_path / "pilot" / "study.sqlite").write_bytes(b"not a database")
     study_card = card(replace(form, study="pilot"), "Study and protocol")
     assert not study_card.ready
-    assert "cannot be read" in study_card.words
+    assert "cannot be read" in study_card.text
 
 
 def test_a_broken_protocol_is_named_with_its_file_before_start(form, tmp_path):
     (tmp_path / "own.toml").write_text("name = [")
     protocol_card = card(replace(form, protocol=str(tmp_path / "own.toml")), "Study and protocol")
     assert not protocol_card.ready
-    assert "own.toml" in protocol_card.words
-    assert "\n" not in protocol_card.words
+    assert "own.toml" in protocol_card.text
+    assert "\n" not in protocol_card.text
 
 
 def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypatch, tmp_path):
@@ -67,12 +67,12 @@ def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypa
     monkeypatch.chdir(tmp_path)
     full = card(replace(form, folder="recordings"), "Disk")
     assert not full.ready
-    assert full.words.startswith(f"{Path('recordings').absolute()} has 1 MB of room")  # as it is spelled on the disk
+    assert full.text.startswith(f"{Path('recordings').absolute()} has 1 MB of room")  # as it is spelled on the disk
 
 
 def test_every_card_that_is_open_says_why_and_the_missing_transducer_comes_first(form):
     cards = checklist(replace(form, subject="", seed="x"), Bench(), "measured")
-    assert all(card.words for card in cards if not card.ready)
+    assert all(card.text for card in cards if not card.ready)
     assert [card.name for card in cards if not card.ready] == ["Study and protocol", "Subject", "Transducer"]
     assert headline(cards, "") == "Connect a transducer, or choose scores only."
 
@@ -83,4 +83,4 @@ def test_a_code_that_was_used_before_asks_and_the_next_free_one_is_proposed(form
         (tmp_path / name / "session.sqlite").write_bytes(b"")
     assert codes_in(tmp_path) == ("P07", "P07", "P08")
     assert next_code(codes_in(tmp_path)) == "P09"
-    assert "Sessions of P07 here already: 2." in card(form, "Subject").words
+    assert "Sessions of P07 here already: 2." in card(form, "Subject").text

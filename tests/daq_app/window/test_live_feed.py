@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from daq_app.recorder.messages import Live
-from daq_app.window.live_feed import LiveFeed, together
+from daq_app.window.live_feed import LiveFeed, merge_live
 from daq_app.window.live_trace import CHANNELS
 from drivers.calibration import Calibration
 from drivers.transducer import TransducerInfo
@@ -102,7 +102,7 @@ def test_readings_that_are_missing_leave_a_gap_however_few_they_are(feed):
 def test_readings_that_came_in_several_messages_are_taken_as_one_up_to_whatever_came_between():
     first, second = live(0, sliding(100)), live(100, sliding(50))
     rezeroed, other = live(150, sliding(10), zero=(1.0,) * 6), live(0, sliding(5), stream=2)
-    messages = list(together([first, second, "a word", rezeroed, other]))
+    messages = list(merge_live([first, second, "a word", rezeroed, other]))
     assert [len(f.time) if isinstance(f, Live) else f for f in messages] == [150, "a word", 10, 5]
     assert messages[0].time.tolist() == [*first.time, *second.time]
     assert messages[0].wrench.tolist() == [*first.wrench.tolist(), *second.wrench.tolist()]

@@ -20,7 +20,7 @@ from daq_app.window.live_model import (
     Use,
     forces_of,
     join_forces,
-    model_words,
+    model_text,
 )
 from daq_app.window.live_model_process import LiveModel
 from sessions.plan.plan import Frame
@@ -84,7 +84,7 @@ def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_i
     solution = solve(settled_scene(PLAN, FRICTION, NORMAL, "finite"))
     assert within.sed[-1] == pytest.approx(solution.sed_ending, rel=0.03)  # what the stepper's mesh is good to
     assert within.depth == pytest.approx(solution.indentation, rel=0.01)
-    assert model_words(within, None, "").state == "provisional"
+    assert model_text(within, None, "").state == "provisional"
     lift = Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1)
     finite.take(lift)
     hard = forces_of(stroke(rate=100), FRAME)
@@ -95,7 +95,7 @@ def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_i
     follower.take(lift)
     small = follower.take(Forces(5.0 + hard.time, 3.0 * hard.normal, 5.0 * hard.pull, 0, 1))
     assert beyond.sed[first:].tolist() == small.sed[first:].tolist()
-    assert model_words(beyond, None, "").state == "instead"
+    assert model_text(beyond, None, "").state == "instead"
     trace = ModelTrace()
     trace.add_prediction(beyond)
     is_known = np.isfinite(trace.columns(5.0, 8.0, 2000).values)
@@ -122,7 +122,7 @@ def test_another_plan_with_the_same_finger_needs_no_other_mesh(follower):
 def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again(follower):
     far = follower.take(Forces(np.array([6.0]), np.array([500.0]), np.array([0.0]), 0, 1))
     assert far.beyond
-    assert model_words(far, None, "").state == "beyond"
+    assert model_text(far, None, "").state == "beyond"
     assert not follower.take(Forces(np.array([7.0]), np.array([1.0]), np.array([0.0]), 0, 1)).beyond
 
 
@@ -133,11 +133,11 @@ def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_stead
     steady = shown_values.sed[(shown_values.time >= 1.2) & (shown_values.time <= 2.0)]
     assert settled.provisional == pytest.approx(steady.mean())
     assert abs(settled.difference) < 0.02
-    words = model_words(shown_values, settled, "").words
+    words = model_text(shown_values, settled, "").text
     assert f"{1000 * settled.sed:.2f} kPa" in words
     assert "at the measured force, small strain" in words
     assert f"± {100 * settled.error:.2g} % by the mesh; model: " in words
-    provisional = model_words(shown_values, None, "").words
+    provisional = model_text(shown_values, None, "").text
     assert "mesh, model: no estimate · at the measured force" in provisional
     assert f"{1000 * settled.provisional:.2f} kPa" in words
 
@@ -147,7 +147,7 @@ def test_a_full_solve_whose_nested_mesh_has_no_such_state_has_no_estimate_from_t
     follower.take(forces_of(stroke(), FRAME))
     settled = follower.settled_solver(Settle(PLAN, FRICTION, NORMAL, (1.2, 2.0)))()
     assert settled.error is None
-    assert f"SED {1000 * settled.sed:.2f} kPa; mesh: no estimate; model: " in model_words(None, settled, "").words
+    assert f"SED {1000 * settled.sed:.2f} kPa; mesh: no estimate; model: " in model_text(None, settled, "").text
 
 
 def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
@@ -156,7 +156,7 @@ def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
     assert settled.sed is None
     assert settled.difference is None
     assert settled.provisional is not None
-    assert settled.reason in model_words(None, settled, "").words
+    assert settled.reason in model_text(None, settled, "").text
     assert settled.picture.sed.max() > 0.0  # the last good state stays to be seen
     assert settled.depth == pytest.approx(1.54, abs=0.02)
     assert settled.picture.lost is None
@@ -172,10 +172,10 @@ def test_a_solve_that_finds_nothing_is_marked_in_the_last_state_that_was_followe
     x, y = settled.picture.lost  # squeezed most between bone and surface, above the contact
     assert abs(x) < 4.0
     assert 0.0 < y < 4.0
-    words = model_words(None, settled, "")
+    words = model_text(None, settled, "")
     assert words.state == "failed"
-    assert "At 1.5 mm of indentation the finger wedges." in words.words
-    assert "⊗" in words.words
+    assert "At 1.5 mm of indentation the finger wedges." in words.text
+    assert "⊗" in words.text
 
 
 def test_readings_become_200_steps_a_second_and_unhealthy_ones_are_left_out():
@@ -212,9 +212,9 @@ def test_joined_batches_are_one_batch():
     ],
 )
 def test_every_state_of_the_model_has_words(provisional, settled, problem, state):
-    words = model_words(provisional, settled, problem)
+    words = model_text(provisional, settled, problem)
     assert words.state == state
-    assert words.words
+    assert words.text
 
 
 def test_a_gap_in_the_readings_is_a_gap_in_the_curve(follower):

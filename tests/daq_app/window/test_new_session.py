@@ -166,12 +166,12 @@ def test_who_is_not_enrolled_is_enrolled_at_a_button_and_who_was_withdrawn_is_re
     assert enrolment(form).may_enrol
     assert "not enrolled" in check_form(form, SIMULATED, NOW, 0)["subject"]
     assert enrol_subject(form) == ""
-    assert "P08 is enrolled" in enrolment(form).words
-    assert "blinded" in enrolment(form).words
+    assert "P08 is enrolled" in enrolment(form).sentence
+    assert "blinded" in enrolment(form).sentence
     assert "enrolled in pilot before" in enrol_subject(form)
     withdraw(study, "P08", "moved away")
     assert not enrolment(form).may_enrol
-    assert "moved away" in enrolment(form).words
+    assert "moved away" in enrolment(form).sentence
     assert "moved away" in check_form(form, SIMULATED, NOW, 0)["subject"]
 
 
@@ -181,7 +181,7 @@ def test_a_folder_that_is_no_study_leaves_protocol_and_seed_to_the_page(tmp_path
 
 def test_a_study_that_cannot_be_read_says_so(study):
     (study / "study.sqlite").write_bytes(b"not a database")
-    assert "cannot be read" in enrolment(in_study(study, "P07")).words
+    assert "cannot be read" in enrolment(in_study(study, "P07")).sentence
     assert isinstance(check_form(in_study(study, "P07"), SIMULATED, NOW, 0), Refusal)
 
 
@@ -228,7 +228,7 @@ def test_a_skipped_trial_of_a_session_that_was_cut_short_is_not_done(tmp_path):
     writer.event("skip", 2)
     writer.close()
     (session,) = unfinished_sessions(tmp_path)
-    assert session.words.endswith(": trials done 1 of 3")
+    assert session.description.endswith(": trials done 1 of 3")
 
 
 def test_sessions_of_one_subject_that_were_cut_short_are_told_apart_by_when_they_began(tmp_path, monkeypatch):
@@ -242,7 +242,7 @@ def test_sessions_of_one_subject_that_were_cut_short_are_told_apart_by_when_they
     monkeypatch.setattr("sessions.recording.head.datetime", Clock)
     for hour in (8, 11):
         new_writer(tmp_path / f"at-{hour}", plan=PLAN).close()
-    words = {one.folder.name: one.words[: len("S01, 2026-11-26 17:51")] for one in unfinished_sessions(tmp_path)}
+    words = {one.folder.name: one.description[: len("S01, 2026-11-26 17:51")] for one in unfinished_sessions(tmp_path)}
     assert words == {"at-8": "S01, 2026-11-26 17:51", "at-11": "S01, 2026-11-26 20:51"}
     monkeypatch.undo()
     time.tzset()

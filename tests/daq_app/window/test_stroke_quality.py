@@ -38,14 +38,14 @@ def test_a_force_that_falls_by_half_asks_for_another_stroke(judge_stroke):
     assert quality.fell == pytest.approx(1 - 0.6 / 1.8, abs=2e-3)
     assert quality.grade == "doubtful"
     assert verdict(quality) == "Redo: pressed less than half as hard at the end. Keep pressing until the end."
-    assert judge_stroke(1.6).words == ()
+    assert judge_stroke(1.6).texts == ()
     assert verdict(judge_stroke(1.6)) == "Good"
 
 
 def test_the_worst_comes_first_and_says_what_to_do(judge_stroke):
     refusal = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"), (FlawName.TOO_LITTLE_FORCE, "refused"))
     assert verdict(refusal) == "Redo: pressed too lightly. Press harder."
-    assert refusal.words[1:] == (stroke_quality.LEAVING, "stick slip")
+    assert refusal.texts[1:] == (stroke_quality.LEAVING, "stick slip")
     doubtful = judge_stroke(0.4, (FlawName.STICK_SLIP, "doubtful"))
     assert verdict(doubtful).startswith("Redo: pressed less than half as hard")
 

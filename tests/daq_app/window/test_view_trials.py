@@ -49,7 +49,7 @@ def test_each_trial_is_one_tile_with_a_state_of_its_own():
 def test_no_two_states_share_a_shape_or_words():
     assert len({mark for mark, _ in TILES.values()}) == len(TILES)
     view = tiles(after(*SCORE, Judged(1, 1, GOOD), *TAKE_KEPT).session)
-    assert [tile.words for tile in view[:3]] == [
+    assert [tile.description for tile in view[:3]] == [
         f"trial 1, {FIRST.stimulus.code}: done",
         f"trial 2, {SECOND.stimulus.code}: in hand",
         f"trial 3, {PLAN.trials[2].stimulus.code}: still to come",

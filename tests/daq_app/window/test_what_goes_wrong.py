@@ -56,9 +56,9 @@ def test_nothing_that_is_done_after_the_recorder_has_ended_takes_the_way_to_resu
 @pytest.mark.parametrize("cut", [NO_RECORDER, m.Failed("StartSession", "no room: free some", "RecordingError")])
 def test_a_session_whose_sealing_was_cut_short_is_not_said_to_be_being_sealed(cut):
     sealing = after(*CLOSING, m.SessionEnded("recordings/P07", END, False), m.Sealing("recordings/P07"))
-    assert derive_view(sealing).lamp.words == "ended, being sealed"
+    assert derive_view(sealing).lamp.text == "ended, being sealed"
     view = derive_view(after(*CLOSING, m.SessionEnded("recordings/P07", END, False), m.Sealing("recordings/P07"), cut))
-    assert view.lamp.words == "ended, not sealed"
+    assert view.lamp.text == "ended, not sealed"
     remedy = "daq-app resume --end recordings/P07" if cut is NO_RECORDER else "No room: free some"
     assert remedy in view.banner.sentence
     assert view.banner.sends != RESUME

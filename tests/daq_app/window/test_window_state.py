@@ -112,13 +112,13 @@ def test_a_redone_trial_loses_its_score_and_says_which_take_it_is():
 def test_a_flawed_stroke_is_redone_by_one_key_whose_reason_is_what_was_found():
     course = derive_view(after(*SCORE, Judged(1, 1, BAD))).course
     assert course.stroke.grade == "refused"
-    assert "no steady window" in course.stroke.words
+    assert "no steady window" in course.stroke.text
     assert course.buttons["redo"].sends == steps.Redo("no steady window")
 
 
 def test_a_good_stroke_is_redone_only_with_a_reason_that_is_asked_for():
     course = derive_view(after(*SCORE, Judged(1, 1, GOOD))).course
-    assert course.stroke.words == f"Stroke on {CODE} · steady 1.5 s · µ 0.44 · 21 mm/s · N fell 8 % · good"
+    assert course.stroke.text == f"Stroke on {CODE} · steady 1.5 s · µ 0.44 · 21 mm/s · N fell 8 % · good"
     assert course.buttons["redo"].enabled
     assert course.buttons["redo"].sends is None
 
@@ -154,7 +154,7 @@ def test_the_recording_lamp_is_fed_by_what_the_disk_acknowledged_and_by_nothing_
         state = after(Tick(100.0 + second), status(1_000), state=state)
     lamp = derive_view(state).lamp
     assert lamp.grade == "wrong"
-    assert lamp.words == "NOT RECORDING 00:00:05"
+    assert lamp.text == "NOT RECORDING 00:00:05"
     assert lamp.age == "saved 5.0 s ago"
     assert derive_view(after(status(2_000), state=state)).lamp.grade == "on"
 
@@ -166,7 +166,7 @@ def test_a_session_goes_on_in_the_folder_that_its_end_names():
 
 def test_a_session_that_has_ended_shows_no_recording():
     state = after(*MOUNT, status(1_000), m.SessionEnded("recordings/P07", END, False), m.Sealing(""), m.Sealed(""))
-    assert derive_view(state).lamp == replace(derive_view(state).lamp, grade="off", words="ended and sealed")
+    assert derive_view(state).lamp == replace(derive_view(state).lamp, grade="off", text="ended and sealed")
 
 
 # ---- what is wrong
@@ -246,7 +246,7 @@ def test_no_reading_counts_as_of_now_once_the_recorder_is_dead_or_not_heard():
 def test_the_health_lamp_names_what_was_lost():
     report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 7, (0.0,) * 7, 0)
     bench = derive_view(after(m.Device(INFO, None), report)).bench
-    assert (bench.lamp, bench.lamp_words) == ("look", "3 lost")
+    assert (bench.lamp, bench.lamp_text) == ("look", "3 lost")
     assert bench.rate == "6998 Hz (set 7000)"
     assert dict(bench.counters)["lost"] == "3"
 
@@ -255,7 +255,7 @@ def test_what_was_lost_and_a_rate_that_is_not_known_are_said_in_the_experimenter
     monkeypatch.setattr("daq_app.window.view.tr", lambda text, **values: f"<{text.format(**values)}>")
     report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 7, (0.0,) * 7, 0)
     bench = derive_view(after(m.Device(replace(INFO, rate=float("nan")), None), report)).bench
-    assert (bench.lamp_words, bench.rate) == ("3 <lost>", "<6998 Hz (set <unknown>)>")
+    assert (bench.lamp_text, bench.rate) == ("3 <lost>", "<6998 Hz (set <unknown>)>")
 
 
 def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_still_come_back():
@@ -265,7 +265,7 @@ def test_a_transducer_that_sends_nothing_for_a_second_is_said_to_while_it_may_st
 
     quiet, silent = view_after(0.9, *TOUCH), view_after(2.2, *TOUCH)
     assert (quiet.bench.lamp, quiet.bench.silent, quiet.banner) == ("well", False, None)
-    assert (silent.bench.lamp, silent.bench.lamp_words) == ("wrong", "no readings for 2 s")
+    assert (silent.bench.lamp, silent.bench.lamp_text) == ("wrong", "no readings for 2 s")
     assert silent.bench.silent
     assert silent.banner.grade == "wrong"
     assert silent.banner.sentence.startswith("No readings for 2 s: check power and cable")
@@ -278,7 +278,7 @@ def test_an_overload_stays_until_somebody_acknowledges_it():
     state = after(m.Device(INFO, None), health_report((0.1,) * 6 + (0.2,), (0.1, 0.1, 0.4, 0.1, 0.1, 0.9, 1.3)))
     bench = derive_view(state).bench
     [combined] = [bar for bar in bench.bars if bar.name == "combined"]
-    assert (combined.share, combined.peak, combined.over) == (0.2, 1.3, True)
+    assert (combined.share, combined.peak, combined.overloaded) == (0.2, 1.3, True)
     assert bench.can_acknowledge
     bench = derive_view(after(m.AcknowledgeOverloads(), state=state)).bench
     assert not bench.can_acknowledge

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from daq_app.analyst.frame import Film, Frame, Instant, Parts
+from daq_app.analyst.frame import Film, Frame, FrameMesh, Instant
 from daq_app.analyst.stroke import RawReadings
 from drivers.readings import ReadingBlock
 from solver.prediction import Skin
@@ -45,7 +45,8 @@ def frame(sed):
     return Frame(square, {"sed": np.full(3, sed)}, {"skin": square}, square, contact, np.array([sed, sed]))
 
 
-PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]), np.array([1])), np.array([0.0, 1.0])
+PARTS = FrameMesh(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]), np.array([1]))
+ARCS = np.array([0.0, 1.0])
 
 
 def film(**more):

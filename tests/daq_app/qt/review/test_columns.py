@@ -11,13 +11,13 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
 from daq_app.analyst import state as m
-from daq_app.analyst.finger_words import finger_words
+from daq_app.analyst.finger_words import finger_text
 from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import rows, selected_row
 from daq_app.analyst.stroke import EDGES
 from daq_app.qt import preferences, start
 from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
-from daq_app.qt.stroke_column import BY, DecisionsBar
+from daq_app.qt.stroke_column import AUTHOR, DecisionsBar
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
 from tests.daq_app.qt.review.examples import SESSION, Nobody, film, raw, until
@@ -118,9 +118,9 @@ def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model
     condition = f"SED at {prediction.indentation:.3g} mm, small strain"
     error = f"{1000 * prediction.sed:.3f} kPa ± 0.1 % by the mesh; model: viscosity below 0.01 to 4 % of the SED"
     assert prediction.error_estimate == pytest.approx(0.001)
-    assert f"{condition} {error}" in finger_words(window.state)
+    assert f"{condition} {error}" in finger_text(window.state)
     assert dict(numbers(window.state))[f"{condition}, averaged over the ending"] == error
-    assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
+    assert f"{condition} {error}" in [link.text for link in lineage(window.state)]
 
 
 def test_while_the_model_is_at_work_no_trial_is_said_to_lack_its_answer(window):
@@ -179,15 +179,15 @@ def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
 def test_an_edge_is_moved_by_keys_and_recorded_with_enter(window):
     stroke = selected_row(window.state).stroke
     handle = window.stroke.stroke.handles["steady begin"]
-    window.stroke.decisions.by.setText("E02")
-    window.stroke.decisions.why.setText("a ramp")
+    window.stroke.decisions.author_field.setText("E02")
+    window.stroke.decisions.reason_field.setText("a ramp")
     handle.setFocus()
     QTest.keyClick(handle, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
     QTest.keyClick(handle, Qt.Key.Key_Left)
     assert not any(isinstance(request, m.Move) for request in window._work.requests)
     QTest.keyClick(handle, Qt.Key.Key_Return)
     move = window._work.requests[-1]
-    assert (move.stroke, move.edge, move.by, move.why) == (stroke.number, "steady begin", "E02", "a ramp")
+    assert (move.stroke, move.edge, move.author, move.reason) == (stroke.number, "steady begin", "E02", "a ramp")
     assert move.time == pytest.approx(stroke.steady[0] + 0.045)
 
 
@@ -260,7 +260,7 @@ def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
     window.take(m.ReportReady("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
     assert bar.redo.accessibleName() == "redo lift of trial 2, Ctrl+Shift+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, control | Qt.KeyboardModifier.ShiftModifier)
-    assert [request.again for request in window._work.requests if isinstance(request, m.Undo)] == [False, True]
+    assert [request.redo for request in window._work.requests if isinstance(request, m.Undo)] == [False, True]
 
 
 def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, window):
@@ -274,8 +274,8 @@ def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, w
     QTest.mouseMove(plot.viewport(), plot.mapFromScene(at))
     application.processEvents()
     pattern = r"([\d.]+) s · N ([\d.]+) N · T ([\d.]+) N · µ ([\d.]+)"
-    time_s, normal, tangential, mu = map(float, re.fullmatch(pattern, plot.words.text()).groups())
-    assert plot.words.isVisible()
+    time_s, normal, tangential, mu = map(float, re.fullmatch(pattern, plot.readout.text()).groups())
+    assert plot.readout.isVisible()
     near = list(np.round(trace.time, 3)).index(time_s)
     assert abs(near - i) <= 1
     assert (normal, tangential, mu) == pytest.approx(
@@ -345,12 +345,12 @@ def test_the_comparison_follows_a_decision_that_changes_the_first_session(window
 
 
 def test_who_decides_is_remembered_with_all_else_that_the_window_remembers(window):
-    by = window.stroke.decisions.by
+    by = window.stroke.decisions.author_field
     by.setText("E07")
     by.editingFinished.emit()
-    assert preferences.settings().value(BY) == "E07"
-    assert DecisionsBar(window.ask).by.text() == "E07"
-    preferences.settings().remove(BY)
+    assert preferences.settings().value(AUTHOR) == "E07"
+    assert DecisionsBar(window.ask).author_field.text() == "E07"
+    preferences.settings().remove(AUTHOR)
 
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):
@@ -374,7 +374,15 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         window.resize(*size)
         application.processEvents()
         assert (window.width(), window.height()) == size
-        parts = (window.way, *window._panels, window.progress, window.stop, window.go_on, window.report, window.export)
+        parts = (
+            window.lineage,
+            *window._panels,
+            window.progress,
+            window.stop,
+            window.go_on,
+            window.report,
+            window.export,
+        )
         assert laid_over(window, parts) == []
         window.take(m.Step(0.5, "working"))
         application.processEvents()

@@ -60,7 +60,7 @@ def test_the_wheel_zooms_the_finger_about_the_pointer_and_home_or_a_double_click
     whole, at = canvas.view(), pixel(0.5, 0.25)
     wheel(application, canvas.viewport(), at, 3)
     assert canvas.view().per_mm == pytest.approx(1.02**45 * whole.per_mm)  # as pyqtgraph documents its wheel
-    assert canvas.view().place(at.x(), at.y()) == pytest.approx(whole.place(at.x(), at.y()))
+    assert canvas.view().from_screen(at.x(), at.y()) == pytest.approx(whole.from_screen(at.x(), at.y()))
     QTest.keyClick(canvas, Qt.Key.Key_Home)
     assert canvas.view() == whole
     QTest.keyClick(canvas, Qt.Key.Key_Plus)
@@ -140,11 +140,11 @@ def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees
     fields.high.setValue(2.5)
     fields.low.setValue(2.5)  # no range: the automatic one is shown
     assert canvas.look.range != (2.5, 2.5)
-    fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
+    fields.field_choice.setCurrentIndex(len(FIELD_CHOICES) - 1)
     assert fields.mode == ALL_TRIALS
     assert canvas.look.field.unit == "mm"
     assert not canvas.grab().isNull()
-    fields.which.setCurrentIndex(0)
+    fields.field_choice.setCurrentIndex(0)
 
 
 @pytest.mark.parametrize("locale", ["en_US", "de_DE", "ar_EG"])
@@ -167,7 +167,7 @@ def test_an_end_of_the_colours_is_typed_with_a_point_or_a_comma_in_every_country
 def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
     key = selected_row(window.state).key
     window.take(m.FingerHistory(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
-    words = window.model.why.text()
+    words = window.model.failure_label.text()
     assert "is step 4: at 0.300 s" in words
     assert words.endswith("The drag wedges it.")
     assert window.model.finger.look.lost == (0.5, 0.5)
@@ -194,22 +194,22 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
     for button in window.model.picture.save.buttons:
         button.click()
     requests = [request for request in window._work.requests if isinstance(request, m.Write)]
-    assert [(write.what, write.path) for write in requests] == [
+    assert [(write.document, write.path) for write in requests] == [
         ("picture course", f"out/picture.{ending}") for ending in ("svg", "png", "csv")
     ]
 
 
 def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simulated(window, monkeypatch, tmp_path):
     window.take(m.FingerHistory(selected_row(window.state).key, film()))
-    window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
+    window.model.fields.field_choice.setCurrentIndex(len(FIELD_CHOICES) - 1)
     field, canvas = FIELD_CHOICES[-1], window.model.finger
     monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
     for button in window.model.save.buttons:
         button.click()
-        assert window._words.accessibleName().startswith("Saved: ")
+        assert window._progress_label.accessibleName().startswith("Saved: ")
     assert not any(isinstance(request, m.Write) for request in window._work.requests)
     with Image.open(tmp_path / "u.png") as image:
-        assert image.size == (2 * canvas.width(), 2 * canvas.size_with(window.model._head()).height())
+        assert image.size == (2 * canvas.width(), 2 * canvas.size_with(window.model._heading()).height())
         assert image.height > 2 * canvas.height() + 2 * canvas.fontMetrics().height()
     assert "SIMULATED" in (tmp_path / "u.svg").read_text()
     head, errors, words, names, *numbers = (tmp_path / "u.csv").read_text().splitlines()
@@ -218,13 +218,13 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
     assert "at small strain; mesh, model: no estimate" in words
     state = canvas.frame
     table = np.array([line.split(",") for line in numbers], float)
-    np.testing.assert_allclose(table, np.column_stack([state.nodes, field.of(state)]), rtol=1e-8)
+    np.testing.assert_allclose(table, np.column_stack([state.nodes, field.values_of(state)]), rtol=1e-8)
     monkeypatch.setattr(
         "daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "none" / "u"), "")
     )
     window.model.save.buttons[0].click()
-    assert window._words.accessibleName().endswith("choose another folder.")
-    window.model.fields.which.setCurrentIndex(0)
+    assert window._progress_label.accessibleName().endswith("choose another folder.")
+    window.model.fields.field_choice.setCurrentIndex(0)
 
 
 def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
@@ -234,11 +234,11 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     ranges, show = set(), window.model._show_step
     window.model._show_step = lambda at: (show(at), ranges.add(window.model.finger.look.range))
     window.model.write_film(tmp_path / "film.gif")
-    assert "Saved" in window._words.accessibleName()
+    assert "Saved" in window._progress_label.accessibleName()
     window.model._show_step = show
     with Image.open(tmp_path / "film.gif") as image:
         assert (image.n_frames, image.info["duration"]) == (4, 100)
-        assert image.size == window.model.finger.size_with(window.model._head()).toTuple()
+        assert image.size == window.model.finger.size_with(window.model._heading()).toTuple()
     assert len(ranges) == 1
     assert "Step 4 of 4" in window.model.finger.accessibleName()
 
@@ -246,8 +246,8 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
 def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(window, tmp_path):
     window.take(m.FingerHistory(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
-    assert "Saved" in window._words.accessibleName()
-    width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._head()).toTuple())
+    assert "Saved" in window._progress_label.accessibleName()
+    width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._heading()).toTuple())
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(tmp_path / "film.mp4")]
     command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     process = subprocess.run(command, capture_output=True, check=True)
@@ -261,7 +261,7 @@ def test_a_film_as_mp4_without_its_encoder_is_one_sentence(window, tmp_path, mon
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     window.take(m.FingerHistory(selected_row(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
-    assert "daq-app[film]" in window._words.accessibleName()
+    assert "daq-app[film]" in window._progress_label.accessibleName()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -269,7 +269,7 @@ def test_a_film_that_is_cancelled_leaves_no_file(window, tmp_path):
     window.take(m.FingerHistory(selected_row(window.state).key, film()))
     QTimer.singleShot(0, lambda: window.findChildren(QProgressDialog)[-1].cancel())
     window.model.write_film(tmp_path / "film.gif")
-    assert "The film was cancelled" in window._words.accessibleName()
+    assert "The film was cancelled" in window._progress_label.accessibleName()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -298,7 +298,7 @@ def two_fingers(application, window, factor=1.5):
     window.take(m.OtherSession("other", replace(example(), session="later"), {row.key: other}))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
-    return window.model.finger, window.model.other
+    return window.model.finger, window.model.compared_finger
 
 
 def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(application, window):
@@ -345,4 +345,4 @@ def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a
     window.take(m.OtherSession("other", replace(example(), session="later", predictions=remaining)))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
-    assert window.model.other.accessibleName() == "B  later has no answer to this stimulus."
+    assert window.model.compared_finger.accessibleName() == "B  later has no answer to this stimulus."
