@@ -185,7 +185,7 @@ class Visit:
         return np.column_stack([x, y, -normal, -HEIGHT * y, HEIGHT * x, np.zeros_like(time)])
 
     def _measured_wrench(self, time: Array, true: Array) -> Array:
-        """Return the wrench (n, 6) [N, N mm] that the transducer tells of a true one in the face's frame."""
+        """Return the wrench (n, 6) [N, N mm] that the transducer measures of a true one in the face's frame."""
         wrench = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
         reading = wrench @ self._errors.T + self._bench.wrench(time) - self._bench.true_wrench(time)
         if self._trouble.hum:

@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) -> str:
-    """Measure one rate [Hz] for so many real seconds, asking `every` so many seconds."""
+    """Measure one rate [Hz] for `seconds` real seconds, asking every `every` seconds."""
     factor = max(1.0, rate / TOP)
     context = multiprocessing.get_context("spawn")
     box_pipe, far_end = context.Pipe()

@@ -1,4 +1,4 @@
-"""How often a study tells which quantity its scores follow: a table for three designs (`sessions.statistics.power`).
+"""How often a study finds which quantity its scores follow: a table for three designs (`sessions.statistics.power`).
 
 A rival is decided where its Akaike weight is at least 0.95.
 

@@ -92,7 +92,7 @@ class PlayedRecorder:
 
 
 def health(**counts: int) -> m.HealthReport:
-    """Return a report of a bench that is well, save for these counts."""
+    """Return a report of a bench that is well, except for these counts."""
     totals = Health(received=123_456, lag_ms=2.0, **counts)
     return m.HealthReport(totals, 6999.7, (0.0,) * 7, (0.0,) * 7, 0)
 
@@ -108,7 +108,7 @@ def status(safe_ns: int) -> Status:
 
 
 def score_reports(trial: int, score: float) -> tuple[m.Report, ...]:
-    """Return what is said when a trial is scored."""
+    """Return the reports of a scored trial."""
     return (log_line("scored", trial, score=score), log_line("take_kept", trial, take=1))
 
 

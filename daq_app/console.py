@@ -49,7 +49,7 @@ class RecordingKept(KeyboardInterrupt):
 
 
 class NotWritten(Exception):
-    """What was said could not be written: why, where, and what to do."""
+    """The output could not be written: why, where, and what to do."""
 
 
 def is_ours(error: Exception) -> bool:

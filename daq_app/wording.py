@@ -96,7 +96,7 @@ def quantity(value: float | None, digits: int, unit: str = "") -> str:
 
 
 def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
-    """Return a number times a factor with so many significant digits, and a dash where there is none.
+    """Return a number times a factor with `digits` significant digits, and a dash where there is none.
 
     Of numbers below a million all digits before the point are there.
 
@@ -138,7 +138,7 @@ def two_meanings(text: str, point: str = ".") -> tuple[str, str] | None:
 
 
 def span(low: float, high: float, digits: int = 3) -> str:
-    """Return a range with so many significant digits, and more where its ends would read alike.
+    """Return a range with `digits` significant digits, and more where its ends would read alike.
 
     >>> span(1.0, 2.5), span(-178.94, -178.91), span(2.0, 2.0)
     ('1.00 to 2.50', '-178.94 to -178.91', '2.00 to 2.00')

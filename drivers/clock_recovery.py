@@ -210,7 +210,7 @@ class ClockRecovery:
         return self._place(damaged, self._held_until_ns)
 
     def bridge(self, received_ns: int) -> None:
-        """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one record."""
+        """Let the stream, restarted, go on at `received_ns` behind a gap of at least one record."""
         if self._zero_ns is None:
             return
         self.watch.begin_anew()
@@ -289,7 +289,7 @@ class ScanCount:
         return _NONE
 
     def bridge(self, received_ns: int) -> None:
-        """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one scan."""
+        """Let the stream, restarted, go on at `received_ns` behind a gap of at least one scan."""
         self.watch.begin_anew()
         if self._behind is not None:
             away = self._arrival_minus_time(self._sequence, received_ns) - self._behind

@@ -39,7 +39,7 @@ class Deadline:
     """A limit on all that is waited for, which nothing that arrives can put off."""
 
     def __init__(self, seconds: float, stopping: threading.Event | None = None) -> None:
-        """End in so many real seconds, or as soon as `stopping` is set."""
+        """End in `seconds` real seconds, or as soon as `stopping` is set."""
         self._began = time.monotonic()
         self._seconds = seconds
         self._stopping = stopping

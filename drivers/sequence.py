@@ -181,12 +181,12 @@ class SequenceAccount:
         ahead, ticks = record.since(last)
         step = self.step or 1
         # A device that had only just been switched on before it rebooted looks here as if it had gone on.
-        if ticks <= 0:  # the counter began anew: only the host's clock knows for how long the device was away
+        if ticks <= 0:  # the counter restarted: only the host's clock knows for how long the device was away
             self.restarted += 1
             away = (record.received_ns - last.received_ns) * 1e-9 * self._counter_rate
             ahead = max(round(away / step), 2)
             ticks = ahead * step
-        elif ahead <= 0:  # the same device numbers its records anew: its counter tells what is missing
+        elif ahead <= 0:  # the same device renumbers its records: its counter shows what is missing
             ahead = max(round(ticks / step), 1)
         self._advance(record, ahead, ticks)
 

@@ -29,7 +29,7 @@ _BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the las
 
 
 class Conversation(Protocol):
-    """What is said over one kind of line around a stream."""
+    """The exchange over one kind of line around a stream."""
 
     def begin(self, link: Link) -> bytes:
         """Bring the device to stream, whatever it was doing; return what it streamed already.
@@ -93,7 +93,7 @@ def _end_stream(conversation: Conversation, link: Link) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Arrival:
-    """Records that arrived together; None where the stream began anew."""
+    """Records that arrived together; None where the stream restarted."""
 
     records: Records | None
     received_ns: int

@@ -149,7 +149,7 @@ class Health:
     late: int = 0
     malformed: int = 0
     stalled: int = 0  # records whose device counter did not move (they are kept, and counted here too)
-    restarted: int = 0  # times the device began to count anew
+    restarted: int = 0  # times the device began to count from zero
     saturated: int = 0  # readings whose status says the six values are invalid, as when out of range
     doubtful: int = 0  # other readings whose status speaks against their values: the device has a fault
     noted: int = 0  # other readings whose status says something, and nothing against their values

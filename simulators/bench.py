@@ -48,7 +48,7 @@ class BenchSettings:
     drift_torque: float = 0.1  # no torque drifts further than this [N mm]
     drift_period: tuple[float, float] = (120.0, 600.0)  # each axis drifts to and fro with a period between these [s]
     offset: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # unloaded reading: weight of the plate, strain of the mounting
-    gains: Six = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)  # felt over true; 1 where the calibration is exact [-]
+    gains: Six = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)  # sensed over true; 1 where the calibration is exact [-]
     tilt: tuple[float, float] = (0.0, 0.0)  # of the stimulus about the transducer's x and y axes [degrees]
     height: float = 20.0  # the stimulus's face above the transducer's origin [mm]
     rated: Six = RATED  # beyond this an axis saturates

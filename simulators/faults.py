@@ -50,7 +50,7 @@ class Faults:
     """The timetable of one box. The same seed hurts the same datagrams in the same way."""
 
     def __init__(self, timetable: Iterable[Fault] = (), *, seed: int = 0, repeat: float = 0.0) -> None:
-        """Begin the timetable anew every `repeat` seconds, if above 0."""
+        """Repeat the timetable every `repeat` seconds, if above 0."""
         self._timetable = tuple(timetable)
         self._seed = seed
         self._repeat = repeat
@@ -186,7 +186,7 @@ def _device_clock(timetable: Sequence[Fault], repeat: float) -> tuple[Array, Arr
 
 
 def _through(values: Array, nodes: Array, sought: Array) -> Array:
-    """Return where (n,) the line through the knots lies, which is begun anew at its end as often as needed."""
+    """Return where (n,) the line through the knots lies, which is restarted at its end as often as needed."""
     rounds = np.floor(values / nodes[-1])
     within = np.array(np.interp(values - rounds * nodes[-1], nodes, sought), np.float64)
     return within + rounds * float(sought[-1])

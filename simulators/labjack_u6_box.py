@@ -171,7 +171,7 @@ class LabJackU6Box:
         self._buffer += self._codes(times[:count])[:, gauges].ravel().tolist()
 
     def _send(self) -> None:
-        """Pack what fills a packet; while some are missing packets say 59, the one that tells how many says 60."""
+        """Pack what fills a packet; while some are missing packets say 59, the one with the number says 60."""
         if self._outbox or self._scan is None or len(self._buffer) < (samples := self._scan[1]):
             return
         codes, self._buffer = self._buffer[:samples], self._buffer[samples:]
@@ -187,7 +187,7 @@ class LabJackU6Box:
         self._outbox += self._faults.route(self.now(), [(self.now(), _long(0xC0, data, 0xF9))])
 
     def _codes(self, times: Array) -> Indices:
-        """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
+        """Return the converter's codes of the six gauges at `times` (n,) [s], shape (n, 6)."""
         volts = self._faults.sensed_wrench(self.bench, times) @ self._gauges.T + _OFFSETS
         volts[self._faults.during("saturate", times), 2] = 11.0
         slope = np.where(volts < 0.0, -_VOLTS_PER_CODE_BELOW, _VOLTS_PER_CODE)

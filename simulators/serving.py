@@ -33,7 +33,7 @@ class TimetableError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Timetable:
-    """Strokes, in order of time, and faults; begun anew every `repeat` seconds where that is above 0."""
+    """Strokes, in order of time, and faults; restarted every `repeat` seconds where that is above 0."""
 
     strokes: tuple[tuple[float, Surface], ...]  # beginning [s] and surface of each
     faults: tuple[Fault, ...] = ()

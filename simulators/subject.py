@@ -84,12 +84,12 @@ class SimulatedSubject:
         return 50.0 + self._gain * (target - 50.0) + self._offset + settings.drift * position + carry_over
 
     def by_friction(self, descriptor: str) -> float:
-        """Return how many points a score rises with each unit of µ felt, over subjects of these settings."""
+        """Return how many points a score rises with each unit of perceived µ, over subjects of these settings."""
         sense = 1.0 if descriptor == "stickiness" else -1.0
         return sense * self.settings.gain * self.settings.friction_weight * 100.0 / (STICKIEST - SLIPPERIEST)
 
     def more_friction(self, first: Surface, second: Surface, trial: int, take: int = 1) -> bool:
-        """Say whether the first has more friction in the judgement of this subject, who answers anew in every trial.
+        """Say whether the first has more friction in the judgement of this subject, independent in every trial.
 
         A cumulative-normal observer of log µ: right with Φ(difference / discrimination), and by chance in a lapse.
         """

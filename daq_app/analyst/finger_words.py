@@ -1,4 +1,4 @@
-"""What is said of the finger that is shown, with which colours, and of two sessions side by side."""
+"""Texts and colour range of the displayed finger, and the comparison of two sessions."""
 
 from collections import defaultdict
 from statistics import fmean
@@ -66,7 +66,7 @@ def was_tried(prediction: PredictionFinding) -> bool:
 
 
 def finger_text(state: AnalystState | None) -> str:
-    """Return what is said of the settled finger, or why there is none."""
+    """Return the text about the settled finger, or the reason why there is none."""
     row = None if state is None else selected_row(state)
     if state is None or row is None:
         return ""
@@ -85,7 +85,7 @@ def finger_text(state: AnalystState | None) -> str:
 
 
 def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
-    """Return the other session's settled finger of the stimulus that is chosen, and what is said of it.
+    """Return the compared session's settled finger for the chosen stimulus, and the text about it.
 
     Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
     """
@@ -110,7 +110,7 @@ def _of_stimulus(report: Report, reference: PredictionFinding) -> list[Predictio
 
 
 def film_text(film: m.FingerHistory | None, index: int | None = None) -> str:
-    """Return what is said of one state of a history; without one, why the history ends before it settles."""
+    """Return the text about one state of a history; without a state, why the history ends before it settles."""
     if film is None:
         return ""
     if index is None:

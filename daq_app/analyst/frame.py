@@ -194,7 +194,7 @@ FIELD_CHOICES = (
 
 
 def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
-    """Return where the colours of frames begin and end: few nodes lie beyond; nought is the middle of signed ones."""
+    """Return where the colours of frames begin and end: few nodes lie beyond; zero is the middle of signed ones."""
     tops = [0.0]
     for frame in frames:
         values = np.abs(field.values_of(frame))

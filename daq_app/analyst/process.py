@@ -13,8 +13,8 @@ from daq_app.child_process import Child
 from daq_app.wording import tr
 
 Connection = Any  # one end of a pipe; its type is another one on each system
-_PATIENCE = 0.15  # work that has not stopped by itself after so long is ended [s]
-URGENT = (m.Stop, m.Move, m.Undo)  # asks for which the model's answers are left, and begun anew
+_PATIENCE = 0.15  # work that has not stopped by then is ended [s]
+URGENT = (m.Stop, m.Move, m.Undo)  # requests that interrupt the model's answers, which start again afterwards
 
 
 def run(connection: Connection, folder: str) -> None:
@@ -109,7 +109,7 @@ class Analyst:
         return tuple(messages)
 
     def ask(self, request: m.Ask) -> None:
-        """Ask for something; where the work was ended before, it begins anew and does that first."""
+        """Ask for something; where the work was ended before, it restarts and does that first."""
         if isinstance(request, m.Stop):
             self._stop_time = time.monotonic()
         if self._child is None:

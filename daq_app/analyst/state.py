@@ -214,7 +214,7 @@ class Row:
 
 
 def fold(state: AnalystState, message: Message) -> AnalystState:
-    """Return the state after a message; what was known stays until it is known anew."""
+    """Return the state after a message; what was known stays until it is known again."""
     match message:
         case ReportReady():
             return _on_report(state, message)
@@ -298,7 +298,7 @@ def selected_row(state: AnalystState) -> Row | None:
 
 
 def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
-    """Take a report; answers to strokes that did not change since stay until they are given anew."""
+    """Take a report; answers to strokes that did not change since stay until they are given again."""
     report, previous = message.report, state.report
     fingers = state.fingers
     if message.stage == "analysed" and previous is not None:

@@ -75,7 +75,7 @@ class Work:
         self._send(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
 
     def do(self, request: m.Ask) -> None:
-        """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
+        """Carry out a request and send the result. Raises Cancelled and whatever `sentence_of` knows."""
         match request:
             case m.Choose(row):
                 self._row = row

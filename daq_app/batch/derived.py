@@ -132,7 +132,7 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
 
 
 def _read_or_empty(recording: Recording, name: str) -> Mapping[str, Any]:
-    """Return a stored document; empty where there is none, or a damaged one, which is then made anew."""
+    """Return a stored document; empty where there is none, or a damaged one, which is then made again."""
     try:
         return stored_document(recording.folder, name) or {}
     except RecordingError:
@@ -218,7 +218,7 @@ def _predict(
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
-    """Return an analysis with its intervals, drawn anew where `bootstrap` is another, as it is kept and printed."""
+    """Return an analysis with its intervals, drawn again where `bootstrap` is another, as it is kept and printed."""
     settings, intervals = analysis.bootstrap, analysis.intervals
     if bootstrap is not None and bootstrap != settings:
         settings = bootstrap

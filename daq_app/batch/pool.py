@@ -110,7 +110,7 @@ def by_cluster(
     address: str,
     prepare: Callable[..., tuple[Any, ...]] = lambda *arguments: arguments,
 ) -> Generator[tuple[str, A | Lost]]:
-    """Yield each job's name and what `work` makes of it, as it comes from the workers of a cluster.
+    """Yield each job's name and the result of `work`, as it comes from the workers of a cluster.
 
     `prepare` turns a job's arguments into those that are sent, when its turn comes. What is under way when nobody takes
     answers any more ends with the client. Raises SchedulerError.
@@ -281,7 +281,7 @@ def visits(
             if isinstance(answer, str | Lost):
                 reason = answer if isinstance(answer, str) else answer.reason
                 failures.append((name, reason))
-                # Paths are told from the current folder.
+                # Paths are relative to the current folder.
                 console.note(f"{name}: {reason}".replace(f"{name}/", f"{jobs[name][0]}/"))
             else:
                 if address is not None:
@@ -312,7 +312,7 @@ def _keys(folders: Sequence[Path], shelf: Shelf) -> tuple[dict[Path, str], list[
 
 
 def by_processes(work: Callable[..., A], jobs: Jobs, workers: int | None) -> Generator[tuple[str, A | Lost]]:
-    """Yield each job's name and what `work` makes of it, from `workers` processes here, or as many as cores."""
+    """Yield each job's name and the result of `work`, from `workers` processes here, or as many as cores."""
     remaining = dict(jobs)
     try:
         for name, answer in _in_pool(work, dict(remaining), workers) if remaining else ():

@@ -62,7 +62,7 @@ _WRONG = (
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command line and return its exit code. Never raises, save for a broken interpreter."""
+    """Run one command line and return its exit code. Never raises, except for a broken interpreter."""
     debug = "--debug" in arguments
     try:
         accept_any_text(sys.stdin, sys.stdout, sys.stderr)

@@ -42,7 +42,7 @@ class Terminal:
     """Reads lines in a thread of its own, so that nobody's slowness holds up the recording."""
 
     def __init__(self, console: Console, *, forces: bool, lines: TextIO | None = None) -> None:
-        """Talk on stderr and listen on stdin; `forces` is False where no transducer tells when a stroke is done."""
+        """Talk on stderr and listen on stdin; `forces` is False where no transducer shows when a stroke is done."""
         self._forces = forces
         self._print = console.note
         self._prompt: Prompt | None = None
@@ -296,7 +296,7 @@ class _Attendance:
 
 
 def _raise_failure(report: m.Report) -> None:
-    """Raise what a report tells of as the command line tells it."""
+    """Raise the failure in a report as the exception that the command line expects."""
     match report:
         case m.Failed(_, sentence, kind):
             if kind in _WRONG:

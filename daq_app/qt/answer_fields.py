@@ -41,7 +41,7 @@ _LARGE = 36  # type of the number [device-independent pixels]
 _BUTTON_TYPE = 24  # type of the buttons
 _WIDE, HIGH = 220, 96  # a button, at least
 FULL = 5.0  # of the bar [N]
-AVERAGING_TIME = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
+AVERAGING_TIME = 0.1  # the mean over this time is shown: an eye follows it, and noise does not move it [s]
 
 
 class ScoreLine(QAbstractSlider):
@@ -53,7 +53,7 @@ class ScoreLine(QAbstractSlider):
     changed = Signal()
 
     def __init__(self, now: Callable[[], float]) -> None:
-        """Show an empty line; `now` tells the session clock [s]."""
+        """Show an empty line; `now` returns the session clock [s]."""
         super().__init__()
         self._now = now
         self._pixels_per_mm = 96 / 25.4
@@ -76,7 +76,7 @@ class ScoreLine(QAbstractSlider):
         self._name()
 
     def set_pixels_per_mm(self, pixels: float) -> None:
-        """Be as long as `LENGTH` says on a screen with so many device-independent pixels a millimetre."""
+        """Be as long as `LENGTH` says on a screen with `pixels` device-independent pixels a millimetre."""
         if pixels != self._pixels_per_mm:
             self._pixels_per_mm = pixels
             self._resize()

@@ -35,7 +35,7 @@ from sessions.plan.plan import Frame
 _FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
 BEGINNING = (m.Connect, m.StartSession, m.ResumeSession)  # requests for which another recorder is started
-_TICK = 0.1  # between two looks at the clock, for what tells an age [s]
+_TICK = 0.1  # between two looks at the clock, for texts with an age [s]
 
 
 class Client(Protocol):

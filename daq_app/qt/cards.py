@@ -118,7 +118,7 @@ class TransducerRow(QWidget):
 
 
 class ScreenFields(QWidget):
-    """What stands on the card of the subject's screen, be it a second screen or a tablet."""
+    """What stands on the card of the subject's screen, whether a second screen or a tablet."""
 
     def __init__(self, act: Callable[[str], None], form: Callable[[], SessionForm]) -> None:
         """Show nothing yet; `act` does what a button stands for, `form` is read when something has changed."""

@@ -27,7 +27,7 @@ _LEAST = 110  # height of the finger, before the font's scale [px]
 BAR_LINES = 3.5  # of text: height of the colour bar
 LEAST_LINES = 2.2  # of words over a finger: with fewer of them the picture stays where it is
 NEAREST, _FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
-# Black lines lie on the colours: magma begins a fifth above its dark end, and nought of a signed field is pale.
+# Black lines lie on the colours: magma begins a fifth above its dark end, and zero of a signed field is pale.
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
 LINE_KEYS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
 _ARROWS = {

@@ -239,7 +239,7 @@ class FingerView(QWidget):
 
 
 def _alike(picture: Picture | None, previous: Picture | None) -> bool:
-    """Say whether two pictures show the same: a finger that nothing touches is said anew sixty times a second."""
+    """Say whether two pictures show the same: a finger that nothing touches is reported sixty times a second."""
     if picture is previous or picture is None or previous is None:
         return picture is previous
     return np.array_equal(picture.outline, previous.outline)

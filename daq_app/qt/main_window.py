@@ -227,7 +227,7 @@ class MainWindow(QMainWindow):
             self.notice.warn(refusal)
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
-        """Ask the recorder for the session of a form; what keeps it from beginning is said."""
+        """Ask the recorder for the session of a form; what prevents it is shown."""
         session = check_form(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
         if isinstance(session, Refusal):
             self.notice.warn(" ".join(session.values()))

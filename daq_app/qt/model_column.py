@@ -255,7 +255,7 @@ class ModelColumn(QWidget):
             self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 
     def write_film(self, path: Path) -> None:
-        """Write the history that is shown as a film, and say what came of it."""
+        """Write the displayed history as a film, and show the result."""
         assert self._film is not None
         previous, self._filming = self._index, True
         try:

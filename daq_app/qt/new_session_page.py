@@ -304,7 +304,7 @@ class NewSessionPage(Panel):
         self._place_changed()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Look for studies anew where the window is turned to: another program may have made one."""
+        """Look for studies again where the window is turned to: another program may have made one."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange:
             self._place_changed()

@@ -93,7 +93,7 @@ def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]
     sorted_shades = shades[order]
     elements = np.empty(corners.shape[:2], _ELEMENT)
     elements["kind"] = 1  # draws a line to it ...
-    elements["kind"][:, 0] = 0  # ... or begins anew there
+    elements["kind"][:, 0] = 0  # ... or restarts there
     elements["x"], elements["y"] = corners[order, :, 0], corners[order, :, 1]
     edges = np.flatnonzero(np.diff(sorted_shades, prepend=-1, append=-1)).tolist()
     for begin, end in pairwise(edges):
@@ -119,7 +119,7 @@ class PaintedWidget(QWidget):
         self.redraw()
 
     def redraw(self) -> None:
-        """Draw all of it anew, with what stands still."""
+        """Redraw everything, the ground too."""
         self._ground = None
         self.update()
 

@@ -199,7 +199,7 @@ def hbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing:
 
 
 def vbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QVBoxLayout:
-    """Return parts below each other, likewise."""
+    """Return parts below each other, as `hbox` does beside each other."""
     return _arrange(QVBoxLayout(), parts, on, margins, spacing)
 
 
@@ -260,7 +260,7 @@ def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
 
 
 def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None) -> None:
-    """Show a text, only where it is another one: nothing is laid out anew for nothing.
+    """Show a text, only where it is another one: nothing is laid out again for nothing.
 
     A screen reader says it after the `name` of what it tells; without a name the text alone.
     """

@@ -101,7 +101,7 @@ class _Canvas(QWidget):
 
 
 class ComparedView(QWidget):
-    """Offers to open a second session, and shows what came of it."""
+    """Offers to open a second session, and shows the comparison."""
 
     def __init__(self, choose: Callable[[], object], save: Save) -> None:
         super().__init__()

@@ -201,7 +201,7 @@ def _apply_theme(application: "QApplication", tokens: "Tokens") -> None:
     from daq_app.qt.tokens import palette, style_sheet, tick_palette
 
     sheet = style_sheet(tokens)
-    if application.styleSheet() == sheet:  # Qt would lay out every widget anew
+    if application.styleSheet() == sheet:  # Qt would lay out every widget again
         return
     application.setApplicationName("daq-app")
     application.setDesktopFileName("daq-app")

@@ -35,7 +35,7 @@ class StrokeColumn(QWidget):
         self._ask = ask
         self._stroke: StrokeFinding | None = None
         self._play_next = False
-        self._moving = False  # an edge was let go elsewhere, and what came of it is not known yet
+        self._moving = False  # an edge was moved, and the result is not known yet
         self._excerpt: m.Excerpt | None = None
         self._request: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
         self.stroke = StrokeView(tokens)

@@ -57,7 +57,7 @@ class SubjectPicture(QWidget):
         self.update()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Draw the page anew in another theme, once its window has it too."""
+        """Redraw the page in another theme, once its window has it too."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.StyleChange and (view := self._view) is not None:
             QTimer.singleShot(0, self, lambda: self._draw(view))

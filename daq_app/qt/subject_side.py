@@ -99,7 +99,7 @@ class TabletScreen(QObject):
                     self.answered.emit(event)
 
     def _session_time(self, sent: float, arrival: float, tablet_time: float) -> float:
-        """Return the session's clock [s] at an instant of the tablet's [ms]: so long before the answer arrived."""
+        """Return the session's clock [s] at an instant of the tablet's [ms], counted back from the answer's arrival."""
         return arrival + self.session_offset - max(sent - tablet_time, 0.0) * 1e-3
 
 

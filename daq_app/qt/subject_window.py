@@ -1,4 +1,4 @@
-"""The subject's place: what to do, then the line. Nothing on it tells which stimulus is mounted."""
+"""The subject's place: what to do, then the line. Nothing on it reveals which stimulus is mounted."""
 
 from collections.abc import Callable
 
@@ -343,7 +343,7 @@ class RulerCheck(QWidget):
 
 
 def _question_of(view: SubjectView) -> tuple[object, ...]:
-    """Return what an answer is to: with another of these it begins anew."""
+    """Return what an answer is to: with another of these it restarts."""
     return view.kind, view.key, view.ends, view.ticks
 
 

@@ -16,7 +16,7 @@ _TICK = 33  # between two pictures while it plays [ms]
 
 
 class TransportBar(QWidget):
-    """Moves through instants; `moved` tells the position of the one that is shown."""
+    """Moves through instants; `moved` carries the position of the one that is shown."""
 
     moved = Signal(int)
     ended = Signal()

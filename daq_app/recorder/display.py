@@ -55,7 +55,7 @@ class Display:
         self.acknowledge()
 
     def stream_began(self) -> None:
-        """Take what comes next as a new stream, whose time and numbers begin anew."""
+        """Take what comes next as a new stream, whose time and numbers restart."""
         self._flush()
         self._stream += 1
         self._newest_time = time.monotonic()

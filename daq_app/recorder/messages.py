@@ -119,7 +119,7 @@ class HealthReport(Struct, frozen=True):
 class Live(Struct, frozen=True, eq=False):
     """What was measured since the last such message, every reading of it; at most 60 a second."""
 
-    stream: int  # grows where time and sequence begin anew
+    stream: int  # grows where time and sequence restart
     sequence: NDArray[np.int64]  # (n,)
     time: Array  # (n,) [s, device clock]
     received_ns: NDArray[np.int64]  # (n,) session clock [ns]

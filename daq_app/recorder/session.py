@@ -322,7 +322,7 @@ def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
 
 
 def _reopen(request: m.ResumeSession, recording: Recording, bench: Bench) -> TransducerInfo | None:
-    """Open the transducer of the session anew, and return who it is; None for a visit that only scores."""
+    """Reopen the transducer of the session, and return who it is; None for a visit that only scores."""
     if recording.info is None:
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")

@@ -119,7 +119,7 @@ class Dialogue:
         self._open_keys: set[str] = set()  # keys of answers that were handed on and are not yet stored
 
     def show(self, view: SubjectView, session: SessionState | None, translate: Translate, *, mirrored: bool) -> None:
-        """Show a page, in the language that `translate` makes of English, and acknowledge the answers that are stored.
+        """Show a page, translated from English by `translate`, and acknowledge the answers that are stored.
 
         `mirrored` says that the language is read from right to left.
         """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # an optional package
 PORT = 8377  # where nothing else listens there; unassigned by IANA
 TRIES = 5  # of wrong codes, before there is a new one
 WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
-ALIVE = 5.0  # a tablet that says nothing for so long is gone [s]
+ALIVE = 5.0  # a tablet that sends nothing for longer is gone [s]
 _PATIENCE = 10.0  # for the first message [s]
 REPLACED = 4000  # closes the conversation with a tab whose place another one of the same browser takes; see page.html
 OFF = logging.CRITICAL + 1
@@ -93,7 +93,7 @@ class TabletServer:
         return f"{self.url}/#{self.code}"
 
     def send(self, message: ToTablet) -> None:
-        """Send something to the tablet; one that comes later gets the last message of each kind that tells a state."""
+        """Send something to the tablet; a tablet that comes later gets the last message of each kind."""
         text = encode(message)
         with self._lock:  # so that a tablet that comes now does not hear of it too early
             self._last[type(message)] = text

@@ -20,7 +20,7 @@ Phase = Literal[
     "idle", "resting", "mounting", "taring", "ready", "stroking", "scoring", "settling", "paused", "closing", "ended",
     "resuming",
 ]  # fmt: skip
-REPORTED: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
+REPORTED: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder reports
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 Outcome = Literal["coming", "done", "skipped"]
 AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]

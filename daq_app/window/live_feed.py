@@ -81,7 +81,7 @@ class LiveFeed:
         self._sequence: int | None = None  # of the newest reading
 
     def device(self, info: TransducerInfo | None) -> None:
-        """Begin anew with another transducer, or none."""
+        """Restart with another transducer, or none."""
         self._info = info
         self._stream = None
         self._take.clear()

@@ -32,7 +32,7 @@ LEAST_MU = 0.05  # before any was measured [-]
 _HISTORY = 60.0  # predictions that are kept for the difference to the full solve [s]
 OBSERVATIONS = 100  # states that a stroke keeps, for a full solve that fails
 OBSERVATION_EVERY = 0.1  # the time between them [s]
-DEFAULT_DEPTH = 2.0  # for which the mesh is made where no plan tells one [mm]
+DEFAULT_DEPTH = 2.0  # for which the mesh is made where no plan states one [mm]
 DEFAULT_AREA = 100.0  # of contact, for the traction bound, likewise [mm2]
 
 
@@ -133,7 +133,7 @@ class Follower:
         )  # fmt: skip
 
     def settled_solver(self, request: Settle) -> Callable[[], SettledSolve]:
-        """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
+        """Return what solves a stroke in full; it may run while more is taken, and uses the predictions until now."""
         first, last = request.steady
         values = np.array([sed for time, sed in self._seds if first <= time <= last])
         values = values[np.isfinite(values)]
@@ -216,5 +216,5 @@ def place_of_greatest_shortening(undeformed: Array, deformed: Array, faces: Indi
 
 
 def _finger(use: Use) -> tuple[Scene, float, Kinematics]:
-    """Return all that tells one finger to be followed from another."""
+    """Return everything that distinguishes one finger from another."""
     return live_scene(use.plan), DEFAULT_AREA if use.plan is None else use.plan.contact_area, use.kinematics

@@ -1,4 +1,4 @@
-"""The live model's words: measured forces in, the SED and a picture out, and what is said of them. No solver."""
+"""The live model's messages: measured forces in, the SED and a picture out, and their texts. No solver."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -16,7 +16,7 @@ from sessions.strokes.forces import in_face_frame
 Array = NDArray[np.float64]
 Kinematics = Literal["small", "finite"]
 
-_STEP = 0.005  # readings within so long are one step of the model [s]: 200 a second
+_STEP = 0.005  # readings within this time are one step of the model [s]: 200 a second
 _GAP = 0.1  # predictions further apart have a gap between them [s]
 MODEL_CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach
 _KINEMATICS = {"small": tr_noop("small strain"), "finite": tr_noop("finite strain")}
@@ -45,7 +45,7 @@ class Forces:
     normal: Array  # (n,) [N], positive when pressing
     pull: Array  # (n,) of the surface on the finger along +x [N]
     received_ns: int  # when the newest reached the computer [ns, session clock]
-    stream: int  # grows where time begins anew
+    stream: int  # grows where time restarts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,7 +150,7 @@ class ModelText:
 def model_text(
     provisional: Provisional | None, settled: SettledSolve | None, problem: str, *, silent: bool = False
 ) -> ModelText:
-    """Return what is said of the picture that is shown; where the transducer is `silent`, nothing is measured now."""
+    """Return the text about the displayed picture; where the transducer is `silent`, nothing is measured now."""
     if problem:
         return ModelText(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:

@@ -23,7 +23,7 @@ from daq_app.wording import tr
 from sessions.plan.plan import Frame, SessionPlan
 
 Connection = Any  # one end of a pipe; its type is another one on each system
-_OLDEST = 2.0  # forces older than so long are dropped, where the model does not keep up [s]
+_OLDEST = 2.0  # forces older than this are dropped, where the model does not keep up [s]
 
 
 def run(connection: Connection) -> None:
@@ -71,7 +71,7 @@ class LiveModel:
     def __init__(self) -> None:
         self.provisional: Provisional | None = None  # the newest
         self.settled: SettledSolve | None = None  # of the last stroke; None again once another begins
-        self.problem = ""  # why nothing is said; empty where all is well
+        self.problem = ""  # why there are no predictions; empty where all is well
         self.predictions = 0  # that came so far
         self._child: Child | None = None
         self._under_way = 0
@@ -82,7 +82,7 @@ class LiveModel:
         self.kinematics: Kinematics = "small"  # that is asked for
 
     def prepare(self) -> None:
-        """Start the process; it follows the published finger until a plan tells of another."""
+        """Start the process; it follows the published finger until a plan states another."""
         if self._child is None:
             self._child = Child(run, name="live model")
             self._under_way, self.problem = 0, ""

@@ -127,7 +127,7 @@ def check_form(
         session_plan = replace(session_plan, frame=face)
     if form.forces and form.normal in SIGNED_AXES:
         session_plan = replace(session_plan, frame=replace(session_plan.frame, normal=form.normal, normal_origin="set"))
-    # In a study the folder's name tells what the visit is for: the protocol is the same in all.
+    # In a study the folder's name states the purpose of the visit: the protocol is the same in all.
     purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)
     folder = parent / f"{form.subject.strip()}_{purpose}_{now.strftime('%Y%m%dT%H%M%S')}"

@@ -77,7 +77,7 @@ class SubjectText(StrEnum):
     FIRST = "The first"
     SECOND = "The second"
     OFFLINE = "No connection. Your answer is kept on this device."
-    # What a screen reader tells:
+    # Texts for a screen reader:
     LINE = "Line from {low} to {high}"
     UNANSWERED = "No answer yet. The arrow keys move the mark."
     ANSWERED = "Answer at {score} of 100. The arrow keys move the mark."
@@ -116,7 +116,7 @@ class SubjectView:
     key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty answer
     hand: Hand = "right"  # that answers: where Next stands
     language: str = ENGLISH
-    force: bool = False  # how hard the finger presses is shown; never how hard it drags, which tells the surface
+    force: bool = False  # how hard the finger presses is shown; never how hard it drags, which would reveal the surface
 
     @property
     def asks(self) -> bool:
@@ -125,7 +125,7 @@ class SubjectView:
 
 
 def subject_view(session: SessionState | None, translate: Translate = str, language: str = ENGLISH) -> SubjectView:
-    """Return what is shown to the subject now, in the language that `translate` makes of English.
+    """Return what is shown to the subject now, translated from English by `translate`.
 
     `language` is the code of the one that is chosen before there is a session, which has its own.
     """

@@ -23,8 +23,8 @@ ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
     "cut short": tr_noop("ended, not sealed"), "sealed": tr_noop("ended and sealed"),
 }  # fmt: skip
-SILENT = 3.0  # a recorder that was not heard for longer is said to be silent [s]
-NO_READINGS = 1.0  # a transducer that sent nothing for longer is said to: its rate is measured over as long [s]
+SILENT = 3.0  # a recorder that reported nothing for longer is called silent [s]
+NO_READINGS = 1.0  # a transducer that sent nothing for longer is called silent: its rate is measured over this time [s]
 UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer [s]
 
 
@@ -100,7 +100,7 @@ def bench_summary(view: BenchView) -> str:
 
 
 def bench_view(bench: BenchState, *, recording: bool, unheard: float = 0.0) -> BenchView:
-    """Return what is shown of the bench; `recording` keeps it connected. It was `unheard` for so long [s]."""
+    """Return what is shown of the bench; `recording` keeps it connected, `unheard` is the last report's age [s]."""
     info = bench.info
     lamp, lamp_text = _bench_lamp(bench, recording=recording)
     counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"
@@ -258,7 +258,7 @@ class Banner:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Everything the experimenter's window shows, save for the pictures."""
+    """Everything the experimenter's window shows, except for the pictures."""
 
     heading: str
     simulated: str | None

@@ -78,14 +78,14 @@ class PlanRow:
     """A line of the plan: a block's heading, or a trial."""
 
     kind: Literal["block", "done", "current", "coming", "skipped"]
-    mark: str  # shape that tells the kind without colour
+    mark: str  # shape that shows the kind without colour
     name: str
-    outcome: str = ""  # what came of it
+    outcome: str = ""  # the result
 
 
 @dataclass(frozen=True, slots=True)
 class StrokeView:
-    """What is said of the last stroke."""
+    """The text about the last stroke."""
 
     grade: Literal["none", "good", "doubtful", "refused"]
     text: str

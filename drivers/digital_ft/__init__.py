@@ -1,4 +1,4 @@
-"""The RS-485 transducer: finding out who answers, and what is said around a stream."""
+"""The RS-485 transducer: finding out who answers, and the exchange around a stream."""
 
 import contextlib
 import math
@@ -197,7 +197,7 @@ def _carry_out(link: Link, request: bytes, action: str) -> None:
 
 
 def _answer(link: Link, request: bytes, action: str) -> bytes:
-    """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault for want of one."""
+    """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault."""
     for times in _PATIENCE:
         answer = wire.answer_in(_response(link, request, b"", times * _ANSWER), request)
         if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's

@@ -1,4 +1,4 @@
-"""The LabJack U6: finding the one an address names, and what is said around a stream of six gauge voltages."""
+"""The LabJack U6: finding the one an address names, and the exchange around a stream of six gauge voltages."""
 
 import contextlib
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 from drivers.usb_link import Endpoints, UsbLink, devices
 
 _ANSWER = 1.0  # for an answer [real s], as in the maker's own driver
-_WRAP = 256 * wire.SCANS  # scans after which the packet counter begins anew
+_WRAP = 256 * wire.SCANS  # scans after which the packet counter restarts
 _VENDOR, _PRODUCT = 0x0CD5, 0x0006
 _ENDPOINTS = Endpoints(0x01, 0x82, 0x83)
 _OPTIONS = frozenset({"serial", "cal", "rate"})
@@ -42,7 +42,7 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
     scans = wire.scan_clock(target.rate)
     conversation = _GaugeConversation(identity.serial, constants, scans)
     info = _info(target, target.calibration, identity, constants, scans)
-    target = replace(target, serial=identity.serial)  # wherever it is plugged in when it is opened anew
+    target = replace(target, serial=identity.serial)  # wherever it is plugged in when it is reopened
     return StreamingTransducer(info, lambda limit: _open_link(target, limit)[0], conversation, clock, opening=deadline)
 
 

@@ -23,7 +23,7 @@ _LIMIT = 10.0  # of a gauge's voltage [V]: beyond, and at the ends of the conver
 
 STREAM_IS_OFF = 52  # answer to a stop when nothing streams
 _DRAINING = 59  # error code of packets while an overflow is being recovered from: their scans are sound
-_RECOVERED = 60  # error code of the packet that tells how many scans an overflow cost
+_RECOVERED = 60  # error code of the packet that states how many scans an overflow cost
 _DUMMY = 0xFFFF  # all six gauges of the scan that stands for those lost
 
 START = bytes([0xA8, 0xA8])

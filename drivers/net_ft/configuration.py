@@ -1,4 +1,4 @@
-"""The page on which the networked box tells who it is: netftapi2.xml (manual 9620-05-NET FT, chapter 9)."""
+"""The page with the networked box's identity: netftapi2.xml (manual 9620-05-NET FT, chapter 9)."""
 
 import math
 import re

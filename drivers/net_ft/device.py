@@ -275,7 +275,7 @@ class NetFtTransducer(ThreadedTransducer):
     def _compare_clocks(self, counter: Indices, received_ns: Indices) -> None:
         """Hold the box's counter against the session's clock."""
         breaks = self._account.restarted + self._account.frozen
-        if breaks != self._breaks:  # it stood still, or began anew
+        if breaks != self._breaks:  # it stood still, or restarted
             self._breaks = breaks
             self._watch.begin_anew()
             return

@@ -1,7 +1,7 @@
 """Six gauges on a data-acquisition device of National Instruments, through its maker's library.
 
 The library (`nidaqmx`, an optional extra) brings its own codec: volts come as numbers. It times the readings by the
-device's clock and numbers nothing; when its buffer overflows it ends the acquisition, which begins anew behind a gap.
+device's clock and numbers nothing; when its buffer overflows it ends the acquisition, which restarts behind a gap.
 """
 
 import importlib

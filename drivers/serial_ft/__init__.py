@@ -1,4 +1,4 @@
-"""The stand-alone controller: finding out who answers, how fast it streams, and what is said around a stream."""
+"""The stand-alone controller: finding out who answers, how fast it streams, and the exchange around a stream."""
 
 import contextlib
 import math

@@ -121,7 +121,7 @@ def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> N
 
 
 def _frame(options: argparse.Namespace, frame: Frame) -> Frame:
-    """Return the frame as stated by bench or protocol, save for what the command line states."""
+    """Return the frame as stated by bench or protocol, except for what the command line states."""
     if options.normal is not None:
         frame = replace(frame, normal=options.normal, normal_origin="set")
     if options.height is not None:

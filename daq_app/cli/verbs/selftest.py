@@ -133,7 +133,7 @@ class _WatchedRecorder:
         raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
 
     def hear(self, seconds: float) -> None:
-        """Note what comes within so many seconds."""
+        """Note what comes within `seconds`."""
         for _ in self._reports(seconds):
             pass
 
@@ -144,7 +144,7 @@ class _WatchedRecorder:
             raise SelfTestFailed("a recorder that was killed did not end")
 
     def _reports(self, seconds: float) -> Iterator[m.Report]:
-        """Yield what comes within so many seconds, each noted; what nobody takes any more waits for the next call."""
+        """Yield what comes within `seconds`, each noted; what nobody takes any more waits for the next call."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self._queue += self.recorder.poll(0.01)

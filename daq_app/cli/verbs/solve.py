@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
 _UNITS = [("" if unit == "1" else unit, factor) for unit, factor in (quantity.shown_unit for quantity in QUANTITIES)]
-# What a course tells beside the quantities, and the units of both.
+# What a course gives beside the quantities, and the units of both.
 _COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
 COURSE_UNITS = [SED.shown_unit, SED.shown_unit, ("N/mm", 1.0), ("N/mm", 1.0), ("mm", 1.0), *_UNITS]
 AUDITS = {

@@ -190,7 +190,7 @@ def _pool(options: argparse.Namespace, folder: Path, output: Path, console: Cons
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     along = options.quantity if options.paths != "none" else SED.name
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, options.calibration_error, along)
-    # What is wrong with these is said before hours of work.
+    # Errors in these are reported before hours of work.
     exclusions, truth = exclusions_in(folder), _load_ground_truth(folder)
     shelf = Shelf(output / "results", visit_options)
     results, failures = visits(
