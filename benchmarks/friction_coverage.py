@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from drivers.arrays import Array
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
@@ -29,7 +29,6 @@ from simulators.bench import RATED, Bench, BenchSettings, StrokeGroundTruth
 from simulators.stroke import CONTACT_AREA, paper_surfaces
 from simulators.subject import SimulatedSubject
 
-Array = NDArray[np.float64]
 Truth = dict[str, float]
 
 RATE = 200.0  # [Hz]

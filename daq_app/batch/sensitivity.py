@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from sessions.toml_file import SettingsError, toml_value
 from solver import Scene, SolveFailure, solve
 from solver.scene.tables import TISSUES, SceneError
@@ -112,7 +112,7 @@ def sensitivity(
     seed: int,
     progress: Callable[[float], None],
     sed: Callable[[Scene], float] | None = None,
-) -> tuple[tuple[Index, ...], NDArray[np.float64]]:
+) -> tuple[tuple[Index, ...], Array]:
     """Return the index of each number, greatest total first, and the SEDs (samples * (numbers + 2),) [MPa].
 
     `samples` is a power of two. `sed` answers one scene; the solver does by default. Raises TooFewAnswers where a
@@ -137,15 +137,13 @@ def sensitivity(
     return sobol_indices(design, responses, seed, lambda name: _one_sided(scene, name, design[name])), responses
 
 
-def saltelli_points(design: Design, samples: int, seed: int) -> NDArray[np.float64]:
+def saltelli_points(design: Design, samples: int, seed: int) -> Array:
     """Return the points (samples * (numbers + 2), numbers) of a design; `samples` is a power of two."""
     draw: Any = importlib.import_module("SALib.sample.sobol")  # slow to load
     return draw.sample(_problem(design), samples, calc_second_order=False, seed=seed)
 
 
-def sobol_indices(
-    design: Design, answers: NDArray[np.float64], seed: int, one_sided: Callable[[str], bool]
-) -> tuple[Index, ...]:
+def sobol_indices(design: Design, answers: Array, seed: int, one_sided: Callable[[str], bool]) -> tuple[Index, ...]:
     """Return the index of each number of a design, greatest total first, from `answers` at its `saltelli_points`."""
     analyse: Any = importlib.import_module("SALib.analyze.sobol")
     result: Any = analyse.analyze(

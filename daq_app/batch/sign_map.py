@@ -16,18 +16,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.batch.pool import Lost, by_cluster, by_processes
 from daq_app.batch.sensitivity import Index, TooFewAnswers, sobol_indices
+from drivers.arrays import Array
 from sessions.file_access import json_object
 from sessions.prediction.surface_series import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions
 from solver import Friction, Loading, Receptor, Scene, Solve
 
 Kinematics = Literal["small", "finite"]
-Array = NDArray[np.float64]
-
 # What is drawn at random, and over which range. Nobody measured these: fingers of a lab's subjects would be better.
 # Thicknesses, bone and press go with the tip radius or the series, so that every draw is a finger that can be.
 DESIGN: Mapping[str, tuple[float, float]] = {

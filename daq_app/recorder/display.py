@@ -6,15 +6,13 @@ from collections.abc import Callable
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.recorder.device_history import remember_overload
 from daq_app.recorder.messages import HealthReport, Live, Report, Six
+from drivers.arrays import Array
 from drivers.calibration import LIMITS, loads
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, TransducerInfo
-
-Array = NDArray[np.float64]
 
 LIVE_EVERY = 1 / 60  # least time between two messages of readings [real s]
 HEALTH_EVERY = 0.1  # between two of health [real s]

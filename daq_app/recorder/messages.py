@@ -16,13 +16,13 @@ import numpy as np
 from msgspec import Struct, field
 from numpy.typing import NDArray
 
+from drivers.arrays import Array, Indices
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.recording import LoggedEvent, Setting
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
 
-Array = NDArray[np.float64]
 Six = tuple[float, float, float, float, float, float]
 Kind = Literal["people", "simulated hand", "simulated people"]
 
@@ -120,11 +120,11 @@ class Live(Struct, frozen=True, eq=False):
     """What was measured since the last such message, every reading of it; at most 60 a second."""
 
     stream: int  # grows where time and sequence restart
-    sequence: NDArray[np.int64]  # (n,)
+    sequence: Indices  # (n,)
     time: Array  # (n,) [s, device clock]
-    received_ns: NDArray[np.int64]  # (n,) session clock [ns]
+    received_ns: Indices  # (n,) session clock [ns]
     wrench: Array  # (n, 6) [N, N mm] of the finger on the stimulus, transducer axes, zero subtracted
-    status: NDArray[np.int64]  # (n,) 0: nothing speaks against the reading
+    status: Indices  # (n,) 0: nothing speaks against the reading
     zero: Six  # raw units, that was subtracted: of the last tare or take; zeros where nothing was measured
     left_out: int = 0  # readings before these that were not sent, because the client did not fetch them
 

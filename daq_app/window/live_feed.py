@@ -8,11 +8,11 @@ from math import nan
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live, Report
 from daq_app.window.live_trace import CHANNELS, LiveTrace, with_gaps
 from daq_app.wording import tr_noop
+from drivers.arrays import Array, Indices, Mask
 from drivers.calibration import LIMITS, WARNING
 from drivers.calibration_file import AXES
 from drivers.readings import ReadingBlock
@@ -20,8 +20,6 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
 from sessions.strokes.forces import centre_of_pressure, in_face_frame
 from sessions.strokes.settings import RatioSettings
-
-Array = NDArray[np.float64]
 
 LOADS = (*AXES, tr_noop("combined"))
 _FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
@@ -163,9 +161,7 @@ class _Tail:
         return _Tail(times[keep], positions[keep]), np.where(known_now & known_then, speed, np.nan)
 
 
-def _mean(
-    total: Array, bad: NDArray[np.int64], starts: NDArray[np.int64], stops: NDArray[np.int64]
-) -> tuple[Array, NDArray[np.bool_]]:
+def _mean(total: Array, bad: Indices, starts: Indices, stops: Indices) -> tuple[Array, Mask]:
     """Return means (n, 3) of position and time from `starts` to `stops`, and which have no unknown reading in them."""
     count = stops - starts
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -4,16 +4,15 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live
 from daq_app.window.live_trace import LiveTrace
 from daq_app.wording import errors_text, tr, tr_noop
+from drivers.arrays import Array, Indices, Mask
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.strokes import FrictionParameters
 from sessions.strokes.forces import in_face_frame
 
-Array = NDArray[np.float64]
 Kinematics = Literal["small", "finite"]
 
 _STEP = 0.005  # readings within this time are one step of the model [s]: 200 a second
@@ -53,7 +52,7 @@ class Picture:
     """A finger as it is drawn: the surface is y = 0."""
 
     nodes: Array  # (n, 2) [mm]
-    faces: NDArray[np.int64]  # (f, 3 or 4); none where only the outline is known
+    faces: Indices  # (f, 3 or 4); none where only the outline is known
     sed: Array  # (f,) [MPa]
     outline: Array  # (w, 2) deformed skin [mm]
     lost: tuple[float, float] | None = None  # where tissue is squeezed most [mm], of a state that led nowhere
@@ -70,7 +69,7 @@ class Provisional:
     depth: float  # of the bone, below first touch [mm]
     mu: float  # taken so far [-]
     kinematics: Kinematics  # that is asked for
-    instead: NDArray[np.bool_]  # (n,) where small strain tells, the forces being beyond the reach of finite strain
+    instead: Mask  # (n,) where small strain tells, the forces being beyond the reach of finite strain
     received_ns: int
     stream: int
 

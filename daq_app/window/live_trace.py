@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from drivers.arrays import Array, Indices
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
 _LONGEST = 60.0  # kept for drawing [s]
@@ -113,7 +113,7 @@ class _Columns:
 
     width: float  # of a column [s]
     first: float  # stretch they were begun for [s]
-    numbers: NDArray[np.int64]  # (k,) time / width
+    numbers: Indices  # (k,) time / width
     pairs: NDArray[np.float32]  # (c, 2 k)
 
     @property
@@ -137,7 +137,7 @@ class _Columns:
         return Columns(*with_gaps(times, self.pairs.astype(np.float64), 2 * (behind + 1)))
 
 
-def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
+def _pairs(values: NDArray[np.float32], starts: Indices) -> NDArray[np.float32]:
     """Return least and greatest of each group that begins at `starts`, in the order in which the curve passes them."""
     pairs = np.empty((len(values), 2 * len(starts)), np.float32)
     if not len(starts):
@@ -151,7 +151,7 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
     return pairs
 
 
-def with_gaps(time: Array, values: Array, gaps: NDArray[np.int64]) -> tuple[Array, Array]:
+def with_gaps(time: Array, values: Array, gaps: Indices) -> tuple[Array, Array]:
     """Return times (n,) and values (channels, n) with a nan before the places `gaps`: a line there is no reading."""
     if not len(gaps):
         return time, values
