@@ -14,12 +14,13 @@ from daq_app.qt.tokens import GRID, SMALL, font, px, theme_of
 from daq_app.window.state import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
-from daq_app.wording import tr
+from daq_app.wording import tr, tr_noop
 
 _ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
 TWO_LINES = 4 * GRID  # of small type, before the font's scale [px]
 _LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
 LEGIBLE = 4.0  # s: some twenty words, read at five a second
+_STROKES = tr_noop({1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"})
 _MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 
@@ -179,14 +180,13 @@ class Arrow(QWidget):
         super().__init__()
         self._direction = 0
         self.setFixedSize(5 * GRID, 7 * GRID)
-        self.setAccessibleName(tr("no stroke asked for"))
+        self.setAccessibleName(tr(_STROKES[0]))
 
     def show_direction(self, direction: int) -> None:
         """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
         if direction != self._direction:
             self._direction = direction
-            name = tr("stroke away from the subject") if direction > 0 else tr("stroke towards the subject")
-            self.setAccessibleName(name if direction else tr("no stroke asked for"))
+            self.setAccessibleName(tr(_STROKES[direction]))
             self.setToolTip(self.accessibleName())
             self.update()
 

@@ -90,19 +90,14 @@ class TransportBar(QWidget):
         self._show(self._times[index])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        match event.key():
-            case Qt.Key.Key_Space:
-                self.toggle()
-            case Qt.Key.Key_Left:
-                self.step(-1)
-            case Qt.Key.Key_Right:
-                self.step(+1)
-            case Qt.Key.Key_Home:
-                self.step(-len(self._times))
-            case Qt.Key.Key_End:
-                self.step(+len(self._times))
-            case _:
-                super().keyPressEvent(event)
+        steps: dict[int, int] = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+        steps |= {Qt.Key.Key_Home: -len(self._times), Qt.Key.Key_End: len(self._times)}
+        if event.key() == Qt.Key.Key_Space:
+            self.toggle()
+        elif event.key() in steps:
+            self.step(steps[event.key()])
+        else:
+            super().keyPressEvent(event)
 
     def _move_to(self, index: int) -> None:
         if index != self._index and len(self._times):

@@ -122,11 +122,12 @@ def check_form(
         return Refusal({"subject": _sentence(error)})
     except (SettingsError, OSError) as error:
         return Refusal({"protocol": _sentence(error)})
+    face = session_plan.frame
     if form.forces and form.height.strip():
-        face = replace(session_plan.frame, height=_number(form.height) or 0.0, height_origin="measured")
-        session_plan = replace(session_plan, frame=face)
+        face = replace(face, height=_number(form.height) or 0.0, height_origin="measured")
     if form.forces and form.normal in SIGNED_AXES:
-        session_plan = replace(session_plan, frame=replace(session_plan.frame, normal=form.normal, normal_origin="set"))
+        face = replace(face, normal=form.normal, normal_origin="set")
+    session_plan = replace(session_plan, frame=face)
     # In a study the folder's name states the purpose of the visit: the protocol is the same in all.
     purpose = session_plan.protocol if study_place is None else "forces" if session_plan.forces else "scores"
     parent = folder_of(form) / PILOTS if form.pilot else place_of(form)

@@ -17,7 +17,6 @@ from sessions.plan.plan import Frame
 from sessions.plan.protocols.languages import ENGLISH
 from sessions.recording import LoggedEvent
 
-Six = tuple[float, float, float, float, float, float]
 Link = Literal["none", "connecting", "open", "lost"]
 _FROM_RECORDER = frozenset(m.REPORTS)
 
@@ -75,8 +74,8 @@ Message = m.Request | m.Report | Own  # what `fold` takes
 class Zero:
     """A measured zero of the bench."""
 
-    mean: Six  # in force, nothing subtracted [N, N mm]
-    noise: Six  # standard deviation [N, N mm]
+    mean: m.Six  # in force, nothing subtracted [N, N mm]
+    noise: m.Six  # standard deviation [N, N mm]
     readings: int
     duration: float  # [s]
 

@@ -69,18 +69,15 @@ def _find_controller(target: _Target, deadline: Deadline) -> tuple[SerialLink, i
         if deadline.remaining <= 0.0:
             break
         bauds.append(baud)
-        link = SerialLink(target.port, baud)
-        try:
-            if has_prompt(deadline.bound(link), tries=2):
-                return link, baud
-        except LinkLost:
-            if deadline.remaining > 0.0:
-                link.close()
-                raise
-        except BaseException:
-            link.close()
-            raise
-        link.close()
+        with contextlib.ExitStack() as stack:
+            link = stack.enter_context(contextlib.closing(SerialLink(target.port, baud)))
+            try:
+                if has_prompt(deadline.bound(link), tries=2):
+                    stack.pop_all()  # which leaves it open
+                    return link, baud
+            except LinkLost:
+                if deadline.remaining > 0.0:
+                    raise
     rates = ", ".join(map(str, bauds))
     raise LinkLost(f"no controller answers (tried {rates} baud); check its power, the cable and the baud rate")
 
