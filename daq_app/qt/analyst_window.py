@@ -49,7 +49,6 @@ class LineageLabel(QLabel):
     def __init__(self) -> None:
         super().__init__()
         self._links: tuple[Link, ...] = ()
-        self._details: dict[str, str] = {}  # by the target of each link
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -57,13 +56,13 @@ class LineageLabel(QLabel):
         self.setTextInteractionFlags(flags.LinksAccessibleByMouse | flags.LinksAccessibleByKeyboard)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.linkActivated.connect(self.followed.emit)
-        self.linkHovered.connect(lambda target: self.setToolTip(self._details.get(target, "")))
+        self.linkHovered.connect(self._show_tool_tip)
         self.setAccessibleName(tr("from the number back to its readings"))
 
     def show_links(self, links: tuple[Link, ...]) -> None:
         if links == self._links:
             return
-        self._links, self._details = links, {link.target: link.detail for link in links}
+        self._links = links
         self._show()
         text = " → ".join(link.text for link in links)
         self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=text))
@@ -78,6 +77,9 @@ class LineageLabel(QLabel):
         style = f"color: {theme_of(self).act}"
         elements = (f'<a href="{link.target}" style="{style}">{escape(link.text)}</a>' for link in self._links)
         self.setText(" &nbsp;→&nbsp; ".join(elements))
+
+    def _show_tool_tip(self, target: str) -> None:
+        self.setToolTip(next((link.detail for link in self._links if link.target == target), ""))
 
 
 class AnalystWindow(QMainWindow):

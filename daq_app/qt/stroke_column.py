@@ -60,7 +60,7 @@ class StrokeColumn(QWidget):
         self.tabs.addTab(self._scroll, tr("Numbers"))
         self.tabs.addTab(self.readings, tr("Readings"))
         self.friction = TextTable(tr("friction of every stroke"), [tr(text) for text in FRICTION_HEAD])
-        self.friction.row_chosen.connect(lambda row: ask(m.Choose(row)))
+        self.friction.row_chosen.connect(self._choose)
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
         row = hbox((self.player, 1), self.save)
@@ -97,6 +97,9 @@ class StrokeColumn(QWidget):
         if self._excerpt is not None and self._stroke is not None and self._stroke.steady is not None:
             readings = self._excerpt.readings
             self.readings.go_to(int(readings.block.time.searchsorted(self._stroke.steady[0])))
+
+    def _choose(self, row: int) -> None:
+        self._ask(m.Choose(row))
 
     def go_to_numbers(self) -> None:
         self.tabs.setCurrentIndex(_NUMBERS)
