@@ -206,8 +206,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 
 def _sed_of(scene: Scene) -> float:
-    settings = replace(scene.solve, course="steady", evidence="quick")
-    return solve(replace(scene, solve=settings)).sed_ending
+    return solve(replace(scene, solve=replace(scene.solve, course="steady", evidence="quick"))).sed_ending
 
 
 def _value(scene: Scene, name: str) -> float | None:

@@ -95,8 +95,7 @@ class StrokeColumn(QWidget):
         self.tabs.setCurrentIndex(_READINGS)
         self.readings.table.setFocus()
         if self._excerpt is not None and self._stroke is not None and self._stroke.steady is not None:
-            readings = self._excerpt.readings
-            self.readings.go_to(int(readings.block.time.searchsorted(self._stroke.steady[0])))
+            self.readings.go_to(int(self._excerpt.readings.block.time.searchsorted(self._stroke.steady[0])))
 
     def _choose(self, row: int) -> None:
         self._ask(m.Choose(row))

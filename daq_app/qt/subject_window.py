@@ -233,8 +233,7 @@ class SubjectWindow(QWidget):
         self.next.setVisible(self._answer_field.answered)
         hint, meanings = "" if self._view is None else self._view.text, self.number.two_meanings
         if self.asks == "number" and meanings is not None:
-            template = translator(self._language)(Text.TWO_MEANINGS)
-            hint = template.format(whole=meanings[0], fraction=meanings[1])
+            hint = translator(self._language)(Text.TWO_MEANINGS).format(whole=meanings[0], fraction=meanings[1])
         if self._hint.text() != hint:
             set_text(self._hint, hint)
             self._fit_type()

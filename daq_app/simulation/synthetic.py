@@ -220,8 +220,7 @@ def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[
     """Record one subject's visit and return its ground truth, a row a stroke."""
     subject, subject_seed = f"S{number:02d}", _seed(seed, number)
     faults = FAULTS.get(subject, VisitFaults(expected=""))
-    gains = np.random.default_rng([subject_seed, 7]).normal(1.0, CALIBRATION, 6)
-    a, b, c, d, e, f = gains.tolist()
+    a, b, c, d, e, f = np.random.default_rng([subject_seed, 7]).normal(1.0, CALIBRATION, 6).tolist()
     bench = Bench(subject_seed, BenchSettings(gains=(a, b, c, d, e, f)))
     clock = SimulatedClock()
     transducer = DirectTransducer(bench, clock, lost=faults.lost, frozen=faults.frozen)
@@ -371,5 +370,4 @@ def _relation(
         products += rows.T @ rows
     noise = people.judgement_noise**2 * SAMPLE_SIZE * (len(surfaces) - 1)
     r = products[0, 3] / math.sqrt(products[0, 0] * (products[3, 3] + noise))
-    slope = np.linalg.solve(products[:3, :3], products[:3, 3])[0]
-    return PopulationRelation(float(r), float(slope))
+    return PopulationRelation(float(r), float(np.linalg.solve(products[:3, :3], products[:3, 3])[0]))

@@ -210,8 +210,7 @@ class SimulatedPeople(SimulatedHand):
                 number = self.subject.number(self.surface(trial), self.take(trial))
                 return steps.MagnitudeEstimate(number, time, 0, None, INPUT)
             case steps.AskChoice(first, second):
-                more = self._more(first, second)
-                return steps.PairedChoice("first" if more else "second", time, 0, None, INPUT)
+                return steps.PairedChoice("first" if self._more(first, second) else "second", time, 0, None, INPUT)
 
     def _more(self, first: Trial, second: Trial) -> bool:
         """Say whether the first of two has more: of friction where one is a standard, else of its descriptor."""

@@ -105,8 +105,7 @@ def _study_note(form: SessionForm) -> str:
         return tr("A study of protocol {protocol}.", protocol=record.protocol)
     names = ", ".join(studies_in(place_of(form).parent))
     elsewhere = tr(" Studies there: {there}.", there=names) if names else ""
-    text = tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name)
-    return text + elsewhere
+    return tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name) + elsewhere
 
 
 def _subject_note(form: SessionForm) -> str:

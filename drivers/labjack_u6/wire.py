@@ -124,8 +124,7 @@ def scan_clock(rate: float) -> ScanClock:
 def parse_identity(answer: bytes) -> Identity:
     """Return who answers. Raises DeviceFault when the answer is none."""
     data = _data(answer, 0x08, 38)
-    serial = int.from_bytes(data[9:13], "little")
-    return Identity(serial, f"{data[4]}.{data[3]:02d}", bool(data[31] & 0x08))
+    return Identity(int.from_bytes(data[9:13], "little"), f"{data[4]}.{data[3]:02d}", bool(data[31] & 0x08))
 
 
 def parse_constants(positive: bytes, negative: bytes) -> Constants:
@@ -203,8 +202,7 @@ class StreamDecoder:
         prefix = bytes([0xF9, 4 + _GAUGES * SCANS, 0xC0])
         while True:
             position = self._bytes.find(prefix, 1)
-            start = position - 1 if position > 0 else max(len(self._bytes) - len(prefix), 0)
-            self._skip(start)
+            self._skip(position - 1 if position > 0 else max(len(self._bytes) - len(prefix), 0))
             if position < 0 or len(self._bytes) < STREAM_PACKET:
                 return packets
             packet = bytes(self._bytes[:STREAM_PACKET])

@@ -120,8 +120,7 @@ def _probe(uri: str, console: Console) -> int:
         columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
         rows = [[axis, number(mean_value), number(sd, 2), unit] for axis, mean_value, sd, unit in columns]
         console.say(table(rows, header=["axis", "mean", "noise (sd)", "unit"]))
-    flawed = any(getattr(health, name) for name in _FLAWS) or not len(readings)
-    return FLAWED if flawed else DONE
+    return FLAWED if any(getattr(health, name) for name in _FLAWS) or not len(readings) else DONE
 
 
 def _listen(transducer: Transducer, clock: Clock, console: Console) -> ReadingBlock:

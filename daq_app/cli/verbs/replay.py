@@ -27,8 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser)
     pace = parser.add_mutually_exclusive_group()
     parse = number_in_range("--speed", float, 0.01, 10_000, "0.01 to 10000, or --fast for as fast as it goes")
-    meaning = "times as fast as it was recorded (1)"
-    pace.add_argument("--speed", type=parse, default=1.0, metavar="X", help=meaning)
+    pace.add_argument("--speed", type=parse, default=1.0, metavar="X", help="times as fast as it was recorded (1)")
     pace.add_argument("--fast", action="store_true", help="as fast as the machine goes")
     parser.add_argument("--no-prediction", action="store_true", help="leave the solver's numbers out")
 

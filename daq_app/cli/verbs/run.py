@@ -53,8 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    simulated_bench = options.device is not None and options.device.startswith("sim:")
-    _refuse_mixtures(options, simulated_bench=simulated_bench)
+    _refuse_mixtures(options, simulated_bench=options.device is not None and options.device.startswith("sim:"))
     session_protocol, seed, body, study_place = _choices(options)
     session_plan = plan(
         session_protocol,
@@ -105,8 +104,7 @@ def _choices(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPla
         return protocol(options.protocol), seed, body_of(options), None
     study = open_study(options.study)
     member = study.member(options.subject)
-    study_place = study.place(member, study_key(options.study))
-    return study.protocol, study.session_seed(member.slot), member.body, study_place
+    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(options.study))
 
 
 def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> None:

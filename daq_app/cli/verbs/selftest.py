@@ -189,8 +189,7 @@ def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[d
         shutil.copytree(folder, copies[-1])
         if recording.end is not None:
             folder = room / f"killed-{number + 1}"  # this session had come to its end before it was killed
-    kills = {"number": KILLS, "readings": readings, "events": events, "most_lost": max(most_lost, 0.0)}
-    return kills, copies
+    return {"number": KILLS, "readings": readings, "events": events, "most_lost": max(most_lost, 0.0)}, copies
 
 
 def _begin_or_resume(witness: _WatchedRecorder, folder: Path) -> int | None:
@@ -239,8 +238,7 @@ def _try_stops(room: Path) -> float:
 def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
     """Cut the ends off copies of a log, as a power cut may; return how often. Raises SelfTestFailed."""
     for number in range(CUTS):
-        origin = copies[number % len(copies)]
-        shutil.copytree(origin, folder)
+        shutil.copytree(copies[number % len(copies)], folder)
         log = folder / f"{LIVE_FILE}-wal"
         if log.exists():
             content = log.read_bytes()

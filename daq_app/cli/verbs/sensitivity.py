@@ -110,8 +110,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     changes = sign_map.single_changes(options.kinematics)
     map_trials = sign_map.map_trials(options.kinematics)
     points = saltelli_points(sign_map.DESIGN, samples, options.seed)
-    fingers = sign_map.sample_fingers(points, options.kinematics)
-    trials = [*changes.values(), *map_trials.values(), *fingers]
+    trials = [*changes.values(), *map_trials.values(), *sign_map.sample_fingers(points, options.kinematics)]
     try:
         progress = console.counter("fingers", len(trials))
         answers = sign_map.answers_of(trials, progress, options.keep, options.workers, options.scheduler)

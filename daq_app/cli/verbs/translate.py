@@ -99,8 +99,7 @@ def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[st
     earlier = translations(context, language)
     root = ElementTree.Element("xliff", version="1.2", xmlns="urn:oasis:names:tc:xliff:document:1.2")
     about = {"original": context, "datatype": "plaintext", "source-language": ENGLISH, "target-language": language}
-    file = ElementTree.SubElement(root, "file", about)
-    units = ElementTree.SubElement(file, "body")
+    units = ElementTree.SubElement(ElementTree.SubElement(root, "file", about), "body")
     gaps = 0
     for number, text in enumerate(texts, 1):
         unit = ElementTree.SubElement(units, "trans-unit", id=str(number))
