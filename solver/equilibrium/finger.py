@@ -314,10 +314,8 @@ class MeshTransfer:
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
         station = _piece(old.arcs[::2], new.inner_arcs)
         layer = _piece(old.heights[::2], new.inner_heights)
-        interpolation = np.stack(
-            [np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1
-        )
-        forces = new.lengths[:, None] * interpolation / old.lengths
+        hats = [np.interp(new.skin, old.skin, unit, 0.0, 0.0) for unit in np.eye(len(old.skin))]
+        forces = new.lengths[:, None] * np.stack(hats, axis=1) / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
         return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 

@@ -100,9 +100,8 @@ class SmallMeshing(Meshing):
             if watch is not None:
                 for number in batch:
                     if answers[number] is not BEYOND_THE_SKIN:
-                        watch(
-                            number, answers[number], finger, states[number].elastic_path if number in states else None
-                        )
+                        path = states[number].elastic_path if number in states else None
+                        watch(number, answers[number], finger, path)
         return [answers[number] for number in every]
 
     def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
@@ -202,7 +201,6 @@ def nested_numbers_of_all(
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
             solution = solutions[number]
             on_nested = nested_state(mesh, state, value, change, solution.steps)
-            out[number] = (
-                None if on_nested is None else with_shares(solution.scene, numbers[number], on_nested, solution.steps)
-            )
+            if on_nested is not None:
+                out[number] = with_shares(solution.scene, numbers[number], on_nested, solution.steps)
     return out

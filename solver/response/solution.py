@@ -149,10 +149,7 @@ def _solve_group(
     if kind == "small" and any(scene.solve.course == "history" for scene in scenes):
         return _march(scenes, meshing, watch)
     refinement = _refine(scenes, meshing, watch, rough)
-    return [
-        _add_warnings(answer, warnings)
-        for answer, warnings in zip(refinement.answers, refinement.warnings, strict=True)
-    ]
+    return list(map(_add_warnings, refinement.answers, refinement.warnings))
 
 
 def _march(scenes: list[Scene], meshing: Meshing, watch: Watch | None) -> list[Answer]:
@@ -264,14 +261,10 @@ def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> di
     for mesh, together in members.items():
         finer: float | Lines | None = LIMIT_FINENESS
         if mesh is not None:
-            nested = [(reductions[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
-            parts = [
-                miss * nested_numbers.shares
-                for miss, nested_numbers in nested
-                if nested_numbers is not None and nested_numbers.shares is not None
-            ]
-            unknown = any(nested_numbers is None for _, nested_numbers in nested)
-            finer = refine_lines(mesh, None if unknown or not parts else np.max(parts, axis=0))
+            nested = [(reductions[i], answer.nested) for i in together if isinstance(answer := answers[i], Prediction)]
+            known = [(miss, numbers.shares) for miss, numbers in nested if numbers is not None]
+            parts = [miss * shares for miss, shares in known if shares is not None]
+            finer = refine_lines(mesh, None if len(known) < len(nested) or not parts else np.max(parts, axis=0))
         if finer is not None:
             out.setdefault(finer, []).extend(together)
     return out
