@@ -262,9 +262,9 @@ def _finer(answers: Mapping[int, Answer], reductions: Mapping[int, float]) -> di
         finer: float | Lines | None = LIMIT_FINENESS
         if mesh is not None:
             nested = [(reductions[i], answer.nested) for i in together if isinstance(answer := answers[i], Prediction)]
-            known = [(miss, numbers.shares) for miss, numbers in nested if numbers is not None]
-            parts = [miss * shares for miss, shares in known if shares is not None]
-            finer = refine_lines(mesh, None if len(known) < len(nested) or not parts else np.max(parts, axis=0))
+            with_nested = [(miss, numbers.shares) for miss, numbers in nested if numbers is not None]
+            parts = [miss * shares for miss, shares in with_nested if shares is not None]
+            finer = refine_lines(mesh, None if len(with_nested) < len(nested) or not parts else np.max(parts, axis=0))
         if finer is not None:
             out.setdefault(finer, []).extend(together)
     return out
