@@ -1,6 +1,6 @@
-"""Every number the analysis and its intervals were set by; stored and shown with what came out.
+"""Every setting of the analysis and its intervals, stored and shown with their results.
 
-Where no source stands beside a threshold, its reason does. Names of fields are unique among all groups.
+Each threshold has its source or its reason beside it. Names of fields are unique among all groups.
 """
 
 from collections.abc import Mapping
@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 from sessions.strokes.stroke import FIXED, AreaLaw
 
-ASSUMED_GAIN_ERROR = 0.01  # standard uncertainty of each axis' gain where nobody stated the transducer's own [-]
-TILT_PRIOR = 1.0  # standard uncertainty of the lean about an axis: 1 mm under one end of a sample 60 mm long [degrees]
+ASSUMED_GAIN_ERROR = 0.01  # standard uncertainty of each axis' gain where the transducer's own is not known [-]
+TILT_PRIOR = 1.0  # standard uncertainty of the tilt about an axis: 1 mm under one end of a sample 60 mm long [degrees]
 
 Pair = tuple[float, float]
 WindowRule = Literal["widened", "least variance", "middle half", "whole slide"]
@@ -20,44 +20,44 @@ WindowRule = Literal["widened", "least variance", "middle half", "whole slide"]
 class DetectorSettings:
     """What counts as touching; forces are above the measured zero."""
 
-    onset_floor: float = 0.05  # a contact exceeds this [N] ...
-    onset_noise: float = 5.0  # ... and so many standard deviations of the noise [-] ...
-    onset_hold: float = 0.010  # ... for so long [s]
-    leave_noise: float = 3.0  # its onset is walked back to where the force left so many standard deviations [-]
-    lift_fraction: float = 0.6  # lifted below this fraction of the onset threshold [-] ...
-    lift_hold: float = 0.020  # ... for so long [s]
-    baseline: float = 0.3  # unloaded stretch that gives zero and noise [s]
-    baseline_readings: int = 12  # and the fewest readings it may have
-    baseline_parts: int = 6  # in which it is renewed
-    quiet_noise: float = 2.0  # it is unloaded when its spread stays within so many times the noise [-] ...
-    quiet_floor: float = 0.02  # ... or within this, for readings that were smoothed before they came [N]
+    onset_floor: float = 0.05  # least force of a contact above zero [N]
+    onset_noise: float = 5.0  # least force of a contact by the noise's standard deviation [-]
+    onset_hold: float = 0.010  # least time for which a contact exceeds both [s]
+    leave_noise: float = 3.0  # force by the noise's standard deviation to which the onset is traced back [-]
+    lift_fraction: float = 0.6  # force by the onset threshold below which the finger is lifted [-]
+    lift_hold: float = 0.020  # least time for which it stays below [s]
+    baseline: float = 0.3  # length of the unloaded stretch that gives zero and noise [s]
+    baseline_readings: int = 12  # fewest readings of that stretch
+    baseline_parts: int = 6  # number of parts in which it is renewed
+    quiet_noise: float = 2.0  # largest spread of an unloaded stretch by the noise [-]
+    quiet_floor: float = 0.02  # spread that always counts as unloaded, for readings smoothed by the device [N]
 
 
 @dataclass(frozen=True, slots=True)
 class SignalSettings:
     """Which readings cannot be used."""
 
-    missing_step: float = 1.8  # a step so many times the usual lacks a reading: two steps, less a tenth of jitter [-]
-    uneven: float = 0.05  # spread of the time steps that makes the rate irregular [-]
-    frozen_shortest: float = 0.05  # as long as this the same six numbers mean a frozen sensor [s] ...
-    frozen_readings: int = 8  # ... and in so many readings
-    frozen_refused: float = 0.5  # share of frozen readings from which on nothing is analysed [-]
-    frozen_off: float = 0.1  # frozen to the end: so far from every rest before, as a share of an axis' range [-]
-    coarse_steps: float = 3.0  # coarse: half an axis' changes are no more than so many of its least steps [-]
-    coarse_jump: float = 2.0  # a jump of coarse steps: so many times the change that an axis seldom exceeds [-]
-    flat_top: float = 0.02  # an axis so long at its own greatest or least value is clipped [s] ...
-    flat_readings: int = 4  # ... in so many readings ...
-    flat_jump: float = 3.5  # ... that it enters or leaves by so many least steps: a slow turn does neither [-] ...
-    flat_around: float = 0.15  # ... while others move over so long: where nothing presses they only make noise [s] ...
-    flat_moves: float = 3.0  # ... by a spread so many times their noise [-]
-    long_run: float = 20.0  # frozen at another value, if so many times longer than its usual repeats [-]
-    wild_noise: float = 10.0  # a wild reading stands beyond its neighbours by so many standard deviations of noise [-]
-    wild_steps: float = 3.0  # ... and so many times the greatest step around it [-] ...
-    wild_coarse: float = 4.0  # ... and so many least steps of a coarse axis [-]
-    wild_widest: int = 2  # readings; a force that lasts longer may be a touch
-    wild_neighbours: int = 2  # readings on each side that a wild one stands out of
-    wild_around: int = 20  # readings on each side whose steps tell what is usual there
-    wild_fewest: int = 8  # such steps; fewer tell nothing
+    missing_step: float = 1.8  # a reading is missing from this ratio to the usual step: two, less a tenth of jitter [-]
+    uneven: float = 0.05  # relative spread of the time steps from which the rate is irregular [-]
+    frozen_shortest: float = 0.05  # least time of six equal numbers that counts as a frozen sensor [s]
+    frozen_readings: int = 8  # fewest readings of that
+    frozen_refused: float = 0.5  # share of frozen readings from which nothing is analysed [-]
+    frozen_off: float = 0.1  # least distance of a value frozen to the end from earlier rests, by the axis' range [-]
+    coarse_steps: float = 3.0  # an axis is coarse where half its changes are at most this many of its least steps [-]
+    coarse_jump: float = 2.0  # a coarse step is a jump from this ratio to the change that the axis seldom exceeds [-]
+    flat_top: float = 0.02  # least time at an axis' own greatest or least value that counts as clipped [s]
+    flat_readings: int = 4  # fewest readings of that
+    flat_jump: float = 3.5  # fewest least steps with which it enters or leaves that value: a slow turn has fewer [-]
+    flat_around: float = 0.15  # time around it in which other axes must move: unloaded ones have noise only [s]
+    flat_moves: float = 3.0  # least spread of those axes by their noise [-]
+    long_run: float = 20.0  # a run of equal values is frozen from this ratio to the usual length of such runs [-]
+    wild_noise: float = 10.0  # least distance of a wild reading from its neighbours by the noise [-]
+    wild_steps: float = 3.0  # least ratio of that distance to the greatest step around it [-]
+    wild_coarse: float = 4.0  # least steps of a coarse axis in that distance [-]
+    wild_widest: int = 2  # most consecutive wild readings; a longer force may be a touch
+    wild_neighbours: int = 2  # readings on each side that a wild one is compared with
+    wild_around: int = 20  # readings on each side whose steps show what is usual there
+    wild_fewest: int = 8  # fewest such steps from which that is known
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,48 +66,48 @@ class FilterSettings:
 
     cut_off: float = 20.0  # of the zero-phase filter of forces and torques [Hz]
     speed_cut_off: float = 5.0  # of the filter of the centre of pressure's speed [Hz]
-    shortest_segment: int = 12  # readings; fewer have no filtered value, for the filter's ends reach across them
-    smoothing: float = 0.1  # the maximum of T/N is that of the force means over so long [s]
-    block: float = 0.1  # intervals and standard errors are those of the means over so long [s]
-    fewest_blocks: int = 4  # of which a standard error is given
+    shortest_segment: int = 12  # fewest readings with filtered values: the filter's ends reach across fewer
+    smoothing: float = 0.1  # averaging time of the forces whose ratio gives the maximum of T/N [s]
+    block: float = 0.1  # averaging time of the blocks behind intervals and standard errors [s]
+    fewest_blocks: int = 4  # fewest blocks that give a standard error
 
 
 @dataclass(frozen=True, slots=True)
 class ZeroSettings:
-    """Where nothing presses, and how far that is trusted."""
+    """Where nothing presses, and how well the zero is known there."""
 
-    quiet_share: float = 0.002  # a spread below this share of the range of N is quiet whatever the noise [-]
-    # ... and torques spread by less than this times the range of N: a standard deviation of 1 mm in 0.3 s is a centre
-    # of pressure that moves at 11.5 mm/s, slower than the slowest published stroke (13 mm/s) [mm]
+    quiet_share: float = 0.002  # spread by the range of N below which a stretch is quiet whatever the noise [-]
+    # Largest spread of its torques by the range of N. A standard deviation of 1 mm in 0.3 s is a centre of pressure
+    # that moves at 11.5 mm/s, slower than the slowest published stroke (13 mm/s) [mm]
     quiet_moves: float = 1.0
     quiet_hops: int = 6  # windows start at every sixth of their length
-    quiet_gap: float = 1.5  # a window that takes so many times its length holds a gap [-]
-    zero_stretch: float = 0.6  # most of the unloaded stretch that gives the zero [s]
-    near: float = 1.0  # unloaded forces so near a stroke tell how far its zero can be trusted [s]
-    unloaded_share: float = 0.3  # a quiet stretch higher than this share of the range of N is a steady press [-]
-    drift_doubted: float = 0.05  # doubtful: drift may have changed mu by this share [-]
-    drift_refused: float = 0.10  # refused: by this one [-]
+    quiet_gap: float = 1.5  # duration by the usual one from which a window contains a gap [-]
+    zero_stretch: float = 0.6  # longest part of an unloaded stretch that gives the zero [s]
+    near: float = 1.0  # greatest distance in time of unloaded forces that show how well a stroke's zero is known [s]
+    unloaded_share: float = 0.3  # force by the range of N from which a quiet stretch is a steady press [-]
+    drift_doubted: float = 0.05  # relative change of mu by drift from which a stroke is doubtful [-]
+    drift_refused: float = 0.10  # relative change of mu by drift from which a stroke is refused [-]
 
 
 @dataclass(frozen=True, slots=True)
 class ContactSettings:
     """Which contacts are strokes, and where they are cut."""
 
-    valley: float = 0.2  # two strokes are separated where N falls below this share of the lower peak [-]
-    turn_share: float = 0.5  # to and fro: the drag counts beyond this share of the median T/N each way [-] ...
-    turn_unsure: float = 2.0  # ... and beyond so many times what the zero leaves open [-] ...
-    turn_shortest: float = 0.1  # ... and each way lasts so long beside the longest [-]
-    turn_block: float = 0.05  # the drag is followed in means over so long [s] ...
-    turn_recent: int = 4  # ... of which so many tell the way it pointed last
-    light_share: float = 0.2  # a contact whose peak is below this share of the greatest is a light touch [-]
+    valley: float = 0.2  # N by the lower of two peaks below which two strokes are separated [-]
+    turn_share: float = 0.5  # to and fro: least drag each way by the median T/N [-]
+    turn_unsure: float = 2.0  # to and fro: least drag each way by the uncertainty from the zero [-]
+    turn_shortest: float = 0.1  # to and fro: least duration of each way by the longest [-]
+    turn_block: float = 0.05  # averaging time of the drag whose direction is followed [s]
+    turn_recent: int = 4  # number of these means that give its last direction
+    light_share: float = 0.2  # peak by the greatest peak below which a contact is a light touch [-]
     shortest_stroke: float = 0.2  # a shorter contact is a tap [s]
-    longest_gap: float = 0.05  # a peak may hide in a longer gap [s]
-    gap_beside: float = 2.5  # readings: a contact so near to unsound ones may go on in them
-    slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
-    greatest_force: float = 200.0  # a greater normal force is no finger's [N]
-    pull_share: float = 0.5  # a recording that pulls so much of what it presses has another normal axis [-]
-    curve_before: float = 0.25  # a stroke's curve begins so long before its onset [s] ...
-    curve_after: float = 0.15  # ... and ends so long after its lift [s]
+    longest_gap: float = 0.05  # a longer gap between readings may contain a peak [s]
+    gap_beside: float = 2.5  # distance in readings from unsound ones within which a contact may continue in them
+    slow_onset: float = 0.5  # longest time from onset to a fifth of the peak: ten times that of a finger [s]
+    greatest_force: float = 200.0  # greatest normal force of a finger [N]
+    pull_share: float = 0.5  # pull by press from which the normal axis must be another one [-]
+    curve_before: float = 0.25  # length of a stroke's curve before its onset [s]
+    curve_after: float = 0.15  # length of a stroke's curve after its lift [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,96 +115,96 @@ class SteadySettings:
     """Where T/N is steady."""
 
     steady_rule: WindowRule = "widened"  # how the steady window is chosen: see `sliding.steady_window`
-    steady_seed: float = 0.5  # share of the slide over which the variance of T/N is least, before it is widened [-]
-    steady_spread: float = 0.10  # steady: standard deviation of T/N over its mean [-] ...
-    steady_trend: float = 0.05  # ... and the means of its four quarters differ from it by no more than this [-]
-    steady_share: float = 0.25  # shortest steady window, as a share of the stroke [-] ...
-    steady_shortest: float = 0.05  # ... in time [s] ...
-    steady_readings: int = 5  # ... and in readings
-    steady_held: float = 0.95  # share of a window's readings that must have a ratio [-]
-    steady_edges: int = 121  # windows begin and end on a grid of so many instants
+    steady_seed: float = 0.5  # share of the slide with the least variance of T/N, from which the window is widened [-]
+    steady_spread: float = 0.10  # largest standard deviation of T/N by its mean [-]
+    steady_trend: float = 0.05  # largest difference of a quarter's mean from the whole window's [-]
+    steady_share: float = 0.25  # shortest steady window by the stroke [-]
+    steady_shortest: float = 0.05  # shortest steady window in time [s]
+    steady_readings: int = 5  # shortest steady window in readings
+    steady_held: float = 0.95  # least share of a window's readings that have a ratio [-]
+    steady_edges: int = 121  # number of instants on the grid where windows begin and end
 
 
 @dataclass(frozen=True, slots=True)
 class SlideSettings:
-    """What shows that the contact slides, how fast and which way."""
+    """What shows that the contact slides, its speed and its direction."""
 
-    sliding_share: float = 0.5  # sliding: the centre of pressure is faster than this share of its greatest speed [-]
-    slide_share: float = 0.2  # the slide has begun: faster than this share of the steady speed [-]
-    shear: float = 3.0  # the centre of pressure may move so far while the skin only shears [mm]
-    # A finger that only rolls moves it no further than a quarter turn of a finger 15 mm wide (the width the model has):
-    # 7.5 mm * pi / 2. Further than that, something slid [mm]
+    sliding_share: float = 0.5  # sliding: speed of the centre of pressure by its greatest [-]
+    slide_share: float = 0.2  # start of the slide: speed by the steady speed [-]
+    shear: float = 3.0  # farthest that the centre of pressure moves while the skin only shears [mm]
+    # Farthest that it moves while the finger only rolls: a quarter turn of a finger 15 mm wide, as the model's is,
+    # 7.5 mm * pi / 2 [mm]
     roll: float = 11.8
-    shear_steps: float = 2.0  # and so many steps of coarse torques are no movement [-]
-    one_way: float = 0.9  # the tangential force keeps its direction: length of its mean unit vector [-] ...
-    drag_share: float = 0.1  # ... where it exceeds this share of its greatest: the noise of less points anywhere [-]
-    along_share: float = 0.5  # a direction along x: the drag's, or the speed's, share along it; 60 degrees off [-]
-    side_load: float = 0.3  # so much of the drag across the movement is a load from the side [-]
-    speed_error: float = 0.10  # a speed with a greater relative standard error is refused [-]
-    speed_line: float = 0.95  # so is one whose line explains less than this share of the movement [-]
-    speed_step: float = 0.10  # so is one whose centre of pressure moves in steps of this share of the way [-]
-    height_doubt: float = 20.0  # how wrong a face height that nobody stated may be [mm]
-    farthest: float = 150.0  # a centre of pressure further out is no finger's [mm]
+    shear_steps: float = 2.0  # most steps of coarse torques that are no movement [-]
+    one_way: float = 0.9  # least length of the mean unit vector of a tangential force that keeps its direction [-]
+    drag_share: float = 0.1  # least drag by its greatest that counts there: noise has any direction [-]
+    along_share: float = 0.5  # least share along x of a direction along x, of drag or speed: 60 degrees off [-]
+    side_load: float = 0.3  # drag across the movement by the whole drag from which it is a load from the side [-]
+    speed_error: float = 0.10  # relative standard error from which a speed is refused [-]
+    speed_line: float = 0.95  # least share of the movement that the line of a speed explains [-]
+    speed_step: float = 0.10  # largest step of the centre of pressure by the movement [-]
+    height_doubt: float = 20.0  # uncertainty of a face height that was not given [mm]
+    farthest: float = 150.0  # farthest centre of pressure of a finger [mm]
 
 
 @dataclass(frozen=True, slots=True)
 class RatioSettings:
-    """Where T/N means something, its static peak and its stick phase."""
+    """Where T/N is defined, its static peak and its stick phase."""
 
-    force_floor: float = 0.3  # T/N means nothing below this normal force [N] ...
-    force_floor_share: float = 0.2  # ... nor below this share of the stroke's peak [-]
-    light_half: float = 0.5  # T/N above 1 only below this share of the peak of N is drift or a load from the side [-]
-    static_share: float = 0.05  # a static peak stands so far above what follows it [-] ...
-    static_noise: float = 3.0  # ... and so many standard deviations of the noise of T/N [-] ...
-    static_after: float = 0.2  # ... that follows it for so long [s]; ...
-    static_late: float = 0.1  # ... it may come so long after the slide began [s]
-    law_fewest: int = 5  # block means from which a power of N and its error are estimated
+    force_floor: float = 0.3  # least normal force at which T/N is defined [N]
+    force_floor_share: float = 0.2  # least normal force for that by the stroke's peak [-]
+    light_half: float = 0.5  # N by its peak: T/N above 1 only below this is drift or a load from the side [-]
+    static_share: float = 0.05  # least height of a static peak above what follows it, relative [-]
+    static_noise: float = 3.0  # least height of a static peak by the noise of T/N [-]
+    static_after: float = 0.2  # time after the peak with which it is compared [s]
+    static_late: float = 0.1  # latest time of the peak after the slide began [s]
+    law_fewest: int = 5  # fewest block means that give a power of N and its error
     law_steepest: float = -1.0 / 3.0  # power by which mu may follow N unseen: T as the area of a Hertz contact [-]
-    slip_within: float = 0.02  # a slip drops T/N within so long: a fifth of a period at 10 Hz [s] ...
-    slip_share: float = 0.05  # ... by this share of its level, as a static peak stands out [-] ...
-    slip_noise: float = 4.0  # ... and so many deviations of a difference: once in 15000 readings by chance [-]
-    slips_fewest: int = 3  # slips of stick-slip: two periods
-    slips_upwards: float = 1.0 / 3.0  # climbs as sudden, for each slip, at most: hum has one for each [-]
-    stick_rise: float = 0.1  # a stick phase: T/N climbs by this share of its level before it stays there [-] ...
-    stick_left: float = 0.5  # ... and the climb leaves no more than this share of its variance [-]
+    slip_within: float = 0.02  # longest drop of T/N in a slip: a fifth of a period at 10 Hz [s]
+    slip_share: float = 0.05  # least drop of a slip by the level of T/N, as for a static peak [-]
+    slip_noise: float = 4.0  # least drop by the noise of a difference: once in 15000 readings by chance [-]
+    slips_fewest: int = 3  # fewest slips of stick-slip: two periods
+    slips_upwards: float = 1.0 / 3.0  # most climbs as sudden for each slip: hum has one for each [-]
+    stick_rise: float = 0.1  # least climb of T/N in a stick phase by the level that it reaches [-]
+    stick_left: float = 0.5  # largest share of its variance that the fitted climb leaves [-]
 
 
 @dataclass(frozen=True, slots=True)
 class ClimbSettings:
     """How the climb of T/N before the break-away is fitted."""
 
-    climb_bends: tuple[float, float] = (1.0, 2.0)  # from which the power of a climb is sought [-] ...
-    climb_bend_limits: tuple[float, float] = (0.5, 4.0)  # ... and between which it stays [-]
-    climb_falls: tuple[float, float] = (0.05, 0.15)  # from which the fall of a static peak to 1/e is sought [s] ...
-    climb_fall_limits: tuple[float, float] = (0.005, 1.0)  # ... and between which it stays [s]
-    climb_fewest: int = 5  # readings of the climb, and of the level
-    climb_most: int = 400  # at most so many means stand for the readings
-    climb_candidates: int = 41  # instants at which rest or level may meet the climb
-    climb_shortest: float = 1e-3  # a climb takes so long [s]
-    climb_steps: int = 60  # of Levenberg's and Marquardt's method at most
-    climb_still: float = 1e-10  # a fit that gains no more than this share of the squares has settled [-]
+    climb_bends: tuple[float, float] = (1.0, 2.0)  # powers of a climb at which the search starts [-]
+    climb_bend_limits: tuple[float, float] = (0.5, 4.0)  # limits of that power [-]
+    climb_falls: tuple[float, float] = (0.05, 0.15)  # start values of the time in which a static peak falls to 1/e [s]
+    climb_fall_limits: tuple[float, float] = (0.005, 1.0)  # limits of that time [s]
+    climb_fewest: int = 5  # fewest readings of the climb, and of the level
+    climb_most: int = 400  # most means that stand for the readings
+    climb_candidates: int = 41  # number of instants tried where rest or level meets the climb
+    climb_shortest: float = 1e-3  # shortest climb [s]
+    climb_steps: int = 60  # most steps of the Levenberg-Marquardt method
+    climb_still: float = 1e-10  # relative decrease of the squares below which a fit has converged [-]
     climb_bends_surely: float = 6.6  # ratio of variances from which a climb is not straight: 1 in 100 by chance [-]
 
 
 @dataclass(frozen=True, slots=True)
 class PressSettings:
-    """Which contacts are presses, that tell how the face leans."""
+    """Which contacts are presses, from which the tilt of the face is measured."""
 
-    press_held: float = 0.5  # held: above this share of its peak [-] ...
-    press_shortest: float = 0.5  # ... for so long [s] ...
-    press_moves: float = 1.0  # ... while its centre of pressure moves no further [mm] ...
-    press_ratio: float = 0.2  # ... and T/N stays below this [-]
-    press_fewest: int = 3  # presses, or blocks of one press, of which an interval is given
+    press_held: float = 0.5  # force by the peak above which a press is held [-]
+    press_shortest: float = 0.5  # shortest time for which it is held [s]
+    press_moves: float = 1.0  # farthest that the centre of pressure moves meanwhile [mm]
+    press_ratio: float = 0.2  # largest T/N meanwhile [-]
+    press_fewest: int = 3  # fewest presses, or blocks of one press, that give an interval
 
 
 @dataclass(frozen=True, slots=True)
 class SystematicSettings:
-    """What all readings of a session share, where nobody measured it."""
+    """Systematic errors that all readings of a session share, where they were not measured."""
 
     # Standard uncertainty of what each force shows of another [-]; None: that of a gain. A certificate states one error
     # of an axis in per cent of full scale, whatever is loaded, so it holds for gain and cross-talk alike.
     cross_talk: float | None = None
-    tilt_prior: float = TILT_PRIOR  # of the lean about each axis [degrees]
+    tilt_prior: float = TILT_PRIOR  # of the tilt about each axis [degrees]
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ class AnalysisSettings:
     systematic: SystematicSettings = field(default_factory=SystematicSettings)
     area: AreaLaw = FIXED  # by which tau_max is computed
     confidence: float = 0.95
-    gain_error: float | None = None  # standard uncertainty of each axis' gain that somebody set [-]; None: assumed
+    gain_error: float | None = None  # standard uncertainty of each axis' gain that was set [-]; None: assumed
     bootstrap_seed: int = 0  # of the intervals drawn
     tilt: tuple[float, float] = (0.0, 0.0)  # tilt of the face's normal to +x and +y that is levelled [degrees]
 
@@ -250,33 +250,33 @@ _GROUPS = ("signal", "filter", "zero", "contact", "steady", "slide", "ratio", "p
 
 @dataclass(frozen=True, slots=True)
 class BootstrapSettings:
-    """What every repeat draws from; stored with the intervals."""
+    """What every bootstrap repeat is drawn from, stored with the intervals."""
 
     repeats: int = 1000
     seed: int = 0
     block: float = 0.1  # [s]
-    inwards: float = 0.2  # the steady window may begin or end so much of its length further inwards [-]
-    slide_share: tuple[float, float] = (0.1, 0.3)  # of the steady speed: at any between them the slide has begun [-]
+    inwards: float = 0.2  # share of its length by which the steady window may begin later or end earlier [-]
+    slide_share: tuple[float, float] = (0.1, 0.3)  # speeds by the steady speed between which the slide may begin [-]
     gain_error: float = ASSUMED_GAIN_ERROR  # standard uncertainty of each axis' gain [-]
-    gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
+    gain_error_origin: str = "assumed"  # "set" where somebody gave it for this transducer
     cross_talk: float = ASSUMED_GAIN_ERROR  # standard uncertainty of what each force shows of another [-]
     tilt: tuple[float, float] = (0.0, 0.0)  # tilt of the face's normal to +x and +y that is not levelled [degrees]
     tilt_error: tuple[float, float] = (TILT_PRIOR, TILT_PRIOR)  # its standard uncertainty [degrees]
     tilt_origin: str = "assumed: too few presses to measure it"
-    tilt_presses: int = 0  # that measured it: its error then follows Student's law, and holds cross-talk from N, too
+    tilt_presses: int = 0  # presses behind it: its error then has Student's law and includes cross-talk from N
     confidence: float = 0.95
-    fewest_blocks: int = 4  # from which a spread is estimated
-    fewest_quiet: int = 10  # readings before the onset from which noise is estimated ...
-    quiet_before: float = 0.02  # ... which end so long before it: later ones may be the touch's already [s]
+    fewest_blocks: int = 4  # fewest blocks that give a spread
+    fewest_quiet: int = 10  # fewest readings before the onset that give the noise
+    quiet_before: float = 0.02  # time before the onset at which they end: later ones may belong to the touch [s]
     top_share: float = 0.97  # readings above this share of the peak may be the peak [-]
-    top_alike: float = 0.25  # ... and filtered ones nearer than this share of a block are alike [-]
-    most_alike: float = 0.8  # neighbouring blocks: more cannot be estimated from so few [-]
-    least_free: float = 2.0  # degrees of freedom of a mean, likewise
-    onset_fewest: int = 3  # readings that tell how steeply the force climbs
-    onset_most: int = 400  # readings about the crossing in which noise is drawn
-    onset_steep: float = 0.2  # least steepness of a bent rise of force, by its mean steepness [-]
-    onset_reach: float = 4.0  # standard deviations of the noise within which it may move the crossing [-]
-    climb_ends: int = 5  # of the fit of a climb, from that of the steady window inwards
+    top_alike: float = 0.25  # filtered readings nearer than this share of a block are correlated [-]
+    most_alike: float = 0.8  # largest correlation of neighbouring blocks: few blocks cannot give a larger one [-]
+    least_free: float = 2.0  # least degrees of freedom of a mean, likewise
+    onset_fewest: int = 3  # fewest readings that give the steepness of the force's rise
+    onset_most: int = 400  # most readings about the crossing in which noise is drawn
+    onset_steep: float = 0.2  # least steepness of a bent rise of force by its mean steepness [-]
+    onset_reach: float = 4.0  # noise in standard deviations within which it may move the crossing [-]
+    climb_ends: int = 5  # number of ends of the fitted climb, from that of the steady window inwards
     detector: DetectorSettings = field(default_factory=DetectorSettings)  # those of the analysis
     climb: ClimbSettings = field(default_factory=ClimbSettings)  # likewise
 
