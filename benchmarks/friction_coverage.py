@@ -51,7 +51,7 @@ class Trouble:
     flicker: float = 0.0  # standard deviation of 1/f noise of each force [N]
     wander: float = 0.0  # standard deviation of mu's slow wandering [-]
     law: float = 0.0  # mu follows N by this power [-]
-    cross_talk: float | None = None  # each force errs by exactly so much of each other, either sign; None: drawn [-]
+    cross_talk: float | None = None  # error of each force by each other one, of either sign; None: drawn [-]
     tilt: tuple[float, float] | None = None  # [degrees]; None: drawn
     presses: int = 0  # before the strokes, by which the analysis measures the lean
     level: bool = False  # mu's truth is the level that it wanders about, not its mean over this very stroke

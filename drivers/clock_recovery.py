@@ -10,8 +10,8 @@ import numpy as np
 
 from drivers.arrays import Array, Indices
 
-WINDOW = 1.0  # of the records that arrive within, the one that waited least is taken [real s]
-_COARSE, _FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
+WINDOW = 1.0  # the record that waited least in each window is used [real s]
+_COARSE, _FINE = (1, 0.1), (3, 0.02)  # windows, and the error of the rate over them, twice in a row, that counts [-]
 
 
 class RateWatch:

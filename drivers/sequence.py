@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivers.arrays import Indices
 
 WRAP = 2**32
-_NEAR = 10_000  # a rejected record at most so many numbers behind was late; further off it was garbage
+_NEAR = 10_000  # farthest number behind at which a rejected record was late; beyond, it was garbage
 
 Relation = Literal["same", "next", "frozen", "behind", "off"]
 

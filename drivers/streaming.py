@@ -18,14 +18,14 @@ from drivers.threaded import ThreadedTransducer
 from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
-_GATHER = 0.002  # at fast rates bytes are let gather for so long before they are taken,
-_LUMP = 2048  # but where so many came at one go: there the computer was busy, and more may be waiting
-_FIRST = 3.0  # until a device that never sent a record is given up, beyond what bringing it to stream takes
-_QUIET = 0.3  # without a whole record, after which the device is asked to stream again
-_SILENCE = 5.0  # without a whole record, after which it is given up
+_GATHER = 0.002  # at fast rates, time in which bytes gather before they are read
+_LUMP = 2048  # bytes at once from which the computer was busy, and more may be waiting
+_FIRST = 3.0  # until a device that never sent a record is given up, beyond its start-up time
+_QUIET = 0.3  # time without a complete record after which the device is asked to stream again
+_SILENCE = 5.0  # time without a complete record after which it is given up
 _LOOKS = 12  # at a rate that is to be measured, until one says what those before it did
-_ALIKE = 0.03  # rates that differ by less are said to be the same [-]
-_BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the last one again and again
+_ALIKE = 0.03  # relative difference below which rates are equal [-]
+_BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between attempts to bring it back; the last one repeats
 
 
 class Conversation(Protocol):

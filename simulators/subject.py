@@ -18,7 +18,7 @@ class SubjectSettings:
     offset_spread: float = 3.0  # and of where they put the middle
     judgement_noise: float = 4.0  # standard deviation between judgements of the same surface
     friction_weight: float = 0.0  # share of a judgement that follows friction instead of the maker's index [-]
-    drift: float = 0.0  # a judgement rises by so much with each trial of its block
+    drift: float = 0.0  # rise of a judgement with each trial of its block
     carry_over: float = 0.0  # and by this share of how far the index judged before lay above the middle [-]
     moisture: float = 0.0  # standard deviation between fingers of the logarithm of their friction [-]
     # Of two strokes that differ by this in log µ the one of more friction is chosen in Φ(1) = 84 %. A JND of 18 % of µ,

@@ -20,8 +20,8 @@ MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a re
 Edge = Literal["onset", "lift", "steady begin", "steady end"]
 EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
 _PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
-EDGE_DISTANCE = 0.02  # edges keep so far from each other [s]
-EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # a key moves an edge by so much [s]
+EDGE_DISTANCE = 0.02  # least distance of two edges [s]
+EDGE_STEP, EDGE_LEAP = 0.005, 0.05  # by which a key moves an edge, and with Shift [s]
 EDGE_DECISIONS: dict[Edge, str] = {"onset": "onset", "steady begin": "steady", "steady end": "steady", "lift": "lift"}
 
 

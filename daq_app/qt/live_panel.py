@@ -32,7 +32,7 @@ _WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}
 LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
 TRAIL = 2.0  # of the centre of pressure [s] ...
-_POINTS = 120  # ... in so many points
+_POINTS = 120  # ... and its number of points
 TAB = 24  # width of what opens and closes the drawer, before the font's scale [px]
 READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
 

@@ -24,7 +24,7 @@ SAMPLE = 14  # length of the piece of line before a curve's name, likewise
 DASHES = 45  # times two thirds of a dash in the stretch that is shown
 _TOP = 2  # above the names [px]
 LINES = 3  # of type: a lower plot has no line to spare for its names
-FAR = 1e4  # a value so many pixels away is as good as any beyond it
+FAR = 1e4  # distance beyond which all values look alike [px]
 
 
 @dataclass(frozen=True, slots=True)

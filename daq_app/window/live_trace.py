@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from drivers.arrays import Array, Indices
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
-_LONGEST = 60.0  # kept for drawing [s]
-_GAP = 5.0  # a step in time longer than so many usual ones is a gap, where no reading was counted as lost [-]
+_LONGEST = 60.0  # longest trace [s]
+_GAP = 5.0  # time step by the usual one from which there is a gap, where no reading was counted as lost [-]
 _STEPS = (1.0, 2.0, 5.0, 10.0)
-SCALE_MARGIN = 0.05  # data may go beyond the scale by this share of it: so much is drawn [-]
-SHRINK = 0.25  # a scale of which no more than this share is used ...
-_PATIENCE = 20.0  # ... for so long is taken back [s]
+SCALE_MARGIN = 0.05  # share of the scale that is drawn beyond it [-]
+SHRINK = 0.25  # used share below which a scale shrinks [-] ...
+_PATIENCE = 20.0  # ... after this time [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

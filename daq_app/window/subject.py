@@ -37,8 +37,8 @@ _NAMES = {
 # Of an answer on the line, and of keys:
 LENGTH = 100.0  # of the line [mm]
 _MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
-STEP = 1.0  # an arrow moves the mark by so much ...
-LEAP = 10.0  # ... and Page Up or Page Down by this
+STEP = 1.0  # by which an arrow moves the mark ...
+LEAP = 10.0  # ... and Page Up or Page Down
 PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
 DIGITS = 1  # of a score: a mark can be placed no finer
 GIVES = frozenset({"Enter", "Space"})  # the answer that stands

@@ -100,10 +100,10 @@ _TICK = 0.05  # longest wait for a datagram, and so for a stop
 _ASK_EVERY = 0.1  # between two start requests while nothing comes
 _SILENCE = 3.0  # until a box that has fallen silent is given up
 _QUIET = 0.3  # silence after which the box is asked to start again
-_THEFTS = 3  # so many returns within _THEFT_SPAN mean that somebody else keeps taking the stream
+_THEFTS = 3  # returns within _THEFT_SPAN from which another client keeps taking the stream
 _THEFT_SPAN = 3.0
-_SILENT_TICKS = 2.0  # across a longer silence the box's counter is not held against the computer's clock
-_TOGETHER = 50_000_000  # of records that arrived within, one is looked at for that [ns]
+_SILENT_TICKS = 2.0  # across a longer silence the box's counter is not compared with the computer's clock
+_TOGETHER = 50_000_000  # one record in this time is compared [ns]
 
 
 class NetFtTransducer(ThreadedTransducer):

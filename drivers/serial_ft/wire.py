@@ -100,7 +100,7 @@ class BinaryDecoder:
         self.malformed = 0
         self._buffer = bytearray()
         self._position = 0  # where the next record is expected in it
-        self._doubt = 0  # records to come that are so near behind a break that they must prove themselves
+        self._doubt = 0  # next records that, close behind a break, count only once later ones agree
         self._skipped = 0  # bytes since the last good record that belong to none
         self._last: Indices | None = None  # values of the last good record
 

@@ -145,8 +145,8 @@ def _common_unit(quantity: str, header_units: set[str | None], option: str | Non
 
 
 ORIGINAL_FILE = "original.csv"
-RATE_TOLERANCE = 0.01  # a stated rate may differ so much from the one the file's times hold [-]
-UNEVEN = 0.05  # time steps that spread more than this hold no one rate [-]
+RATE_TOLERANCE = 0.01  # relative difference allowed between a stated rate and that of the file's times [-]
+UNEVEN = 0.05  # relative spread of time steps from which there is no single rate [-]
 NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _FEWEST = 2
 _LONGEST = 9e9  # of a recording [s]: a session's clock counts nanoseconds in 64 bits

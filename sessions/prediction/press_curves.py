@@ -13,10 +13,10 @@ from sessions.strokes import AnalysisSettings, StrokeCurve
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.trial_analysis import TrialContext
 
-LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
-STANDS = 0.01  # a stage stands while it is so near its greatest travel, as a share of that [-] ...
-SHORTEST_HOLD = 0.5  # ... for so long: what shortest press the analysis knows [s]
-LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
+LONGEST_GAP = 0.1  # of the log within a press [s]: meanwhile a finger travels less than a point's share
+STANDS = 0.01  # distance from its greatest travel, by that, within which a stage stands [-]
+SHORTEST_HOLD = 0.5  # least time for which it stands: the shortest press of the analysis [s]
+LEAST_TRAVEL = 0.1  # least travel of a press; with less, the log is not that of the bone [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

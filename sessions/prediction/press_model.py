@@ -21,7 +21,7 @@ from solver.response.nearby import stiffness_shares
 LAYERS = ("epidermis", "dermis", "fat")  # the bone is rigid
 # Orthonormal contrasts of three log stiffnesses: skin's two layers, and both against the fat.
 CONTRASTS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
-REACH = 3.3  # contrasts reach so many deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
+REACH = 3.3  # largest contrast in deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
 DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
 RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
 DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives are not known: 15 numbers

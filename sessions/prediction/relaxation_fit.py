@@ -20,15 +20,15 @@ from sessions.prediction.finger_fit import QUANTILES, FingerFit, Interval, Loadi
 from sessions.prediction.press_model import LAYERS, FitError, PressModel
 from solver import Relaxation, Scene
 
-BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they are correlated for about that [s]
-GRID_SIZE = 60  # of each number at once, between bounds that are drawn closer ...
-_ROUNDS = 5  # ... so many times at most, until ...
-_FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
-TURNS, _AGREED = 8, 0.003  # of finger and relaxation at most, and the change of the part that ends them [-]
+BLOCK = 0.05  # averaging time of the forces compared: about the correlation time of a filter at 20 Hz [s]
+GRID_SIZE = 60  # values of each number in one round, between bounds that narrow from round to round
+_ROUNDS = 5  # most rounds
+_FINE = 12.0  # values of each number that carry the posterior at the end (inverse Simpson index)
+TURNS, _AGREED = 8, 0.003  # most alternations of finger and relaxation, and the change of the part that ends them [-]
 LEAST_PART = 0.01  # a part that may be less cannot be distinguished from none [-]
 LARGEST_PART = 0.95  # a scene allows 0.99 [-]
-_LONGEST = 10.0  # relaxation times are tried from a block to so many times the longest hold
-_FEWEST = 10  # blocks beyond the numbers that are looked for
+_LONGEST = 10.0  # longest relaxation time tried, by the longest hold; the shortest is a block [-]
+_FEWEST = 10  # fewest blocks beyond the unknown numbers
 
 
 class HoldCurve(NamedTuple):

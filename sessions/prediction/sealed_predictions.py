@@ -17,7 +17,7 @@ from sessions.recording.derived import UNBLINDING, load_derived, store_derived
 
 SEAL = "sealed-prediction.json"
 SEAL_NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")
-_SAME = 1e-12  # numbers made on another machine may differ by so much [-]
+_SAME = 1e-12  # relative difference allowed to numbers from another machine [-]
 
 
 def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:

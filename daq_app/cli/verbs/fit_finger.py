@@ -35,9 +35,9 @@ from solver import Scene
 EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
 SCENE_HEAD = "# A finger found by 'daq-app fit-finger'"  # at the head of its scene file
 _MU, FACTOR = 0.5, 2.0  # usual ones
-DEEPER = 1.1  # the model goes so much deeper than the stage, should the finger be touched before its onset is seen [-]
-FALL = 0.05  # of the force in a hold, from which on relaxing is named [-]
-AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones before that is a flaw [-]
+DEEPER = 1.1  # depth of the model by that of the stage, should contact begin before its onset is detected [-]
+FALL = 0.05  # relative fall of the force in a hold from which relaxation is named [-]
+AGREE = 0.02  # relative difference of the solver's forces from the fitted ones from which there is a flaw [-]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
