@@ -256,8 +256,8 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
-    """The correlations of some paths as a distribution."""
+class FiveNumberSummary:
+    """Extremes, quartiles and median of the correlations of some paths."""
 
     correlated: int  # paths with a correlation; the numbers below are theirs
     distinct: int  # of these correlations, as many differ by more than `SAME`
@@ -275,11 +275,11 @@ def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
     return [finding.within if within else finding.r for finding in paths]
 
 
-def spread(values: Sequence[float | None]) -> Spread | None:
-    """Return the distribution of correlations; None where there is none.
+def five_number_summary(values: Sequence[float | None]) -> FiveNumberSummary | None:
+    """Return the five-number summary of correlations; None where there is none.
 
-    >>> distribution = spread([0.5, None, 0.7, 0.701])
-    >>> distribution.median, distribution.correlated, distribution.distinct
+    >>> summary = five_number_summary([0.5, None, 0.7, 0.701])
+    >>> summary.median, summary.correlated, summary.distinct
     (0.7, 3, 2)
     """
     numbers = sorted(value for value in values if value is not None)
@@ -290,20 +290,20 @@ def spread(values: Sequence[float | None]) -> Spread | None:
     for value in numbers:
         if value - distinct[-1] > SAME:
             distinct.append(value)
-    return Spread(len(numbers), len(distinct), least, lower, median, upper, greatest)
+    return FiveNumberSummary(len(numbers), len(distinct), least, lower, median, upper, greatest)
 
 
-def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread | None, bool], ...]:
-    """Return for each choice and each of its values the distribution over all paths with it, and whether it is usual.
+def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, FiveNumberSummary | None, bool], ...]:
+    """Return for each value of each choice the five-number summary over all paths with it, and whether it is usual.
 
     Medians that lie far apart within a choice say that it matters.
     """
     values = correlations(findings)
-    rows: list[tuple[str, str, Spread | None, bool]] = []
+    rows: list[tuple[str, str, FiveNumberSummary | None, bool]] = []
     for choice in CHOICES:
         names = dict.fromkeys(getattr(finding.path, choice) for finding in findings)
         usual = {getattr(finding.path, choice) for finding in findings if finding.usual}
         for name in names:
             subset = [r for finding, r in zip(findings, values, strict=True) if getattr(finding.path, choice) == name]
-            rows.append((choice, name, spread(subset), name in usual))
+            rows.append((choice, name, five_number_summary(subset), name in usual))
     return tuple(rows)

@@ -15,8 +15,8 @@ from sessions.statistics.multiverse import (
     PathTrial,
     by_choice,
     correlations,
+    five_number_summary,
     path_findings,
-    spread,
     trial_paths,
 )
 from sessions.strokes import AnalysisSettings, analyse
@@ -125,7 +125,7 @@ def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
     (usual,) = [finding for finding in findings if finding.usual]
     assert usual.path.mu == "maximum"
     assert usual.r == pytest.approx(1.0)
-    whole = spread(correlations(findings))
+    whole = five_number_summary(correlations(findings))
     assert (whole.correlated, whole.least, whole.greatest) == (len(SMALL), -1.0, 1.0)
     assert whole.distinct == 2  # of so many paths, one result for each receptor
 
@@ -134,4 +134,4 @@ def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted
     trials = [PathTrial("A", i, float(i), "maximum", (8.0 + i, *(None for _ in SMALL[1:]))) for i in (0, 20, 50)]
     findings = path_findings(trials, "small", within=False)
     assert [finding.surfaces for finding in findings[:2]] == [3, 0]
-    assert spread(correlations(findings)).correlated == 1
+    assert five_number_summary(correlations(findings)).correlated == 1

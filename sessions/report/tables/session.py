@@ -36,7 +36,15 @@ from sessions.report.wording import (
     with_sign,
 )
 from sessions.statistics.correlations import Relation, slope_interval
-from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
+from sessions.statistics.multiverse import (
+    CHOICE_LABELS,
+    SAME,
+    FiveNumberSummary,
+    PathFinding,
+    by_choice,
+    correlations,
+    five_number_summary,
+)
 from sessions.statistics.scores import MeanScore, sd_interval
 
 _WITHOUT = {
@@ -246,7 +254,7 @@ NamedPaths = tuple[str, Sequence[PathFinding]]
 
 
 def paths_table(path_groups: Iterable[NamedPaths]) -> Table | None:
-    """Return the distribution of the correlation over all paths and over those with each choice, by descriptor."""
+    """Return five-number summaries of the correlation over all paths and over those with each choice, by descriptor."""
     groups = [(name, _rows(findings)) for name, findings in path_groups if findings]
     columns = (
         "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
@@ -255,40 +263,40 @@ def paths_table(path_groups: Iterable[NamedPaths]) -> Table | None:
 
 
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
-    """Return the distribution in a sentence, and how many paths turn the sign of the usual one."""
+    """Return the distribution of the correlation in a sentence, and how many paths turn the sign of the usual one."""
     values = correlations(findings)
-    distribution = spread(values)
+    summary = five_number_summary(values)
     usual = next((r for r, finding in zip(values, findings, strict=True) if finding.usual and r), 0.0)
     start = f"{capital(name)}: of {len(findings)} paths of the analysis"
-    if distribution is None:
+    if summary is None:
         return f"{start} none gives a correlation."
     opposite_count = sum(r is not None and r * usual < 0.0 for r in values)
     sign_clause = f", {opposite_count} with another sign than the usual path" if opposite_count else ""
-    distinct = distribution.distinct
+    distinct = summary.distinct
     difference = "all agree within" if distinct == 1 else f"{distinct} of these differ by more than"
-    least, median, greatest = map(correlation, (distribution.least, distribution.median, distribution.greatest))
+    least, median, greatest = map(correlation, (summary.least, summary.median, summary.greatest))
     return (
-        f"{start} {distribution.correlated} give a correlation, from {least} to {greatest}, "
+        f"{start} {summary.correlated} give a correlation, from {least} to {greatest}, "
         f"median {median}{sign_clause}; {difference} {SAME:g}."
     )
 
 
 def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
-    rows = [("all", "", "", *_spread(spread(correlations(findings)), len(findings)))]
+    rows = [("all", "", "", *_spread(five_number_summary(correlations(findings)), len(findings)))]
     previous = ""
-    for choice, name, distribution, usual in by_choice(findings):
+    for choice, name, summary, usual in by_choice(findings):
         count = sum(getattr(finding.path, choice) == name for finding in findings)
         label = CHOICE_LABELS[choice] if choice != previous else ""
-        rows.append((label, name, "usual" if usual else "", *_spread(distribution, count)))
+        rows.append((label, name, "usual" if usual else "", *_spread(summary, count)))
         previous = choice
     return tuple(rows)
 
 
-def _spread(distribution: Spread | None, paths: int) -> Row:
-    if distribution is None:
+def _spread(summary: FiveNumberSummary | None, paths: int) -> Row:
+    if summary is None:
         return (f"0 of {paths}", *(NONE for _ in range(6)))
-    numbers = (distribution.least, distribution.lower, distribution.median, distribution.upper, distribution.greatest)
-    return (f"{distribution.correlated} of {paths}", distribution.distinct, *(correlation(value) for value in numbers))
+    numbers = (summary.least, summary.lower, summary.median, summary.upper, summary.greatest)
+    return (f"{summary.correlated} of {paths}", summary.distinct, *(correlation(value) for value in numbers))
 
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
