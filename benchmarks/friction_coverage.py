@@ -124,9 +124,7 @@ class Visit:
     def errors_alone(self, force: Array, settings: BootstrapSettings) -> dict[str, bool]:
         """Say whether intervals of nothing but gains, cross-talk and lean hold mu and T of a true force (3,) [N]."""
         reading = self._errors[:3, :3] @ self._turn @ force
-        accuracy = (settings.gain_error, settings.cross_talk)
-        lean = settings.tilt, settings.tilt_error
-        systematic = SystematicDraws(settings.repeats, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
+        systematic = SystematicDraws(settings)
         along = drag_direction(reading[None, :2])
         drag, normal = float(np.hypot(*reading[:2])), -float(reading[2])
         true = float(np.hypot(*force[:2]))

@@ -218,7 +218,7 @@ class Console:
 def point_advice(text: str) -> str:
     """Return what to add to what is allowed where somebody typed a comma before a fraction.
 
-    >>> behind_a_point("'1,5'"), behind_a_point("1.5"), behind_a_point("1,5,2")
+    >>> point_advice("'1,5'"), point_advice("1.5"), point_advice("1,5,2")
     (', its fraction behind a point', '', '')
     """
     return ", its fraction behind a point" if re.fullmatch(r"'?[+-]?\d*,\d+'?", text.strip()) else ""
@@ -247,7 +247,7 @@ class Parser(argparse.ArgumentParser):
 def table(rows: list[list[str]], *, header: list[str]) -> str:
     """Return rows as aligned columns; the first column to the left, the others to the right.
 
-    >>> print(table([["slip 0", "1.5"], ["slip 100", "12.0"]], head=["surface", "N"]))
+    >>> print(table([["slip 0", "1.5"], ["slip 100", "12.0"]], header=["surface", "N"]))
     surface      N
     slip 0     1.5
     slip 100  12.0

@@ -76,7 +76,7 @@ _ANSWERS: Mapping[str, str] = tr_noop({  # by what became of a trial, or which o
 def answer_text(outcome: str, answer: float | str | None) -> str:
     """Return what a subject answered: a score, a number of its own, or which of two.
 
-    >>> answer_words("scored", 37.4), answer_words("numbered", 0.125), answer_words("chosen", "first")
+    >>> answer_text("scored", 37.4), answer_text("numbered", 0.125), answer_text("chosen", "first")
     ('score 37', 'number 0.125', 'the first')
     """
     if answer is None:
@@ -151,7 +151,7 @@ def span(low: float, high: float, digits: int = 3) -> str:
 def errors_text(mesh: float | None, effect: str = "") -> str:
     """Return what stands behind a number of the model: its relative error from the mesh, and from what is left out.
 
-    >>> errors_words(0.0036, "viscosity 4 % of the SED"), errors_words(None)
+    >>> errors_text(0.0036, "viscosity 4 % of the SED"), errors_text(None)
     (' ± 0.36 % by the mesh; model: viscosity 4 % of the SED', '; mesh, model: no estimate')
     """
     from solver.prediction import percent  # here: most verbs have no need of the solver

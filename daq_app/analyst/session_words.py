@@ -207,9 +207,9 @@ def points(state: AnalystState) -> tuple[Point, ...]:
 def progress_text(step: Step | None) -> str:
     """Return what is being done, and how long it will still take.
 
-    >>> progress_words(Step(0.5, "predicting", 3.2))
+    >>> progress_text(Step(0.5, "predicting", 3.2))
     'predicting  50 %, about 4 s left'
-    >>> progress_words(Step(0.5, "drawing the history", None, 60))
+    >>> progress_text(Step(0.5, "drawing the history", None, 60))
     'drawing the history  load step 30 of 60'
     """
     if step is None:

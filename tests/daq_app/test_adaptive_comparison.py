@@ -107,7 +107,7 @@ def test_a_session_that_was_cut_short_goes_on_with_the_comparison_its_answers_as
     for answers in (1, 7, 23):
         next_part = resumption(plan(ADAPTIVE, "S03", 3, forces=False), recording.events[: answered_at[answers - 1] + 2])
         assert isinstance(next_part.state, Mounting)
-        assert next_part.state.place.trial == recording.trials[2 * answers].trial
+        assert next_part.state.position.trial == recording.trials[2 * answers].trial
 
 
 def test_a_recording_of_a_later_kind_of_plan_is_not_read_by_a_program_that_would_not_follow_the_answers(recording):

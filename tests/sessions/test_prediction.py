@@ -10,7 +10,7 @@ from paper_friction import NORMAL_FORCE, PLAN, analysis, parameters, stroke
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
 from solver import Finger, Friction, Loading, Scene, SceneError, solve, solve_many
-from solver.response.fields import Sketch, place_of_least_stretch, stills, way_until
+from solver.response.fields import Sketch, path_until_failure, place_of_least_stretch, stills
 from solver.scene.published import SLIPPERINESS, STICKINESS
 
 
@@ -69,7 +69,7 @@ def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(
 def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(progress_calls):
     _, _, way = progress_calls[1][0]
     slippery = replace(way.scene, friction=Friction(3.0, None))
-    instants, why = way_until(slippery, way.finger)
+    instants, why = path_until_failure(slippery, way.finger)
     assert why is not None
     assert "mm" in str(why)
     times = [instant.time for instant in instants]

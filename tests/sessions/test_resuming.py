@@ -38,7 +38,7 @@ def log_of(walk):
         if any(isinstance(command, Refuse) for command in commands):
             lines.append(("refused", None, {"event": kind_of(type(event)), "sentence": ""}))
             continue
-        trial = None if not hasattr(before, "place") else before.place.trial.number
+        trial = None if not hasattr(before, "position") else before.position.trial.number
         lines.append((kind_of(type(event)), trial, msgspec.structs.asdict(event)))
         lines += [line for line in map(line_of, commands) if line is not None]
     return plan, [LoggedEvent(i, i, kind, trial, 0, data) for i, (kind, trial, data) in enumerate(lines, 1)]
