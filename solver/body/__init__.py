@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, Indices, Narrow, inverse
 from solver.constitutive import Elasticity, LocalState
-from solver.mesh import Q2P1, Mesh, distinct
+from solver.mesh import Q2P1, Mesh, distinct, integrals
 
 UNHELD = 1e14  # product of the largest entries of stiffness and compliance, from which the body counts as loose [-]
 
@@ -250,8 +250,7 @@ class Endings:
         return total / self.areas[wide]
 
 
-VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
-_XI, _ETA = np.ascontiguousarray(np.moveaxis(_SLOPES, 2, 0))  # derivatives by the local coordinates, (9, 9) each
+VALUES = Q2P1.shape(Q2P1.points)[0]  # (9 points, 9 nodes)
 
 
 class Places(NamedTuple):
@@ -279,7 +278,7 @@ class MeshElements:
 
     @classmethod
     def of(cls, mesh: Mesh, materials: Sequence[Elasticity]) -> Self:
-        """Integrate the elements of `mesh` with `materials` by region. Raises LinAlgError for a folded element."""
+        """Integrate the elements of `mesh` with `materials` by region. Raises MeshError for a folded element."""
         return cls(*integrate_elements(mesh, materials, np.full((len(mesh.elements), 16), -1, np.int32)))
 
     def volume_modes(self, volume: Array, element: Indices | slice = slice(None)) -> Array:
@@ -325,42 +324,18 @@ class MeshElements:
         return (self.combination[probes.element] @ probes.modes[:, :, None])[:, :, 0]
 
 
-@lru_cache(maxsize=4)  # consecutive bodies often share a mesh and differ in materials
-def _geometry(mesh: Mesh) -> tuple[Array, ...]:
-    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`.
-
-    The modes are 1, x, y about the centre, made orthonormal by the Cholesky factor of their mass matrix.
-    """
-    x, y = np.moveaxis(mesh.local(mesh.nodes), 2, 0)  # (e, 9) each
-    x_xi, x_eta, y_xi, y_eta = x @ _XI.T, x @ _ETA.T, y @ _XI.T, y @ _ETA.T
-    det = x_xi * y_eta - x_eta * y_xi
-    if not det.min() > 0.0:
-        raise LinAlgError("an element is folded")
-    x_xi, x_eta, y_xi, y_eta = (slope[:, :, None] / det[:, :, None] for slope in (x_xi, x_eta, y_xi, y_eta))
-    grad_x, grad_y = y_eta * _XI - y_xi * _ETA, x_xi * _ETA - x_eta * _XI
-    weight = det * Q2P1.weights
-    points = np.stack([x @ VALUES.T, y @ VALUES.T], axis=2)
-    centre = points.mean(axis=1)
-    affine = np.concatenate([np.ones((*det.shape, 1)), points - centre[:, None]], axis=2)  # (e, q, 3)
-    wide = weight[:, :, None]
-    mass: Array = np.swapaxes(affine, 1, 2) @ (wide * affine)
-    combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
-    laplace = np.swapaxes(grad_x, 1, 2) @ (wide * grad_x) + np.swapaxes(grad_y, 1, 2) @ (wide * grad_y)
-    return grad_x, grad_y, weight, affine @ np.swapaxes(combination, 1, 2), laplace, centre, combination
-
-
 def integrate_elements(
     mesh: Mesh, materials: Sequence[Elasticity], unknown: Narrow
 ) -> tuple[Mesh, ElementArrays, Array, Array]:
     """Return the fields of `MeshElements`; `unknown` (e, 16) numbers the outer nodes' unknowns, -1 where fixed.
 
-    Raises LinAlgError where an element is folded.
+    Raises MeshError where an element is folded.
     """
     shear, lame, stiffening = (
         np.array(numbers, np.float64)[mesh.region]
         for numbers in zip(*((m.shear, m.lame, getattr(m, "stiffening", NEO_HOOKEAN)) for m in materials), strict=True)
     )
-    grad_x, grad_y, weight, modes, laplace, centre, combination = _geometry(mesh)
+    grad_x, grad_y, weight, modes, laplace, centre, combination = integrals(mesh)
     elements = ElementArrays(
         grad_x, grad_y, weight, modes, laplace, shear, stiffening, lame, mesh.elements.astype(np.int32),
         unknown.reshape(-1, 8, 2),

@@ -61,7 +61,7 @@ class LinearElimination:
     def __init__(self, mesh: Mesh, materials: Sequence[Elasticity]) -> None:
         """Assemble `mesh` with `materials` by region, and eliminate all unknowns but the skin's.
 
-        Raises LinAlgError where an element is folded, or the stiffness inside is not positive definite.
+        Raises MeshError where an element is folded, LinAlgError where the stiffness inside is not positive definite.
         """
         plan = symbolic_factorization(mesh)
         self.elastic = Elastic(*integrate_elements(mesh, materials, plan.unknown))

@@ -4,7 +4,7 @@ Any mesh can be refined by halves: each element is divided in four by its own qu
 """
 
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import TypeVar
 
@@ -196,6 +196,29 @@ def jacobians(mesh: Mesh, points: Array) -> tuple[Array, Array]:
         worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]
         raise MeshError(f"an element of the mesh is folded, near x = {worst[0]:.3g}, y = {worst[1]:.3g} mm")
     return jacobian, det
+
+
+@lru_cache(maxsize=4)  # consecutive bodies often share a mesh and differ in materials
+def integrals(mesh: Mesh) -> tuple[Array, ...]:
+    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`.
+
+    The first five are as in `arrays.ElementArrays`. The centre (e, 2) and combination (e, 3, 3) are of the modes,
+    which are 1, x, y about the centre, made orthonormal by the Cholesky factor of their mass matrix. Raises MeshError
+    where an element is folded.
+    """
+    jacobian, det = jacobians(mesh, Q2P1.points)
+    values, slopes = Q2P1.shape(Q2P1.points)
+    by_local = inverse(jacobian)[..., None]  # (e, q, 2, 2, 1) derivatives of the local coordinates by x and y
+    xi, eta = np.ascontiguousarray(np.moveaxis(slopes, 2, 0))  # (9, 9) each
+    grad_x, grad_y = (by_local[:, :, 0, k] * xi + by_local[:, :, 1, k] * eta for k in (0, 1))
+    points = values @ mesh.local(mesh.nodes)
+    weight, centre = det * Q2P1.weights, points.mean(axis=1)
+    affine = np.concatenate([np.ones((*det.shape, 1)), points - centre[:, None]], axis=2)  # (e, q, 3)
+    weights = weight[:, :, None]
+    mass: Array = np.swapaxes(affine, 1, 2) @ (weights * affine)
+    combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
+    laplace = np.swapaxes(grad_x, 1, 2) @ (weights * grad_x) + np.swapaxes(grad_y, 1, 2) @ (weights * grad_y)
+    return grad_x, grad_y, weight, affine @ np.swapaxes(combination, 1, 2), laplace, centre, combination
 
 
 def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
