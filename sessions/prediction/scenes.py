@@ -277,9 +277,8 @@ def predict(
     rows = [row for row, _ in inputs]
     scene_of_row = {n: scene for n, (_, scene) in enumerate(inputs) if scene is not None}
     report: Watch = watch or (lambda _number, _row, _path: None)
-    for number, row in enumerate(rows):
-        if number not in scene_of_row:
-            report(number, row, None)
+    for number in (n for n in range(len(rows)) if n not in scene_of_row):
+        report(number, rows[number], None)
     order = sorted(scene_of_row, key=lambda n: (n != first, n))
     scenes = [scene_of_row[n] for n in order]
     is_small = options.kinematics == "small"  # a depth is matched on its finger: finite strain would put it elsewhere
@@ -301,7 +300,7 @@ def predict(
         elif 2 * position in answers:
             report(order[position], fill_row(position), solutions.get(position))
 
-    pairs = [model_input for scene in scenes for model_input in (scene, quick(opposite(scene)))]
+    pairs = [variant for scene in scenes for variant in (scene, quick(opposite(scene)))]
     answers |= dict(enumerate(solve_many(pairs, progress, take_answer if watch else None)))
     for position, number in enumerate(order):
         rows[number] = fill_row(position)

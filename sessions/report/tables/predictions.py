@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval, Variant
@@ -58,21 +59,20 @@ _UNDER_RATES = "Under each number: the 95 % interval that friction's uncertainty
 _SED_ALONE = "the uncertainty of friction goes through to the SED alone"
 
 
-def _cell(
-    value: float | None,
-    error: float | None,
-    reason: str | None,
-    interval: Ends | None,
-    without: str | None,
-    doubt: str,
-    as_text: Format,
-    least: int,
-    unit: float = 1.0,
-) -> Cell:
-    """Return a number ± its relative error, over the interval that friction makes, or why it has none.
+class _Estimate(NamedTuple):
+    """A number of the model with its relative error and the interval from the uncertainty of friction."""
 
-    In doubt whether a finger can be in its state it has neither, for they would speak for it.
-    """
+    value: float | None
+    error: float | None
+    reason: str | None  # why there is no number
+    interval: Ends | None
+    without: str | None  # why there is no interval
+    doubt: str  # why no finger may be in that state, else ""
+
+
+def _cell(estimate: _Estimate, as_text: Format, least: int, unit: float = 1.0) -> Cell:
+    """Return a number ± its error, over its interval. A doubtful number has neither, since they would support it."""
+    value, error, reason, interval, without, doubt = estimate
     if doubt and value is not None:
         return estimate_cell(value, as_text, None, None, doubt)
 
@@ -86,7 +86,7 @@ def _sed(
     value: float | None, error: float | None, reason: str | None, interval: SedInterval | None, doubt: str
 ) -> Cell:
     """Return an SED in kPa; an interval for which draws were solved is marked with a star."""
-    cell = _cell(value, error, reason, *_limits(interval), doubt, sed, 3, 1e3)
+    cell = _cell(_Estimate(value, error, reason, *_limits(interval), doubt), sed, 3, 1e3)
     star = cell.interval and interval is not None and interval.method == "sampling"
     return replace(cell, interval=f"{cell.interval}*") if star else cell
 
@@ -155,7 +155,8 @@ def variant_forces_table(report: Report) -> Table | None:
         intervals = alternative.interval
         interval = intervals and (intervals.indentation if pressed else intervals.normal_force)
         without = intervals and intervals.reason
-        return _cell(value, error, alternative.reason, interval, without, alternative.doubt, places(2), 2)
+        estimate = _Estimate(value, error, alternative.reason, interval, without, alternative.doubt)
+        return _cell(estimate, places(2), 2)
 
     units = {variant.conditions: "mm" if variant.driven == "force" else "N" for variant in _variants(report)}
     columns = " | ".join(f"({n}) [{unit}]" for n, unit in enumerate(units.values(), 1))
@@ -197,7 +198,7 @@ def force_table(report: Report) -> Table | None:
         def cell(name: str, error: float | None, interval: Ends | None, without: str | None, decimals: int = 2) -> Cell:
             doubt, reason = prediction.doubt if name in _OF_STATE else "", prediction.reasons.get(name)
             value: float | None = getattr(prediction, name)
-            return _cell(value, error, reason, interval, without, doubt, places(decimals), decimals)
+            return _cell(_Estimate(value, error, reason, interval, without, doubt), places(decimals), decimals)
 
         matching_interval = prediction.matching_depth_interval
         return (
