@@ -80,7 +80,7 @@ def main() -> int:
 
 
 def typed_code() -> str:
-    """Return a digest of all that the types depend on: the code, its settings, and what is installed beside it."""
+    """Return a digest of the code, its settings and the versions of installed packages, which determine the types."""
     digest = hashlib.sha256()
     for path in [ROOT / "pyproject.toml", *(path for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py")))]:
         digest.update(f"{path.relative_to(ROOT)}\n".encode() + path.read_bytes())

@@ -126,13 +126,9 @@ def test_predict_gives_a_row_a_trial_and_every_number_comes_out_again_in_another
         assert row["measured_normal"] > 0
         assert len(row["alternatives"]) == 4
     # Sets and the like come in another order under another seed of hashes.
-    other = subprocess.run(
-        [sys.executable, "-m", "daq_app", "verify", str(small), "--json"],
-        capture_output=True,
-        env={**os.environ, "PYTHONHASHSEED": "1"},
-        cwd=ROOT,
-        check=False,
-    )
+    command = [sys.executable, "-m", "daq_app", "verify", str(small), "--json"]
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    other = subprocess.run(command, capture_output=True, env=environment, cwd=ROOT, check=False)
     assert json.loads(other.stdout)["checked"] == ["files", "analysis.json", "prediction.json"]
     assert json.loads(other.stdout)["problems"] == []
     assert other.returncode == 0

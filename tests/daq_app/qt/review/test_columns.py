@@ -59,12 +59,10 @@ def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_amo
     responses.setCurrentText("pressure [kPa]")
     responses.activated.emit(responses.currentIndex())
     table = rows(window.state)
-    assert [point.response for point in points(window.state)] == pytest.approx(
-        [1e3 * pressures[table[point.row].stroke.number] for point in points(window.state)]
-    )
-    assert sorted(spot.pos().y() for spot in window.trials.points.points()) == sorted(
-        point.response for point in points(window.state)
-    )
+    values = [point.response for point in points(window.state)]
+    expected = [1e3 * pressures[table[point.row].stroke.number] for point in points(window.state)]
+    assert values == pytest.approx(expected)
+    assert sorted(spot.pos().y() for spot in window.trials.points.points()) == sorted(values)
     row = next(at for at, line in enumerate(table) if line.stroke is not None and line.stroke.number in pressures)
     window.take(m.Choose(row))
     text = f"{abs(1e3 * pressures[table[row].stroke.number]):.3f}"
@@ -102,9 +100,8 @@ def test_a_click_on_the_head_sorts_by_value_and_a_line_still_chooses_its_trial(w
 def test_ctrl_c_copies_the_selected_range_as_tab_separated_values(window):
     table = window.stroke.friction
     model = table.model()
-    table.selectionModel().select(
-        QItemSelection(model.index(0, 1), model.index(1, 2)), QItemSelectionModel.SelectionFlag.ClearAndSelect
-    )
+    cells, how = QItemSelection(model.index(0, 1), model.index(1, 2)), QItemSelectionModel.SelectionFlag.ClearAndSelect
+    table.selectionModel().select(cells, how)
     QTest.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     first, second = texts(table)[:2]
     assert QGuiApplication.clipboard().text() == f"{first[1]}\t{first[2]}\n{second[1]}\t{second[2]}"
@@ -374,15 +371,8 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         window.resize(*size)
         application.processEvents()
         assert (window.width(), window.height()) == size
-        parts = (
-            window.lineage,
-            *window._panels,
-            window.progress,
-            window.stop,
-            window.go_on,
-            window.report,
-            window.export,
-        )
+        buttons = (window.stop, window.go_on, window.report, window.export)
+        parts = (window.lineage, *window._panels, window.progress, *buttons)
         assert laid_over(window, parts) == []
         window.take(m.Step(0.5, "working"))
         application.processEvents()
