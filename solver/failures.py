@@ -64,6 +64,22 @@ class NotConverged(SolveFailure):
     kind = "not_converged"
 
 
+class CutFolds(NotConverged):
+    """Tissue beside the free cut folds, so that finer meshes come to other folds and no error is known."""
+
+
+def cut_folds(least: float, folds: float) -> CutFolds:
+    """Return the failure where tissue is squeezed to `least` of its length, and a free face folds at `folds` [-].
+
+    >>> str(cut_folds(0.31, 0.54))[:88]
+    'tissue beside the free cut folds (it is squeezed to 31 % of its length, and a free face '
+    """
+    return CutFolds(
+        f"tissue beside the free cut folds (it is squeezed to {100 * least:.0f} % of its length, and a free face folds "
+        f'at {100 * folds:.0f} %): ask for finger.cut = "driven", a longer shaft, or less depth or friction'
+    )
+
+
 class ContactLost(NotConverged):
     """No set of contact states without contradiction was found; the message says what was tried."""
 

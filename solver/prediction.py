@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.arrays import Array, Indices
+from solver.failures import SolveFailure
 from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import NAMES, QUANTITIES, SED
@@ -84,6 +85,7 @@ class NestedNumbers:
     of_edges: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_of_edges: Array  # (m, r) its changes likewise
+    order: float  # of convergence, which their errors assume
     shares: Array | None = None  # (a + b,) of the SED's error in each column and row of the mesh, where it is too large
 
 
@@ -121,7 +123,8 @@ class Prediction:
     indentation_error: float | None = None  # likewise of indentation; None where that was given
     shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
-    nested: NestedNumbers | None = None  # on the nested mesh, for the error estimates; None without a state there
+    nested: NestedNumbers | None = None  # on the nested mesh, for the error estimates; None where errors are unknown
+    unknown: SolveFailure | None = None  # why they are; None where errors are known
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 
     @property
@@ -136,7 +139,7 @@ class Prediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints: plain numbers, lists and strings."""
-        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("history", "nested")}
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("history", "nested", "unknown")}
         plain: dict[str, Any] = {k: value for k, value in values.items() if isinstance(value, int | float | None)}
         if self.nested is None:  # errors are unknown
             plain |= {name: None for name in plain if name == "error_estimate" or name.endswith("_error")}

@@ -10,7 +10,6 @@ from typing import NamedTuple
 from sessions.plan.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
 from sessions.prediction.stored import (
-    ERROR_NOT_KNOWN,
     SessionPrediction,
     TrialPrediction,
     Variant,
@@ -350,8 +349,8 @@ def _fill_row(
     if isinstance(answer, SolveFailure):
         reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(answer))
         return replace(row, reasons=reasons)
-    if answer.nested is None:
-        reasons["error_estimate"] = ERROR_NOT_KNOWN
+    if answer.unknown is not None:
+        reasons["error_estimate"] = f"The error is not known, since {answer.unknown}."
     return replace(
         row,
         **settled_numbers(answer),

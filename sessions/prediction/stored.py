@@ -118,11 +118,10 @@ _PARTS = ("stimulus", *_OPTIONAL)
 
 # Options as they were called until 2026-11-26, and what they are called now. Documents hold both names for one release.
 _PRESENT_NAMES = {"beside": "variants", "beside_intervals": "variant_intervals"}
-ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
 
 
 def known_error(prediction: Prediction, error: float | None) -> float | None:
-    """Return a relative error of a prediction [-], or None where its nested mesh has no such state to compare with."""
+    """Return a relative error of a prediction [-], or None where it is unknown."""
     return None if prediction.nested is None else error
 
 

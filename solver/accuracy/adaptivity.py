@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from solver._kernels.compiling import OPEN, SLIP, STICK
-from solver.accuracy.error_estimate import FROM_EDGES, PARTS, NestedState, Steps, errors, from_halving, order_of
+from solver.accuracy.convergence_order import from_halving
+from solver.accuracy.error_estimate import FROM_EDGES, PARTS, NestedState, Steps, errors
 from solver.arrays import Array, Indices
 from solver.body import Patches
 from solver.body.linear import Elastic
@@ -28,6 +29,7 @@ from solver.constitutive import Moduli
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger, settled_moduli
 from solver.equilibrium.load_path import end
+from solver.failures import NotConverged
 from solver.mesh import ALONG, OUT, Lines, line
 from solver.mesh.mesher import FINEST, FingerMesh
 from solver.prediction import NestedNumbers
@@ -124,11 +126,15 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     return recover((free + compliance[:, forces] @ reactions).reshape(-1, 2))
 
 
-def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Steps | None) -> NestedNumbers:
+def with_shares(
+    scene: Scene, numbers: Array, on_nested: NestedState | NotConverged, steps: Steps | None
+) -> NestedNumbers | NotConverged:
     """Return the numbers of a nested state, with the shares of columns and rows where a finer mesh may be needed.
 
-    `numbers` (COUNT,) are the scene's on the mesh of the answer.
+    `numbers` (COUNT,) are the scene's on the mesh of the answer. A failure is returned as it is.
     """
+    if isinstance(on_nested, NotConverged):
+        return on_nested
     nested, finger, state = on_nested
     target = scene.solve.target
     misses_tolerance = target is not None and errors(scene, numbers, nested, steps).sed > target
@@ -136,7 +142,7 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
         return nested
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
     change = abs(float(nested.numbers[0] - numbers[0]))
-    parts *= from_halving(order_of(scene)) * change / max(float(parts.sum()), np.finfo(float).tiny)
+    parts *= from_halving(nested.order) * change / max(float(parts.sum()), np.finfo(float).tiny)
     edge = np.flatnonzero(np.diff(state.state))  # node before each edge of contact
     middle = (finger.arcs[edge] + finger.arcs[edge + 1]) / 2.0
     columns = np.searchsorted(finger.geometry.lines.arcs, middle) - 1

@@ -18,29 +18,24 @@ changes are added as squares.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import combinations, pairwise
+from itertools import combinations
 from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
+from solver.accuracy.convergence_order import ORDER, from_halving, order_of
 from solver.arrays import Array
 from solver.body import Patches
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
-from solver.equilibrium.finger import Finger, settled_moduli
+from solver.equilibrium.finger import Finger
+from solver.failures import NotConverged
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
 from solver.scene import Scene
-from solver.scene.tables import TISSUES, USUAL_TOLERANCE, Materials
+from solver.scene.tables import USUAL_TOLERANCE
 
-# Power of the element size with which errors fall: beneath a contact, and at a corner. Displacements at a straight or
-# convex corner of held and free tissue follow r^a, with a of 1/2 or more (Williams 1952, J. Appl. Mech. 19, 526), and
-# energies err by the power 2 a.
-ORDER, CORNER_ORDER = 2.0, 1.0
-# Largest ratio of stiffnesses of neighbouring tissues in the trials in which errors fall with the square [-].
-SECOND_ORDER = {"small": 100.0, "finite": 6.0}
 # Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
 # about the true place, at most half a node away; the width depends on it linearly.
 FROM_EDGES, WIDTH_FROM_EDGES = 1.0 / 3.0, 0.5
@@ -55,22 +50,6 @@ def half_width(change: Array, edges: Array, order: float = ORDER, part: Array | 
     Errors fall with the power `order` of the element size.
     """
     return from_halving(order) * np.abs(change) + part * edges.sum(axis=0)
-
-
-def from_halving(order: float) -> float:
-    """Return the error of a number on a mesh by what halving its elements changes, the sum of a geometric series."""
-    return 1.0 / (1.0 - 2.0**-order)
-
-
-def order_of(scene: Scene) -> float:
-    """Return the order of convergence that an estimate assumes for a scene.
-
-    It is that of corners where stiff skin carries the drag to the corner of bone and cut: beyond the stiffnesses for
-    which trials show second order, and where skin stiffens as it stretches.
-    """
-    kind = scene.solve.kinematics
-    stiffens = kind == "finite" and any(tissue.law == "ogden" for tissue in scene.materials.by_region)
-    return CORNER_ORDER if stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[kind] else ORDER
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -156,6 +135,9 @@ def edge_changes(
     ]
 
 
+NO_NESTED_STATE = NotConverged("the nested mesh has no such state: ask for less friction or depth")
+
+
 class NestedState(NamedTuple):
     """A scene on its nested mesh."""
 
@@ -166,16 +148,21 @@ class NestedState(NamedTuple):
 
 def nested_state(
     finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None
-) -> NestedState | None:
+) -> NestedState | NotConverged:
     """Return a state of the nested mesh with its numbers, from `values` (COUNT + r,) and `changes` (m, COUNT + r).
 
-    `steps` are its load steps where it depends on its load path. None where no equilibrium exists with an edge moved,
-    as at a friction limit.
+    `steps` are its load steps where it depends on its load path. Returns why errors are unknown where they are: where
+    the free cut folds, or where no equilibrium exists with an edge moved, as at a friction limit.
     """
     if np.isinf(changes).any():
-        return None
+        return NO_NESTED_STATE
+    try:
+        order = order_of(finger, state)
+    except NotConverged as failure:
+        return failure
     numbers = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    return NestedState(NestedNumbers(numbers, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:]), finger, state)
+    nested = NestedNumbers(numbers, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:], order)
+    return NestedState(nested, finger, state)
 
 
 def _move_edges(
@@ -227,7 +214,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     if nested is None:
         return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     change = nested.numbers - numbers
-    error = half_width(change, nested.of_edges, order_of(scene), _PARTS_OF_EDGES)
+    error = half_width(change, nested.of_edges, nested.order, _PARTS_OF_EDGES)
     if steps is not None:
         error += steps.error
     relative = error / np.maximum(np.abs(numbers), np.finfo(float).tiny)
@@ -245,11 +232,11 @@ def responses(numbers: Array, errors: Errors) -> dict[str, Response]:
     return {name: Response(value, error) for name, value, error in pairs}
 
 
-def row_errors(scene: Scene, row: Array, nested: NestedNumbers | None) -> Array:
+def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the errors of the SED of a row of receptors `row` (r,), relative (r,); nan where nothing is known."""
     if nested is None:
         return np.full(len(row), np.nan)
-    error = half_width(nested.row - row, nested.row_of_edges, order_of(scene))
+    error = half_width(nested.row - row, nested.row_of_edges, nested.order)
     return error / np.maximum(row, np.finfo(float).tiny)
 
 
@@ -263,33 +250,6 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
         indentation=estimates.indentation if by_force else None,
         shift=estimates.shift if by_drag else None,
     )
-
-
-_ROUND_OFF = 1e-12  # relative, of a stiffness
-TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
-
-
-def stiffness_warning(scene: Scene) -> str:
-    """Return a warning where neighbouring tissues differ more in stiffness than in trials of the estimates, else "".
-
-    Tissues are relaxed, as in the answer.
-    """
-    ratio, stiff, soft = _stiffness_ratio(scene.materials)
-    if ratio <= TRIED_RATIO:
-        return ""
-    return (
-        f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials up "
-        f"to {TRIED_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
-    )
-
-
-@lru_cache(maxsize=32)
-def _stiffness_ratio(materials: Materials) -> tuple[float, str, str]:
-    """Return the largest ratio of stiffnesses of neighbouring tissues without its round-off, the stiffer and softer."""
-    stiffness = {name: moduli.engineering[0] for name, moduli in zip(TISSUES, settled_moduli(materials), strict=True)}
-    pairs = [pair for outer, inner in pairwise(TISSUES[:-1]) for pair in ((outer, inner), (inner, outer))]
-    ratio, stiff, soft = max((stiffness[a] / stiffness[b], a, b) for a, b in pairs)
-    return ratio * (1.0 - _ROUND_OFF), stiff, soft
 
 
 COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of all numbers
@@ -333,7 +293,7 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     edges = np.array([np.linalg.norm(nested.of_edges[:, :count], axis=0) for _, nested in with_estimate])
     pairs = np.array(list(combinations(range(len(with_estimate)), 2))).T
     apart = change[pairs[0]] - change[pairs[1]]
-    order = order_of(with_estimate[0][0].scene)  # all have the same tissues
+    order = min(nested.order for _, nested in with_estimate)
     worst = half_width(apart, np.hypot(edges[pairs[0]], edges[pairs[1]])[None], order)
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(

@@ -16,7 +16,7 @@ from solver.contact import STATE_NAMES
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, LoadPath
-from solver.failures import SolveFailure
+from solver.failures import NotConverged, SolveFailure
 from solver.mesh import Lines
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
 from solver.progress import Progress
@@ -52,7 +52,7 @@ def prediction(
     finger: Finger[Patches],
     numbers: Array,
     row: Array,
-    nested: NestedNumbers | None,
+    nested: NestedNumbers | NotConverged,
     estimate_s: float,
 ) -> Prediction:
     """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
@@ -62,7 +62,9 @@ def prediction(
     entry = model(driven, finger, state, solution.displacement, width)
     has_shift = scene.loading.dragged and state.load.path_dependent  # the shift of a sliding finger is arbitrary
     numbers[4] = shift if has_shift else 0.0
-    estimates = errors(scene, numbers, nested, solution.steps)
+    unknown = nested if isinstance(nested, NotConverged) else None
+    nested_numbers = None if isinstance(nested, NotConverged) else nested
+    estimates = errors(scene, numbers, nested_numbers, solution.steps)
     return Prediction(
         scene=scene,
         sed_ending=sed,
@@ -79,14 +81,15 @@ def prediction(
         indentation_error=estimates.indentation,
         shift_error=estimates.shift if has_shift else None,
         contact_width_error=estimates.width,
-        nested=nested,
+        nested=nested_numbers,
+        unknown=unknown,
         sed_point_error=estimates.point,
         dofs=finger.body.mesh.dofs,
         newton_iterations=state.iterations,
         wall_s=solution.wall_s,
         setup_s=solution.setup_s,
         estimate_s=estimate_s,
-        row=Row(ROW, row, row_errors(scene, row, nested)),
+        row=Row(ROW, row, row_errors(row, nested_numbers)),
         responses=responses(numbers, estimates),
         model=entry,
         audits=solution.audits,

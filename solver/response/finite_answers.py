@@ -5,18 +5,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 
-import numpy as np
-
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
-from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state
+from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation import folds_at
-from solver.continuation.existence import PROOF, doubts, is_folded, refuse_far_beyond, sound
+from solver.continuation.existence import doubts, is_folded, refuse_far_beyond, sound
 from solver.continuation.finite_states import nearby, roughly, settled_state
 from solver.continuation.small_states import within_reach
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
-from solver.equilibrium.finger import FiniteFinger, finite_laws
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.relaxation import CondensedRelaxing
@@ -196,8 +193,8 @@ def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes
 
 def solve_nested(
     scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
-) -> tuple[NestedState | None, Steps | None]:
-    """Return the state of a scene on the nested mesh of `top`, None where none exists there, and its load steps.
+) -> tuple[NestedState | NotConverged, Steps | None]:
+    """Return the state of a scene on the nested mesh of `top`, or why it tells no error, and its load steps.
 
     `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
     """
@@ -213,33 +210,10 @@ def solve_nested(
             steps = None
             state = nearby(finger, scene, start.state) or settled_state(finger, scene, start.state)
     except SolveFailure:
-        return None, steps
+        return NO_NESTED_STATE, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
     return nested_state(finger, state, values, changes, steps), steps
-
-
-CUT_FOLDS = "Error estimates may not hold: beside the free cut, tissue"  # the warning begins like this
-
-
-def _doubts_at_cut(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
-    """Return a warning where tissue beside the free cut is squeezed more than its free face can bear, else nothing.
-
-    A face folds there (Biot 1963, Appl. Sci. Res. A 12, 168), and finer meshes come to other folds.
-    """
-    scene, mesh, columns = finger.scene, finger.body.mesh, len(finger.geometry.lines.arcs) - 1
-    if scene.finger.cut != "free":
-        return ()
-    first_to_last = np.arange(len(mesh.elements)).reshape(columns, -1)
-    ends = first_to_last[[0, -1]].ravel()
-    F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[ends]
-    least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
-    place = int(least.argmin())
-    folds = folds_at(finite_laws(scene.materials)[mesh.region[ends[place]]]) if least[place] < PROOF.plain else 0.0
-    if least[place] >= folds:
-        return ()
-    clause = f"is squeezed to {100 * least[place]:.0f} % of its length, and a free face folds at {100 * folds:.0f} %"
-    return (f'{CUT_FOLDS} {clause}: ask for finger.cut = "driven", a longer shaft, or less depth or friction.',)
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]
@@ -304,11 +278,11 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     solved_at = perf_counter()
     report_progress("estimating errors, on the nested mesh")
     on_nested, steps = solve_nested(scene, top, steps, meshes)
-    nested_numbers = None if on_nested is None else with_shares(scene, numbers, on_nested, steps)
+    nested_numbers = with_shares(scene, numbers, on_nested, steps)
     row = finger.row.average(state.u)
     estimate_s = perf_counter() - solved_at
-    warnings, wall = doubts(finger, state) + _doubts_at_cut(finger, state), solved_at - start - setup
-    solution = replace(solution, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
+    wall = solved_at - start - setup
+    solution = replace(solution, steps=steps, warnings=doubts(finger, state), wall_s=wall, setup_s=setup)
     return prediction(solution, finger, numbers, row, nested_numbers, estimate_s)
 
 

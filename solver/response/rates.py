@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.error_estimate import PARTS, edge_changes, half_width, order_of
+from solver.accuracy.convergence_order import order_of
+from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
 from solver.equilibrium import EquilibriumState, ForceLoad
 from solver.equilibrium.finger import KINDS, Finger
@@ -105,12 +106,13 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     try:
         fewer = [course_numbers(history(scene, mesh, march_on(mesh, part))) for part in PARTS.tolist()]
         path = march_on(nested, float(PARTS[0]))
+        course = history(scene, nested, path)
+        ends = instants(course)
+        states = [path.instants[end - 1 - len(course.time)].state for end in ends]
+        order = min(order_of(nested, state) for state in states)
     except SolveFailure:
         return CourseNumbers(usual.value * np.nan, usual.rate * np.nan)
-    course = history(scene, nested, path)
     finer = course_numbers(course)
-    ends = instants(course)
-    states = [path.instants[end - 1 - len(course.time)].state for end in ends]
     edges = 0.0 * usual.value
     if not scene.materials.relax:
         edges += [_of_edges(scene, nested, state) for state in states]
@@ -124,7 +126,7 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
         by_steps = sum(
             abs(number - value) / (1.0 / part - 1.0) for number, part in zip(by_part, PARTS.tolist(), strict=True)
         )
-        return half_width(nested_value - by_part[0], changed_by_edges[None], order_of(scene)) + by_steps
+        return half_width(nested_value - by_part[0], changed_by_edges[None], order) + by_steps
 
     return CourseNumbers(error("value", edges), error("rate", rate_edges))
 

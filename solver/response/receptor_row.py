@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, half_width, order_of
+from solver.accuracy.convergence_order import order_of
+from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, half_width
 from solver.arrays import Array
 from solver.body import Patches
 from solver.body.finite import FiniteBody, FinitePatches
@@ -75,7 +76,7 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     if in_steps:
         state = end(scene, nested)
     (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], row_numbers(nested))
-    errors = half_width(finer - values.ravel(), edges, order_of(scene))
+    errors = half_width(finer - values.ravel(), edges, order_of(nested, state))
     if in_steps:
         usual, *fewer = row_numbers(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.target).bound

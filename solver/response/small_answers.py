@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
-from solver.accuracy.error_estimate import Steps, edge_changes, nested_state
+from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, remove_round_off
 from solver.equilibrium import EquilibriumState
@@ -183,8 +183,8 @@ def _remove_round_off(
 
 def nested_numbers_of_all(
     mesh: LinearFinger, solutions: Sequence[SceneSolution], numbers: Array
-) -> list[NestedNumbers | None]:
-    """Return the numbers of solved scenes on the nested `mesh`, None for a scene without a state there.
+) -> list[NestedNumbers | NotConverged]:
+    """Return the numbers of solved scenes on the nested `mesh`, or why a scene has none there.
 
     `numbers` (c, COUNT) are those on the mesh of the answers.
     """
@@ -194,13 +194,12 @@ def nested_numbers_of_all(
             states[number] = nearest(solution.scene, mesh) if solution.steps is None else end(solution.scene, mesh)
         except SolveFailure:
             continue
-    out: list[NestedNumbers | None] = [None] * len(solutions)
+    out: list[NestedNumbers | NotConverged] = [NO_NESTED_STATE] * len(solutions)
     if states:
         with_forces = [(state, forces_of(solutions[number].scene, state.load)) for number, state in states.items()]
         values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
             solution = solutions[number]
             on_nested = nested_state(mesh, state, value, change, solution.steps)
-            if on_nested is not None:
-                out[number] = with_shares(solution.scene, numbers[number], on_nested, solution.steps)
+            out[number] = with_shares(solution.scene, numbers[number], on_nested, solution.steps)
     return out

@@ -8,13 +8,14 @@ import numpy as np
 
 from solver._kernels.contact_system import STEEP
 from solver.accuracy.adaptivity import refine_lines
-from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error, stiffness_warning
+from solver.accuracy.convergence_order import stiffness_warning
+from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
 from solver.accuracy.residual_overstress import with_viscosity
 from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
-from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.failures import CutFolds, NoSteadyState, NotConverged, SolveFailure
 from solver.mesh import Lines
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction
@@ -28,10 +29,6 @@ LIMIT_ACCURACY = 0.03  # relative, of a friction limit
 USABLE_ESTIMATE = 0.1  # largest error estimate with which a coarser mesh's answer near a limit is still given
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance asked for."
-ERROR_UNKNOWN = (
-    "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
-)
-NOT_NESTED = NotConverged("The nested mesh has no such state.")
 # Of a mesh on which a scene without a state on the first is solved once more: 8 refuses the same of 316 scenes.
 LIMIT_FINENESS = 6.0
 FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
@@ -308,8 +305,8 @@ def _coarser_counts(coarser: Answer, failure: SolveFailure) -> bool:
 def _loss(answer: Answer, coarser: Answer | None) -> SolveFailure | None:
     """Return the failure for which the answer of the coarser mesh counts in place of this one, or None."""
     failure = answer if isinstance(answer, SolveFailure) else None
-    if isinstance(answer, Prediction) and answer.nested is None and _estimate(coarser) < 1.0:
-        failure = NOT_NESTED
+    if isinstance(answer, Prediction) and _estimate(coarser) < 1.0:
+        failure = answer.unknown
     return failure if failure is not None and coarser is not None and _coarser_counts(coarser, failure) else None
 
 
@@ -323,12 +320,14 @@ def _sentences(
 ) -> tuple[str, ...]:
     """Return the warnings of an answer from the finest mesh."""
     warnings: list[str] = []
-    if failure is not None:
+    if isinstance(failure, CutFolds):
+        warnings.append(f"This is a coarse mesh's answer, and its error estimate: on finer ones {failure}.")
+    elif failure is not None:
         warnings.append("A finer mesh did not find this state: this is the coarser one's, and its error estimate.")
         if failure.limit_mu is not None:
             warnings.append(NEAR_LIMIT.format(failure.limit_mu, 100.0 * LIMIT_ACCURACY))
-    if isinstance(answer, Prediction) and answer.nested is None:
-        warnings.append(ERROR_UNKNOWN)
+    if isinstance(answer, Prediction) and answer.unknown is not None:
+        warnings.append(f"How far this is off is not known, since {answer.unknown}.")
     elif error > 1.0 and isinstance(answer, Prediction) and answer.scene.solve.tolerance is not None:
         warnings.append(TOLERANCE_MISSED)
     if isinstance(answer, Prediction) and (doubt := stiffness_warning(answer.scene)):
@@ -360,11 +359,12 @@ def _errors(
 def _error_by_tolerance(answer: Answer, *, limits_known: bool) -> float:
     """Return an answer's error estimate by the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
 
-    A refusal counts as unknown unless `limits_known`: unless its mesh gives limits to 3 %.
+    A refusal counts as unknown unless `limits_known`: unless its mesh gives limits to 3 %. Where the free cut folds,
+    the error is unknown on finer meshes too, and counts as 0.
     """
     if isinstance(answer, NoSteadyState) and not limits_known:
         return ASSUMED_ERROR
-    if not isinstance(answer, Prediction):
+    if not isinstance(answer, Prediction) or isinstance(answer.unknown, CutFolds):
         return 0.0
     if answer.nested is None:
         return ASSUMED_ERROR

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import stiffness_warning
+from solver.accuracy.convergence_order import stiffness_warning
 from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
-from solver.response.finite_answers import CUT_FOLDS
 from solver.response.solution import solve, solve_many
 from solver.scene.tables import Solve
 from solver.verification.fine_meshes import fine_numbers
@@ -138,7 +137,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
     """
     if answer.nested is None:
         return []
-    best, warned = answer.sed_ending_corrected, any(warning.startswith(CUT_FOLDS) for warning in answer.warnings)
+    best, warned = answer.sed_ending_corrected, bool(stiffness_warning(answer.scene))
     numbers = (  # place in the truth, value and estimate of each of `GOALS`
         (0, answer.sed_ending, answer.error_estimate),
         (0, best, answer.corrected_error),
@@ -156,7 +155,7 @@ def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.n
             better = abs(corrected_error), error * (error - corrected_error) > 0.0
         row = Estimate(
             answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
-            float(doubt[place]), *better, warned or bool(stiffness_warning(answer.scene)),
+            float(doubt[place]), *better, warned,
         )  # fmt: skip
         rows.append(row)
     return rows

@@ -10,6 +10,7 @@ from paper_friction import NORMAL_FORCE, PLAN, analysis, parameters, stroke
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
 from solver import Finger, Friction, Loading, Scene, SceneError, solve, solve_many
+from solver.accuracy.error_estimate import NO_NESTED_STATE
 from solver.response.fields import Sketch, path_until_failure, place_of_least_stretch, stills
 from solver.scene.published import SLIPPERINESS, STICKINESS
 
@@ -228,7 +229,9 @@ def test_the_subjects_own_finger_and_angle_are_predicted_unless_another_finger_i
 
 def test_where_the_nested_mesh_has_no_such_state_the_error_is_not_known_and_its_reason_says_so(tables, monkeypatch):
     def bounded_by_nothing(scenes, *rest, **options):
-        return [replace(answer, nested=None) for answer in solve_many(scenes, *rest, **options)]
+        return [
+            replace(answer, nested=None, unknown=NO_NESTED_STATE) for answer in solve_many(scenes, *rest, **options)
+        ]
 
     monkeypatch.setattr("sessions.prediction.scenes.solve_many", bounded_by_nothing)
     row = predict(beginning(tables, 1), PLAN, PredictionOptions(course="steady")).trials[0]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve, solve
-from solver.accuracy.error_estimate import errors, stiffness_warning
+from solver.accuracy.convergence_order import stiffness_warning
+from solver.accuracy.error_estimate import errors
 from solver.continuation.small_states import expected_depth, nearest, settled_state
 from solver.equilibrium import EQUILIBRIUM
 from solver.equilibrium.finger import LinearFinger
@@ -84,7 +85,7 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     sliding = Scene(friction=Friction(0.3), loading=Loading(1.0))
     truth, error = np.ones(COUNT), 0.04
     zeros, edges = np.zeros((1, COUNT)), np.full((2, COUNT), 0.005)
-    nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros)
+    nested = NestedNumbers(truth * (1.0 + error / 4.0), zeros, zeros, zeros, 2.0)
     estimate = errors(sliding, truth * (1.0 + error), nested, None)
     assert estimate.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
     assert estimate.corrected == pytest.approx(error / 4.0 / (1.0 + error / 4.0), rel=1e-12)

@@ -178,7 +178,7 @@ def _print_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Co
         console.say(f"\n{title}")
         console.say(table(lines, header=["", "press", "break-away", "slide", ""]).lstrip("\n"))
     if not isfinite(errors.value[0, 0]):
-        console.say("Their errors are not known: the nested mesh has no such course.")
+        console.say("Their errors are not known: the nested mesh has no such course, or its free cut folds.")
 
 
 def _plain(table: "Array") -> list[list[float | None]]:

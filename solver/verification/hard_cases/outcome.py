@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
-from solver.response.solution import ERROR_UNKNOWN, solve_many
+from solver.response.solution import solve_many
 from solver.scene import Scene
 
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # audits of balance
@@ -51,7 +51,7 @@ def _of_answer(answer: Prediction) -> Outcome:
         flaws.append("smallest_det_F")
     if not answer.sed_ending > 0.0:
         flaws.append("sed_ending")
-    if not 0.0 < answer.error_estimate < _NOTHING and ERROR_UNKNOWN not in answer.warnings:
+    if not 0.0 < answer.error_estimate < _NOTHING and answer.unknown is None:
         flaws.append("error_estimate")
     numbers = (answer.sed_ending, answer.sed_point, answer.normal_force, answer.tangential_force, answer.error_estimate)
     balance = max(checks[name] for name in BALANCE if name in checks)

@@ -1,0 +1,99 @@
+"""The power of the element size with which the errors of a scene fall, and where there is none.
+
+Errors of quadratic elements beneath a contact fall at least with the square of the element size. At a straight or
+convex corner of held and free tissue displacements follow r^a, with a of 1/2 or more (Williams 1952, J. Appl. Mech. 19,
+526), and energies err by the power 2 a. Such a corner lies where bone meets the free cut.
+
+At finite strain that corner is squeezed further on each finer mesh. A free face folds where it is squeezed along itself
+below a certain stretch (Biot 1963, Appl. Sci. Res. A 12, 168). Where one element alone falls below it, the mesh does
+not resolve a fold: the corner counts. Where more do, the cut folds. Nothing sets the size of such folds, so that finer
+meshes come to others, and no error is known.
+"""
+
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from solver.arrays import Array
+from solver.continuation import folds_at
+from solver.equilibrium import EquilibriumState
+from solver.equilibrium.finger import Finger, FiniteFinger, finite_laws, settled_moduli
+from solver.failures import cut_folds
+from solver.scene import Scene
+from solver.scene.tables import TISSUES, Materials
+
+ORDER, CORNER_ORDER = 2.0, 1.0  # beneath a contact, and at a corner
+# Largest ratio of stiffnesses of neighbouring tissues in the trials in which errors fall with the square [-].
+SECOND_ORDER = {"small": 100.0, "finite": 6.0}
+
+
+def from_halving(order: float) -> float:
+    """Return the error of a number on a mesh by what halving its elements changes, the sum of a geometric series."""
+    return 1.0 / (1.0 - 2.0**-order)
+
+
+def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
+    """Return the order of convergence that an estimate assumes, from the `state` on its nested mesh.
+
+    It is that of corners where tissue is squeezed at one, where neighbouring tissues differ in stiffness by more than
+    in trials that show second order, and where skin stiffens as it stretches. Raises CutFolds.
+    """
+    scene = finger.scene
+    squeezed = _check_cut(finger, state) if isinstance(finger, FiniteFinger) and scene.finger.cut == "free" else False
+    kind = scene.solve.kinematics
+    stiffens = kind == "finite" and any(tissue.law == "ogden" for tissue in scene.materials.by_region)
+    at_corner = squeezed or stiffens or _stiffness_ratio(scene.materials)[0] > SECOND_ORDER[kind]
+    return CORNER_ORDER if at_corner else ORDER
+
+
+def _check_cut(finger: FiniteFinger, state: EquilibriumState) -> bool:
+    """Return whether an element beside the free cut of a nested mesh is squeezed below the stretch at which faces fold.
+
+    Raises CutFolds where more than one is, at one end.
+    """
+    mesh = finger.body.mesh
+    columns = np.arange(len(mesh.elements)).reshape(len(finger.geometry.arcs) - 1, -1)
+    outer = columns[[0, 1, -2, -1]].ravel()  # in the outer columns of the mesh that this one divides
+    F = finger.body.deformation(state.u).reshape(len(mesh.elements), -1, 2, 2)[outer]
+    least = np.linalg.svd(F, compute_uv=False)[..., -1].min(axis=1)
+    folds = _folding_stretches(finger.scene.materials)[mesh.region[outer]]
+    ends = (least < folds).reshape(2, -1).sum(axis=1)
+    if ends.max() > 1:
+        worst = int((least - folds).argmin())
+        raise cut_folds(float(least[worst]), float(folds[worst]))
+    return bool(ends.any())
+
+
+@lru_cache(maxsize=8)
+def _folding_stretches(materials: Materials) -> Array:
+    """Return the stretch at which a free face folds by region [-]."""
+    return np.array([folds_at(law) for law in finite_laws(materials)])
+
+
+_ROUND_OFF = 1e-12  # relative, of a stiffness
+TRIED_RATIO = 100.0  # largest ratio of stiffnesses of neighbouring tissues in the trials where estimates hold [-]
+
+
+def stiffness_warning(scene: Scene) -> str:
+    """Return a warning where neighbouring tissues differ more in stiffness than in trials of the estimates, else "".
+
+    Tissues are relaxed, as in the answer.
+    """
+    ratio, stiff, soft = _stiffness_ratio(scene.materials)
+    if ratio <= TRIED_RATIO:
+        return ""
+    return (
+        f"The {stiff} is {float(f'{ratio:.2g}'):,.0f} times as stiff as the {soft}. Error estimates hold in trials up "
+        f"to {TRIED_RATIO:.0f} times; beyond, errors of up to twice the estimate were seen."
+    )
+
+
+@lru_cache(maxsize=32)
+def _stiffness_ratio(materials: Materials) -> tuple[float, str, str]:
+    """Return the largest ratio of stiffnesses of neighbouring tissues without its round-off, the stiffer and softer."""
+    stiffness = {name: moduli.engineering[0] for name, moduli in zip(TISSUES, settled_moduli(materials), strict=True)}
+    pairs = [pair for outer, inner in pairwise(TISSUES[:-1]) for pair in ((outer, inner), (inner, outer))]
+    ratio, stiff, soft = max((stiffness[a] / stiffness[b], a, b) for a, b in pairs)
+    return ratio * (1.0 - _ROUND_OFF), stiff, soft
