@@ -28,7 +28,7 @@ from solver._kernels.active_set import SINGULAR
 from solver.accuracy.convergence_order import ORDER, from_halving, order_of
 from solver.arrays import Array
 from solver.body import Patches
-from solver.equilibrium import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
+from solver.equilibrium import EquilibriumState, ForceLoad, Newton
 from solver.equilibrium.finger import Finger
 from solver.failures import NotConverged
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
@@ -199,9 +199,7 @@ def _move_edge(
     start = replace(state, state=states, sense=senses)
     if newton.solve_contact(start, state.load, x, 0, forces) == SINGULAR:
         return None
-    deeper, along = newton.system.motion.tolist() if forces is not None else (0.0, 0.0)
-    load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
-    after = newton.apply_step(start, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    after = newton.correct(start, lambda _load: x)[0]
     return replace(after, state=states, sense=senses)  # the prescribed states, not those that would follow
 
 

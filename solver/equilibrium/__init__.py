@@ -1,11 +1,11 @@
 """One load step of a body: Newton's method, which updates displacements and contact states together.
 
 The states of the skin's nodes (open, stick, slip, shear-limited) change with every iteration by a primal-dual active
-set, without a penalty (Alart and Curnier 1991; Hüeber and Wohlmuth 2005). The pressure in the geometric stiffness is
-the linearised prediction of the iteration before (mixed integration points: Magisano, Leonetti and Garcea 2017). So a
-nearly incompressible body takes the whole depth in a step or two.
+set, without a penalty (Alart and Curnier 1991; Hüeber and Wohlmuth 2005). The geometric stiffness has the pressure that
+the last iteration predicts (Magisano, Leonetti and Garcea 2017). So nearly incompressible bodies need a step or two.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -65,9 +65,7 @@ class LoadState(NamedTuple):
     depth: float  # indentation: travel of the bone towards the surface [mm]
     mu: float  # [-]
     tau: float = np.inf  # traction bound [MPa]
-    sense: int = (
-        0  # +1, -1: the settled sliding state whose friction force on the skin points there; 0: sticks or slips
-    )
+    sense: int = 0  # of the friction force on the skin in settled sliding, +1 or -1; 0: it sticks or slips
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
 
     @property
@@ -85,11 +83,11 @@ class LoadState(NamedTuple):
         if part == 1.0:
             return target
         tau = self.tau + part * (target.tau - self.tau) if max(self.tau, target.tau) < np.inf else target.tau
-        depth, travel = (
-            self.depth + part * (target.depth - self.depth),
-            self.travel + part * (target.travel - self.travel),
+        depth, mu, travel = (
+            begin + part * (end - begin)
+            for begin, end in ((self.depth, target.depth), (self.mu, target.mu), (self.travel, target.travel))
         )
-        return LoadState(depth, self.mu + part * (target.mu - self.mu), tau, target.sense, travel)
+        return LoadState(depth, mu, tau, target.sense, travel)
 
     def validate(self) -> "LoadState":
         """Return a copy with floats, for the kernels. Raises ValueError for values that are not allowed."""
@@ -101,6 +99,7 @@ class LoadState(NamedTuple):
 
 
 _UNLOADED = LoadState(0.0, 0.0)
+Anchor = Callable[[LoadState], Array]  # positions along x (k,) at which nodes stick under a load [mm]
 
 
 class ForceLoad(NamedTuple):
@@ -117,12 +116,9 @@ class ForceLoad(NamedTuple):
 
     def towards(self, target: "ForceLoad", part: float) -> "ForceLoad":
         """Return the forces a `part` of the way to `target`, which gives the same quantities."""
-        tangential = target.tangential
-        if tangential is not None:
-            start = 0.0 if self.tangential is None else self.tangential
-            tangential = start + part * (tangential - start)
-        normal = self.normal + part * (target.normal - self.normal)
-        return ForceLoad(normal, tangential, self.travel + part * (target.travel - self.travel))
+        start, drag = self.tangential or 0.0, target.tangential
+        normal, travel = self.normal + part * (target.normal - self.normal), target.travel - self.travel
+        return ForceLoad(normal, None if drag is None else start + part * (drag - start), self.travel + part * travel)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,6 +143,11 @@ class EquilibriumState:
     def place(self, body: CondensedBody) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
         return body.place(self.u)
+
+    def anchor(self, body: CondensedBody) -> Anchor:
+        """Return where nodes stick in a step from this state: their places, moved with the surface."""
+        origin, travel = self.place(body)[:, 0].copy(), self.load.travel
+        return lambda load: origin + (load.travel - travel)
 
     @property
     def touching(self) -> NDArray[np.bool_]:
@@ -265,6 +266,18 @@ class Newton:
         changes = self._meet(states, self._position(u, load, anchor), load_arguments(load))
         return EquilibriumState(u, pressure, *states, load, state.iterations + 1), largest, changes
 
+    def correct(
+        self, state: EquilibriumState, anchor: Anchor, scale: float = 1.0
+    ) -> tuple[EquilibriumState, float, int]:
+        """Return `state` after the step of the last linearisation, its largest displacement [mm], and changed states.
+
+        Under given forces depth and travel change with it.
+        """
+        deeper, along = (scale * self.system.motion).tolist()
+        load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
+        corrected, largest, changes = self.apply_step(state, load, self.steps[:, EQUILIBRIUM], anchor(load), scale)
+        return corrected, max(largest, abs(deeper), abs(along)), changes
+
     def settle(
         self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
     ) -> EquilibriumState:
@@ -274,40 +287,54 @@ class Newton:
         from consecutive steps: convergence is quadratic with a new tangent, linear with a kept one. Raises NotConverged
         after `limit` iterations, or where the body would turn inside out.
         """
-        x = start.place(self.condensed)[:, 0].copy()  # contiguous, for the kernels
-        anchor = x + (load.travel - start.load.travel)
-        begin = self._enter(start, load, x)
+        states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
+        position = self._position(start.u, load, start.place(self.condensed)[:, 0].copy())
+        self._meet(states, position, load_arguments(load))
+        begin = replace(start, state=states.state, sense=states.sense, load=load)
+        if self.condensed.constant and self.condensed.motions.shape[1]:
+            begin = lower_onto_surface(self.condensed, begin)
+        return self.settle_from(begin, start, None, tolerance, limit)
+
+    def settle_from(
+        self, begin: EquilibriumState, start: EquilibriumState, forces: ForceLoad | None, tolerance: float, limit: int
+    ) -> EquilibriumState:
+        """Return the equilibrium one step from `start`, as `settle` does, with iterations that begin at `begin`.
+
+        Depth and travel are those of `begin`; those that are not prescribed follow from `forces`.
+        """
+        if forces is not None and forces.tangential is None:
+            begin = replace(begin, load=begin.load._replace(travel=forces.travel))
+        anchor = start.anchor(self.condensed)
         if self.condensed.constant:
-            if self.condensed.motions.shape[1]:
-                begin = lower_onto_surface(self.condensed, replace(begin, load=load))
-            return self.solve_linear(begin, load, anchor)
-        return self._iterate(begin, load, anchor, tolerance, limit)
+            return self.solve_linear(begin, begin.load, anchor(begin.load), forces)
+        rounds = CONTROL.rounds if forces is None else 0  # more of them lose drags near the friction limit
+
+        def linearise(state: EquilibriumState, *, reuse: bool = False) -> bool:
+            return self.linearise(state, state.load, anchor(state.load), rounds, forces, reuse=reuse)
+
+        return self._iterate(begin, linearise, anchor, tolerance, limit)
 
     def _iterate(
-        self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
+        self, begin: EquilibriumState, linearise: Callable[..., bool], anchor: Anchor, tolerance: float, limit: int
     ) -> EquilibriumState:
-        """Return the equilibrium as `settle` does, from the contact states of `start`, with known `anchor` (k,)."""
-        state = previous = start
-        reuse = self.condensed.equilibrium is start.u
+        """Return the equilibrium that iterations from `begin` end in. Raises NotConverged."""
+        state = previous = begin
+        reuse = self.condensed.equilibrium is begin.u
         scale, last, new, equal_steps = 1.0, 0.0, False, 0
         for _ in range(limit):
             if reuse:
-                if not self.linearise(state, load, anchor, CONTROL.rounds, reuse=True):
+                if not linearise(state, reuse=True):
                     reuse = False
                     continue
                 previous = state
-            elif not self.linearise(state, load, anchor, CONTROL.rounds):
+            elif not linearise(state):
                 scale /= 2.0  # the last step went too far
-                if (
-                    state is previous
-                    or scale < CONTROL.shortest
-                    or not self.linearise(previous, load, anchor, CONTROL.rounds)
-                ):
-                    raise NotConverged("the body would turn inside out")
+                if state is previous or scale < CONTROL.shortest or not linearise(previous):
+                    raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
                 state = previous
             elif state is not previous:
                 previous, scale = state, min(1.0, 2.0 * scale)
-            state, largest, changes = self.apply_step(previous, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+            state, largest, changes = self.correct(previous, anchor, scale)
             if not largest < CONTROL.unbounded:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
@@ -353,12 +380,6 @@ class Newton:
         return EquilibriumState(
             u, state.pressure, contact.state.copy(), contact.sense.copy(), contact.reaction.copy(), load, iterations
         )
-
-    def _enter(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
-        """Return `start` with the contact states that follow from `load`; `x` (k,) are positions along the surface."""
-        states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
-        self._meet(states, self._position(start.u, load, x), load_arguments(load))
-        return replace(start, state=states.state, sense=states.sense)
 
 
 def lower_onto_surface(body: CondensedBody, start: EquilibriumState) -> EquilibriumState:

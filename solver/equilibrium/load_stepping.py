@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
-from solver.arrays import Array
-from solver.equilibrium import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
 from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
@@ -148,63 +147,20 @@ def find_root(function: Callable[[float], tuple[float, State]], start: float, cl
     return None
 
 
-def correct(
-    newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, travel: float, *, reuse: bool = False
-) -> tuple[EquilibriumState, float, int] | None:
-    """Return the state after one iteration towards the forces, its largest displacement, and its changed states.
-
-    `origin` (k,) are the positions of the skin's nodes along x when the surface's was `travel`. With `reuse` the
-    last tangent serves again. None where the linear system fails.
-    """
-    load = state.load
-    if forces.tangential is None:
-        load = load._replace(travel=forces.travel)
-    if not newton.linearise(state, load, origin + load.travel - travel, 0, forces, reuse=reuse):
-        return None
-    deeper, along = newton.system.motion.tolist()
-    load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-    corrected, largest, changes = newton.apply_step(
-        state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - travel
-    )
-    return corrected, max(largest, abs(deeper), abs(along)), changes
-
-
 def solve_under_forces(
-    newton: Newton, start: EquilibriumState, forces: ForceLoad, tolerance: float = 1e-8, limit: int = 30
+    newton: Newton, start: EquilibriumState, forces: ForceLoad, tolerance: float = 1e-10, limit: int = 30
 ) -> EquilibriumState:
     """Return the equilibrium under `forces`, one backward Euler step from `start`, with its friction and sense.
 
     Raises NotConverged after `limit` iterations.
     """
     try:
-        state = _iterate(newton, start, start, forces, tolerance, limit)
+        state = newton.settle_from(start, start, forces, tolerance, limit)
     except ContactLost:  # for example where friction is so small that all but one node slip
         if forces.tangential is None:
             raise
         return _find_travel(newton, start, start, forces, tolerance, limit)
     return _find_travel(newton, start, state, forces, tolerance, limit) if _slips_freely(state, forces) else state
-
-
-def _iterate(
-    newton: Newton, start: EquilibriumState, begin: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
-) -> EquilibriumState:
-    """Return the equilibrium one step from `start`; the iteration begins at `begin`. Raises NotConverged."""
-    origin, travel = start.place(newton.condensed)[:, 0], start.load.travel
-    state = begin
-    if newton.condensed.constant:
-        if forces.tangential is None:
-            state = replace(state, load=state.load._replace(travel=forces.travel))
-        return newton.solve_linear(state, state.load, origin + state.load.travel - travel, forces)
-    for _ in range(limit):
-        correction = correct(newton, state, forces, origin, travel)
-        if correction is None:
-            raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
-        state, largest, changes = correction
-        if not largest < CONTROL.unbounded:
-            raise NotConverged("the displacements grow without bound")
-        if largest < tolerance and not changes:
-            return state
-    raise NotConverged(f"no equilibrium within {limit} iterations")
 
 
 def _slips_freely(state: EquilibriumState, forces: ForceLoad) -> bool:
@@ -225,7 +181,7 @@ def _find_travel(
 
     def drag_error(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
-        near = _iterate(newton, start, near, ForceLoad(forces.normal, None, travel), tolerance, limit)
+        near = newton.settle_from(near, start, ForceLoad(forces.normal, None, travel), tolerance, limit)
         return float(near.force[0]) - drag, near
 
     state_at_drag = find_root(drag_error, state.load.travel, DRAG_TOLERANCE * state.load.mu * forces.normal)

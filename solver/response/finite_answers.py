@@ -12,7 +12,7 @@ from solver.arrays import Array
 from solver.continuation.existence import doubts, is_folded, refuse_far_beyond, sound
 from solver.continuation.finite_states import nearby, roughly, settled_state
 from solver.continuation.small_states import within_reach
-from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
@@ -296,8 +296,9 @@ def _correct(
     x = state.place(newton.condensed)[:, 0]
     if not newton.linearise(state, state.load, x):
         return None
-    corrected, _, _ = newton.apply_step(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
-    corrected = replace(corrected, state=state.state, sense=state.sense)  # nanometres change no contact state
+    corrected = replace(
+        newton.correct(state, lambda _load: x)[0], state=state.state, sense=state.sense
+    )  # nanometres change no contact state
     corrected_checks = _audits(finger, newton, corrected)
     worse = _contradicting(corrected_checks) > max(_contradicting(checks), FINITE_IMBALANCE)
     return None if worse else (corrected, corrected_checks)

@@ -18,7 +18,6 @@ from solver.body import Endings, Patches, Probes
 from solver.continuation.small_states import expected_depth
 from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lower_onto_surface
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.load_stepping import correct
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
@@ -213,12 +212,13 @@ class FiniteStepper(Stepper):
         """Return the result of `step` by iterations from the last state."""
         newton = self.newton
         state = self._ready(normal, tangential)
-        origin, travel = state.place(newton.condensed)[:, 0], state.load.travel
+        anchor = state.anchor(newton.condensed)
         forces, goes_far = ForceLoad(normal, tangential), self._goes_far(normal)
         far, turns = (_CONTROL.near, _CONTROL.arriving) if self._behind else (_CONTROL.far, _CONTROL.further)
         for number in range(1, max(iterations, turns) + 1):
             reuse = goes_far and number == 1
-            correction = correct(newton, state, forces, origin, travel, reuse=reuse)
+            regular = newton.linearise(state, state.load, anchor(state.load), 0, forces, reuse=reuse)
+            correction = newton.correct(state, anchor) if regular else None
             if reuse and (correction is None or correction[1] > _CONTROL.furthest):
                 continue
             if correction is None or correction[1] > _CONTROL.furthest or correction[0].reaches_end:
