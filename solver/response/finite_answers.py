@@ -296,9 +296,8 @@ def _correct(
     x = state.place(newton.condensed)[:, 0]
     if not newton.linearise(state, state.load, x):
         return None
-    corrected = replace(
-        newton.correct(state, lambda _load: x)[0], state=state.state, sense=state.sense
-    )  # nanometres change no contact state
+    corrected = newton.correct(state, lambda _load: x)[0]
+    corrected = replace(corrected, state=state.state, sense=state.sense)  # nanometres change no contact state
     corrected_checks = _audits(finger, newton, corrected)
     worse = _contradicting(corrected_checks) > max(_contradicting(checks), FINITE_IMBALANCE)
     return None if worse else (corrected, corrected_checks)
