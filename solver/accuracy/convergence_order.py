@@ -38,7 +38,7 @@ def order_of(finger: Finger[Any], state: EquilibriumState) -> float:
     """Return the order of convergence that an estimate assumes, from the `state` on its nested mesh.
 
     It is `CORNER_ORDER` where the element at the corner of bone and cut is squeezed, where neighbouring tissues differ
-    in stiffness by more than in trials that show second order, and where skin stiffens as it stretches. Raises CutFolds.
+    in stiffness by more than in trials that show second order, or where skin stiffens as it stretches. Raises CutFolds.
     """
     scene = finger.scene
     squeezed = _check_cut(finger, state) if isinstance(finger, FiniteFinger) and scene.finger.cut == "free" else False

@@ -137,16 +137,19 @@ def _sliding_under(
             begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
             state = _at_force(newton, begin, force)
             return steady(finger, state.load, start=state)
-    last: EquilibriumState | None = None
+    states: list[EquilibriumState] = []
     try:
         for state in _increase_force(newton, load, force):
-            last = state
+            states.append(state)  # those before a failure count
     except NotConverged:
-        if last is None:
+        if not states:
             raise
-        return _deeper(finger, last, force)
-    assert last is not None
-    return steady(finger, last.load, start=last)
+        return _deeper(finger, states[-1], force)
+    *before, last = states
+    try:
+        return steady(finger, last.load, start=last)
+    except NoSteadyState:  # it lies beyond a limit, which has a force as well as a depth
+        return _deeper(finger, before[-1], force)
 
 
 def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:
