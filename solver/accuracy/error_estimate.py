@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
-from solver.accuracy.convergence_order import ORDER, from_halving, order_of
+from solver.accuracy.convergence_order import ORDER, from_halving
 from solver.arrays import Array
 from solver.body import Patches
 from solver.equilibrium import EquilibriumState, ForceLoad, Newton
@@ -147,19 +147,15 @@ class NestedState(NamedTuple):
 
 
 def nested_state(
-    finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None
+    finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None, order: float
 ) -> NestedState | NotConverged:
     """Return a state of the nested mesh with its numbers, from `values` (COUNT + r,) and `changes` (m, COUNT + r).
 
-    `steps` are its load steps where it depends on its load path. Returns why errors are unknown where they are: where
-    the free cut folds, or where no equilibrium exists with an edge moved, as at a friction limit.
+    `steps` are its load steps where it depends on its load path, and `order` is its `order_of`. Returns NO_NESTED_STATE
+    where no equilibrium exists with an edge moved, as at a friction limit.
     """
     if np.isinf(changes).any():
         return NO_NESTED_STATE
-    try:
-        order = order_of(finger, state)
-    except NotConverged as failure:
-        return failure
     numbers = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
     nested = NestedNumbers(numbers, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:], order)
     return NestedState(nested, finger, state)

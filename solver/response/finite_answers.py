@@ -7,6 +7,7 @@ from time import perf_counter
 
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
+from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation.existence import doubts, is_folded, refuse_far_beyond, sound
@@ -17,7 +18,7 @@ from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.relaxation import CondensedRelaxing
-from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.failures import CutFolds, NoSteadyState, NotConverged, SolveFailure
 from solver.mesh import Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
@@ -209,11 +210,14 @@ def solve_nested(
         else:
             steps = None
             state = nearby(finger, scene, start.state) or settled_state(finger, scene, start.state)
+        order = order_of(finger, state)
+    except CutFolds as failure:
+        return failure, steps
     except SolveFailure:
         return NO_NESTED_STATE, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
-    return nested_state(finger, state, values, changes, steps), steps
+    return nested_state(finger, state, values, changes, steps, order), steps
 
 
 FINITE_IMBALANCE = 1e-8  # relative residual of the forces from which a state is corrected further [-]

@@ -12,6 +12,7 @@ import numpy as np
 
 from solver.accuracy import audits
 from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
+from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, Steps, edge_changes, nested_state
 from solver.arrays import Array
 from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, remove_round_off
@@ -200,6 +201,6 @@ def nested_numbers_of_all(
         values, changes = edge_changes(mesh.newton, with_forces, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
             solution = solutions[number]
-            on_nested = nested_state(mesh, state, value, change, solution.steps)
+            on_nested = nested_state(mesh, state, value, change, solution.steps, order_of(mesh, state))
             out[number] = with_shares(solution.scene, numbers[number], on_nested, solution.steps)
     return out
