@@ -26,7 +26,8 @@ def _terminal_errors() -> tuple[type[Exception], ...]:
 
 
 _PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN}
-_PORT_ERRORS = (OSError, *_terminal_errors())  # raised when a port is pulled out; pyserial's own errors are OSErrors
+# Raised when a port is pulled out, or is used after that. pyserial's own errors are OSErrors.
+_PORT_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, *_terminal_errors())
 _POSIX = os.name == "posix"
 _MOST = 65536  # bytes taken at one go
 _WRITE_PATIENCE = 0.1  # for the system to take what is sent [real s]
@@ -51,7 +52,7 @@ class SerialLink:
                 xonxoff=False,  # binary records may hold those very bytes
                 exclusive=True,
             )
-        except (*_PORT_ERRORS, ValueError) as error:
+        except _PORT_ERRORS as error:
             raise SetupError(f"{port} cannot be opened: {_reason(error, baud)}") from None
 
     def send(self, data: bytes) -> None:
@@ -62,7 +63,7 @@ class SerialLink:
                 if _POSIX and not select.select([], [self._port.fileno()], [], _WRITE_PATIENCE)[1]:
                     raise OSError
                 data = data[self._port.write(data) :]
-        except (*_PORT_ERRORS, ValueError):  # the latter from a port that is closed
+        except _PORT_ERRORS:
             raise LinkLost(f"{self._port_name} takes no bytes any more; check that its plug is in") from None
 
     def receive(self, timeout: float) -> bytes | None:
@@ -75,7 +76,7 @@ class SerialLink:
             while data and len(data) < _MOST and (available := self._port.in_waiting):  # at most 4 KB at a time
                 data += self._port.read(available)
             return data or None
-        except (*_PORT_ERRORS, ValueError):  # the latter from a port that vanishes while its waiting time is set
+        except _PORT_ERRORS:
             raise LinkLost(f"{self._port_name} is gone; check that its plug is in") from None
 
     def close(self) -> None:

@@ -4,8 +4,8 @@ import errno
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import usb.core  # pyright: ignore[reportMissingTypeStubs]
-import usb.util  # pyright: ignore[reportMissingTypeStubs]
+import usb.core
+import usb.util
 
 from drivers.transducer import LinkLost, SetupError
 

@@ -293,7 +293,7 @@ def complete(document: Mapping[str, Any], form: type[T]) -> T:
 
 def _missing_keys(document: object, complete: object, path: str = "") -> Iterator[str]:
     """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
-    if isinstance(complete, list | tuple):
+    if isinstance(complete, (list, tuple)):
         items = zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)
         for index, (item, complete_item) in enumerate(items):
             yield from _missing_keys(item, complete_item, f"{path}[{index}]")

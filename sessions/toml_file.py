@@ -249,7 +249,7 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
     if isinstance(value, Mapping):
         table = cast("Mapping[str, Any]", value)
         return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in table.items() if item is not None) + "}"
-    if isinstance(value, list | tuple):
+    if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_inline, cast("tuple[Any, ...]", value))) + "]"
     if isinstance(value, str):
         return "".join(map(_escape, json.dumps(value, ensure_ascii=False)))

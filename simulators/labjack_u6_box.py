@@ -12,8 +12,8 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-import usb.backend  # pyright: ignore[reportMissingTypeStubs]
-import usb.core  # pyright: ignore[reportMissingTypeStubs]
+import usb.backend
+import usb.core
 
 from drivers import usb_link
 from drivers.arrays import Array, Indices

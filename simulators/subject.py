@@ -95,7 +95,7 @@ class SimulatedSubject:
         """
         draw = np.random.default_rng([self.seed, 6, trial, take])
         if draw.uniform() < self.settings.lapse:
-            return bool(draw.uniform() < 0.5)
+            return draw.uniform() < 0.5
         return bool(np.log(first.mu / second.mu) > draw.normal(0.0, self.settings.discrimination))
 
     def number(self, surface: Surface, repetition: int = 1) -> float:

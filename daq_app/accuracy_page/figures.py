@@ -1,6 +1,5 @@
 """The pictures of the accuracy page, each with the numbers it shows."""
 
-# pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
 from collections.abc import Iterable, Mapping, Sequence

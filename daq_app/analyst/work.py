@@ -18,7 +18,7 @@ from drivers.arrays import Array
 from sessions.exchange import ExportSource, export
 from sessions.file_access import failure_sentence, write_whole
 from sessions.plan.plan import Blinded
-from sessions.prediction import PredictionOptions, TrialPrediction, predict
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, predict
 from sessions.prediction.scenes import SolutionPath
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
@@ -57,6 +57,7 @@ class Work:
         self._row = 0
         self._load_paths: dict[m.Key, tuple[TrialPrediction, SolutionPath | None]] = {}  # no way at finite strain
         self._sketches: dict[int, Sketch] = {}
+        self._prediction: SessionPrediction | None = None
         self._comparison: Report | None = None  # that is compared
         self._history: m.FingerHistory | None = None  # the last history
         self._analyse()

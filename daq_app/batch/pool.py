@@ -108,7 +108,7 @@ def by_cluster(
     work: Callable[..., A],
     jobs: Jobs,
     address: str,
-    prepare: Callable[..., tuple[Any, ...]] = lambda *arguments: arguments,
+    prepare: Callable[..., tuple[Any, ...]] = lambda *arguments: arguments,  # pyrefly: ignore[implicit-any-lambda]
 ) -> Generator[tuple[str, A | Lost]]:
     """Yield each job's name and the result of `work`, as it comes from the workers of a cluster.
 

@@ -75,7 +75,7 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
     base = published_finger(kinematics)
     other_strain: Kinematics = "finite" if kinematics == "small" else "small"
 
-    def finger(**changes: float) -> Trial:
+    def finger(**changes: Any) -> Trial:  # noqa: ANN401  lengths and angles
         return Trial(replace(base, finger=replace(base.finger, **changes)))
 
     return {
@@ -110,13 +110,14 @@ def sample_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
 def _finger(sample: Mapping[str, float], base: Scene) -> Trial:
     radius, epidermis, dermis, bone, angle, *stiff, nu, position, depth, press = sample.values()
     finger = base.finger
+    x, y = finger.bone_centre
     scaled = replace(
         finger,
         tip_radius=radius,
         epidermis=epidermis * radius,
         dermis=dermis * radius,
         bone_radius=bone * radius,
-        bone_centre=tuple(coordinate * radius / finger.tip_radius for coordinate in finger.bone_centre),
+        bone_centre=(x * radius / finger.tip_radius, y * radius / finger.tip_radius),
         shaft_length=finger.shaft_length * radius / finger.tip_radius,
         contact_angle=angle,
     )

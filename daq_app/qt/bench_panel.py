@@ -44,7 +44,7 @@ class BenchPanel(Panel):
         self._choice.setEditable(True)
         self._choice.setLineEdit(EntryLine(lambda: self._leave(connecting=True), self._leave))
         self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
-        self._choice.setCompleter(None)  # pyright: ignore[reportArgumentType]  what is typed stays what it is
+        self._choice.setCompleter(None)  # pyrefly: ignore[bad-argument-type]  what is typed stays what it is
         self.search = button(tr("Search"), tr("search for transducers"), search)
         self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_choice)
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))

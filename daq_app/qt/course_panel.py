@@ -116,7 +116,7 @@ class CoursePanel(Panel):
             self.plan.takeItem(self.plan.count() - 1)
         for index, row in enumerate(rows):
             item = self.plan.item(index)
-            if item is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None beyond the last
+            if item is None:  # Qt returns None beyond the last
                 item = QListWidgetItem()
                 self.plan.addItem(item)
             text = f"{row.name} {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"

@@ -123,7 +123,7 @@ class KeysPage(Panel):
 
     def toggle(self) -> None:
         """Show the page over everything else, or hide it; it is filled when it is first seen."""
-        if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None where there is none
+        if self.layout() is None:  # Qt returns None where there is none
             self._fill()
         self.setVisible(not self.isVisible())
         self.raise_()
@@ -131,7 +131,7 @@ class KeysPage(Panel):
 
     def fit(self) -> None:
         """Take the middle of the window, as much as there is need for."""
-        if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  it was never seen
+        if self.layout() is None:  # it was never seen
             return
         window = self._window.size()
         size = QSize(px(_WIDTH), 0).boundedTo(window - QSize(4 * GRID, 4 * GRID))

@@ -82,7 +82,7 @@ def _polygon(points: Array) -> QPolygonF:
     """Return points (n, 2), n > 0, as Qt holds them: written into its own memory, as pyqtgraph does it."""
     polygon = QPolygonF()
     polygon.resize(len(points))
-    memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyright: ignore[reportCallIssue]  its stub knows none
+    memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyrefly: ignore[bad-argument-type, bad-argument-count]  its stub knows none
     np.frombuffer(memory, np.float64).reshape(-1, 2)[:] = points
     return polygon
 
@@ -100,7 +100,7 @@ def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]
         polygons = elements[begin:end]
         path = QPainterPath()
         stream = QDataStream(QByteArray(polygons.size.to_bytes(4, "big") + polygons.tobytes() + _TAIL))
-        stream >> path  # pyright: ignore[reportUnusedExpression]  it reads into `path`
+        stream >> path  # it reads into `path`
         yield int(sorted_shades[begin]), path
 
 

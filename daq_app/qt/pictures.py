@@ -155,7 +155,7 @@ def write_picture(canvas: FingerCanvas, heading: str, path: Path) -> None:
         case _:
             buffer = QBuffer()
             image = _image(canvas, _DENSITY, heading)
-            image.save(buffer, "PNG")  # pyright: ignore[reportCallIssue, reportArgumentType]
+            image.save(buffer, "PNG")  # pyrefly: ignore[no-matching-overload]
             write_whole(path, bytes(buffer.data().data()))
 
 
@@ -217,7 +217,7 @@ def _write_film(path: Path, frames: list[Image.Image]) -> None:
 def _mp4(frames: list[Image.Image]) -> bytes:
     """Return an MP4 (H.264) that every browser shows. Raises ImportError where the encoder is not installed."""
     try:
-        from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingTypeStubs]
+        from imageio_ffmpeg import get_ffmpeg_exe
     except ImportError as error:
         raise ImportError(tr(NO_MP4)) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together

@@ -5,7 +5,7 @@ from math import floor, log10
 from typing import Any
 
 import numpy as np
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
+import pyqtgraph
 from PySide6.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent, QValidator
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget

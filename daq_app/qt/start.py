@@ -210,7 +210,7 @@ def _apply_theme(application: "QApplication", tokens: "Tokens") -> None:
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
     for box in ("QCheckBox", "QRadioButton"):  # the stub asks for bytes
-        application.setPalette(tick_palette(tokens), box)  # pyright: ignore[reportArgumentType]
+        application.setPalette(tick_palette(tokens), box)  # pyrefly: ignore[bad-argument-type]
     application.setStyleSheet(sheet)
 
 

@@ -181,7 +181,7 @@ class StrokeView(QWidget):
         begin, end = (self._lines[edge][0] for edge in ("steady begin", "steady end"))
         long = sum(metrics.horizontalAdvance(line.label.format) for line in (begin, end)) + 2 * GRID
         apart = (end.value() - begin.value()) / max(self._forces.viewPixelSize()[0], 1e-12)
-        rows = {**_ROWS, "steady end": 1 if apart > long else 2}
+        rows: dict[Edge, int] = {**_ROWS, "steady end": 1 if apart > long else 2}
         for edge, number in rows.items():
             self._lines[edge][0].label.setPosition(1.0 - (number + 0.5) * row)
         if np.allclose(self._forces.viewRange()[1], self._range):

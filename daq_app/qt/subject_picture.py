@@ -124,7 +124,7 @@ class Mirror(QWidget):
             self.picture = SubjectPicture(self._size)
             self.picture.setFixedHeight(px(MIRROR_HEIGHT, most=1.4))
             self.picture.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            self.layout().addWidget(self.picture)  # pyright: ignore[reportOptionalMemberAccess]  it was set above
+            self.layout().addWidget(self.picture)  # pyrefly: ignore[missing-attribute]  it was set above
         self.picture.show_page(self._view, self._size)
 
 

@@ -53,7 +53,7 @@ class TabletServer:
         `on_change` is called when a tablet comes or goes or the code changes. A free port replaces a taken one.
         """
         try:
-            import segno  # noqa: F401  # pyright: ignore[reportUnusedImport]  the window draws the link with it
+            import segno  # noqa: F401  # the window draws the link with it
             from websockets.sync.server import serve
         except ImportError as error:
             raise NoTabletServer(_MISSING) from error
@@ -73,7 +73,7 @@ class TabletServer:
             self._talk,
             sock=listener,
             process_request=self._answer,
-            origins=[self.url],  # pyright: ignore[reportArgumentType]  a text, of a type of its own
+            origins=[self.url],  # a text, of a type of its own
             max_size=LARGEST,
             ping_interval=ALIVE / 2,
             ping_timeout=ALIVE / 2,

@@ -1,7 +1,7 @@
 """The live model's messages: measured forces in, the SED and a picture out, and their texts. No solver."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -134,7 +134,8 @@ def forces_of(live: Live, frame: Frame) -> Forces | None:
 
 def join_forces(batches: list[Forces]) -> Forces:
     """Return several batches of one stream as one."""
-    arrays = {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in ("time", "normal", "pull")}
+    names = ("time", "normal", "pull")
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in names}
     return replace(batches[-1], **arrays)
 
 

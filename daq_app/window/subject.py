@@ -101,7 +101,7 @@ def usual_question(descriptor: str) -> str:
 def translator(language: str) -> Translate:
     """Return what makes a subject's language of the English texts; a text without a translation stays English."""
     texts = translations(SUBJECT, language)
-    return lambda text: texts.get(text, str(text))
+    return lambda text: texts.get(text, text)
 
 
 @dataclass(frozen=True, slots=True)

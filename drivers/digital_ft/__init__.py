@@ -123,7 +123,9 @@ class _DigitalConversation:
     number: int  # of the calibration, 1 to 16
     stored: wire.StoredCalibration  # as it was read
     word: int = 0  # the status word, which can only be read while nothing streams
-    numbering = ClockRecovery
+
+    def numbering(self, rate: float, factor: float) -> ClockRecovery:
+        return ClockRecovery(rate, factor)
 
     def decoder(self) -> RecordDecoder:
         return wire.StreamDecoder(self.word)

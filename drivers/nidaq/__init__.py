@@ -178,8 +178,11 @@ class _VoltsDecoder:
 
 
 class _TaskConversation:
-    decoder = _VoltsDecoder
-    numbering = ScanCount
+    def decoder(self) -> "_VoltsDecoder":
+        return _VoltsDecoder()
+
+    def numbering(self, rate: float, factor: float) -> ScanCount:
+        return ScanCount(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         link.send(b"start")

@@ -138,7 +138,9 @@ def _target_of(address: Address) -> _Target:
 @dataclass(eq=False)
 class _ControllerConversation:
     binary: bool
-    numbering = ClockRecovery
+
+    def numbering(self, rate: float, factor: float) -> ClockRecovery:
+        return ClockRecovery(rate, factor)
 
     def decoder(self) -> RecordDecoder:
         return wire.BinaryDecoder() if self.binary else wire.AsciiDecoder()

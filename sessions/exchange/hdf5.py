@@ -1,14 +1,11 @@
 """A session as one HDF5 file: the sealed copy, which tells of itself, and the tables made from it."""
 
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false, reportIndexIssue=false
-# pyright: reportArgumentType=false
 # h5py brings no types; every array is given its type where it leaves this file.
 
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -59,9 +56,10 @@ def read(path: Path) -> ExportedSession:
     with h5py.File(path, "r") as file:
         form = _text(file.attrs.get("format", b""))
         check_format({"name": form, "version": int(file.attrs.get("format_version", 0))} if form else None)
+        names = ("plan", "transducer", "provenance")
         head = Head(
             _text(file.attrs["SIMULATED"]) if "SIMULATED" in file.attrs else None,
-            *(json_value(_text(_array(file, f"head/{name}")[0])) for name in ("plan", "transducer", "provenance")),
+            *(cast("Any", json_value(_text(_array(file, f"head/{name}")[0]))) for name in names),
             losses=tuple(map(_text, _array(file, "head/losses"))),
             digest=None,  # the file's own check sums guard it
         )

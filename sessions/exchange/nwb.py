@@ -4,11 +4,6 @@ Needs the optional library pynwb. Raw numbers and forces are acquired time serie
 answers, strokes, friction and predictions are tables.
 """
 
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportMissingImports=false, reportCallIssue=false
-# pyright: reportAttributeAccessIssue=false
-# pynwb brings no types, and is not installed everywhere.
-
 import hashlib
 import math
 from collections.abc import Mapping

@@ -368,13 +368,13 @@ def _flat(row: Mapping[str, Any]) -> Iterable[tuple[str, Cell]]:
     for name, value in row.items():
         if name in _PAIRS:
             yield from zip(_names(name), value or (None, None), strict=True)
-        elif isinstance(value, list | tuple) and all(isinstance(item, str) for item in cast("Sequence[Any]", value)):
+        elif isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in cast("Sequence[Any]", value)):
             yield name, "; ".join(cast("Sequence[str]", value)) or None
         elif isinstance(value, Mapping) and name == "stimulus":
             yield from ((f"{name}_{item}", cell) for item, cell in cast("Mapping[str, Cell]", value).items())
         elif isinstance(value, Mapping):
             yield name, "; ".join(f"{key}: {item}" for key, item in cast("Mapping[str, Any]", value).items()) or None
-        elif isinstance(value, list | tuple):
+        elif isinstance(value, (list, tuple)):
             yield name, json.dumps(value, ensure_ascii=False) if value else None
         elif isinstance(value, bool):
             yield name, "true" if value else "false"

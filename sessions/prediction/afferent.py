@@ -8,7 +8,7 @@ bound: what it adds is the course in time.
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 
@@ -234,4 +234,4 @@ def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = S
         greatest = 1.0 if name == "variation" else 1e4
         if not least <= value <= greatest:
             raise ValueError(f"{name} = {value:g} is not allowed: {least:g} to {greatest:g}")
-    return replace(usual_settings(quantity), seed=seed, **changes)
+    return replace(usual_settings(quantity), seed=seed, **cast("Mapping[str, Any]", changes))

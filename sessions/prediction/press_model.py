@@ -107,7 +107,7 @@ def press_model(
         width_error += np.array([press.contact_width_error or 0.0 for press in presses]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
     targets = np.vstack([force, slope[:, 0], slope[:, 1]])
-    coefficients = np.linalg.lstsq(basis, targets, rcond=None)[0]
+    coefficients = _fit(basis, targets)
     residual = basis[: len(contrast)] @ coefficients - force
     if mu:
         shape = np.empty((len(sticking), DEPTHS))
@@ -117,12 +117,12 @@ def press_model(
             shape[number] = np.log([press.normal_force for press in presses])
         shape -= _basis(sticking, DEGREE)[0] @ coefficients
         basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
-        friction = np.linalg.lstsq(basis, shape, rcond=None)[0]
+        friction = _fit(basis, shape)
         residual = np.vstack([residual, basis @ friction - shape])
         coefficients[_orders(DEGREE).sum(axis=1) <= DEGREE_OF_FRICTION] += friction
     error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(residual**2))))
     basis = _basis(contrast, DEGREE_OF_WIDTH)[0]
-    width_coefficients = np.linalg.lstsq(basis, width, rcond=None)[0]
+    width_coefficients = _fit(basis, width)
     width_error = np.hypot(width_error, np.sqrt(np.mean((basis @ width_coefficients - width) ** 2, axis=0)))
     return replace(blank, coefficients=coefficients, width=width_coefficients, error=error, width_error=width_error)
 
@@ -195,6 +195,11 @@ def _design(rings: Sequence[int]) -> Array:
 def _orders(degree: int) -> Indices:
     """Return the orders (c, 2) of the Chebyshev products up to a total degree."""
     return np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)])
+
+
+def _fit(basis: Array, values: Array) -> Array:
+    """Return the coefficients with which `basis` fits `values` in the least squares."""
+    return np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], np.float64)
 
 
 def _basis(contrast: Array, degree: int) -> tuple[Array, Array, Array]:

@@ -119,7 +119,7 @@ def unlike(stored: Any, fresh: Any, path: str, but: frozenset[str] = frozenset()
         for key in sorted({*stored_map, *fresh_map} - but, key=_rank):
             yield from unlike(stored_map.get(key, ABSENT), fresh_map.get(key, ABSENT), f"{path}.{key}", but)
         return
-    if isinstance(stored, list | tuple) and isinstance(fresh, list | tuple):
+    if isinstance(stored, (list, tuple)) and isinstance(fresh, (list, tuple)):
         stored_list, fresh_list = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
         if len(stored_list) == len(fresh_list):
             for i, (old, new) in enumerate(zip(stored_list, fresh_list, strict=True)):
@@ -138,7 +138,7 @@ def differences(stored: object, fresh: object, path: str) -> Iterator[str]:
     for name, old, new in unlike(stored, fresh, path, TIMINGS):
         if old is ABSENT or new is ABSENT:
             yield f"{name} is {'new' if old is ABSENT else 'no longer made'}"
-        elif isinstance(old, list | tuple) and isinstance(new, list | tuple):
+        elif isinstance(old, (list, tuple)) and isinstance(new, (list, tuple)):
             entries = len(cast("Sequence[Any]", old)), len(cast("Sequence[Any]", new))
             yield f"{name} was stored with {entries[0]} entries and comes out with {entries[1]}"
         else:

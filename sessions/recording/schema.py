@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from drivers.arrays import Array, Indices
 from drivers.readings import ReadingBlock
 from sessions.recording.head import compact_json
 from sessions.recording.log import LoggedEvent
@@ -132,7 +131,7 @@ def summary(block: ReadingBlock) -> tuple[int, ...]:
 
 def block_from_blobs(columns: tuple[bytes, ...]) -> ReadingBlock:
     """Return the readings of `columns`, in the order of `COLUMNS`. Raises ValueError when they differ in length."""
-    arrays: dict[str, Indices | Array] = {
+    arrays: dict[str, Any] = {
         name: np.frombuffer(column, dtype) for (name, dtype), column in zip(COLUMNS.items(), columns, strict=True)
     }
-    return ReadingBlock(**{**arrays, "raw": arrays["raw"].reshape(-1, 6)})  # pyright: ignore[reportArgumentType]  columns differ in type
+    return ReadingBlock(**{**arrays, "raw": arrays["raw"].reshape(-1, 6)})

@@ -3,8 +3,6 @@
 `docs/session-format.md` tells each data set and unit to someone without this program; keep the two together.
 """
 
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false, reportIndexIssue=false
 # h5py brings no types; every array is given its type where it leaves this file.
 
 import io

@@ -191,7 +191,7 @@ class SessionWriter:
             self.commit()
         return event
 
-    def instant_ns(self, _kind: str, _trial: int | None) -> int:
+    def instant_ns(self, _kind: str, _trial: int | None, /) -> int:
         """Return the instant of an event for which none was given [ns, session clock]."""
         return self.clock.now_ns()
 

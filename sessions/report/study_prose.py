@@ -17,6 +17,7 @@ from sessions.report.tables.scales import psychometric_sentences, scale_sentence
 from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import capital, correlation, digits, full_stop, plural, shown_response, significant
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.multiverse import Kinematics
 from sessions.statistics.scores import by_key
 from sessions.statistics.visit import Exclusion
 
@@ -90,7 +91,7 @@ def _relation_sentences(findings: DescriptorFindings, study: StudyFindings) -> l
     ]
 
 
-def _otherwise(findings: DescriptorFindings, other_strain: str) -> str:
+def _otherwise(findings: DescriptorFindings, other_strain: Kinematics) -> str:
     """Return what the same trials give at the other strain, as far as the many paths went there."""
     usual = next((path.path for path in findings.paths if path.usual), None)
     other_path = None if usual is None else replace(usual, kinematics=other_strain)

@@ -73,7 +73,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  whatever an event holds
     """Return plain data with every nan and infinity written as a text."""
     if isinstance(value, dict):
         return {name: _plain(content) for name, content in cast("dict[str, Any]", value).items()}
-    if isinstance(value, list | tuple):
+    if isinstance(value, (list, tuple)):
         return [_plain(content) for content in cast("list[Any]", value)]
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 

@@ -98,7 +98,7 @@ class _Rewriter(FleetingWriter):
         self._is_cut_short = not any(event.kind == "ended" for event in log)
         self._next_event = 0
 
-    def instant_ns(self, kind: str, trial: int | None) -> int:
+    def instant_ns(self, kind: str, trial: int | None, /) -> int:
         """Return when such an event was recorded next. Raises _CutShort where the recording ends without an end."""
         if self._is_cut_short and (kind == "ended" or self._next_event == len(self._log)):
             raise _CutShort("the recording was cut short here")

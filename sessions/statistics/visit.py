@@ -6,7 +6,7 @@ People keep decisions to leave a subject out in a file in the folder of the sess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from sessions.plan.plan import Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
@@ -267,15 +267,18 @@ def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analys
         "normal_force": (stroke.normal_force, intervals.normal_force),
     }
     bounds = {name: ends for name, (value, ends) in numbers.items() if value is not None and ends is not None}
+    columns: dict[str, Any] = {
+        **{name: value for name, (value, _) in numbers.items()},
+        **{f"{name}_low": low for name, (low, _) in bounds.items()},
+        **{f"{name}_high": high for name, (_, high) in bounds.items()},
+    }
     return replace(
         row,
         rule=friction.rule,
         mu_dynamic=stroke.mu_dynamic,
         mu_static=stroke.mu_static,
         tangential_force=stroke.tangential_force,
-        **{name: value for name, (value, _) in numbers.items()},
-        **{f"{name}_low": low for name, (low, _) in bounds.items()},
-        **{f"{name}_high": high for name, (_, high) in bounds.items()},
+        **columns,
     )
 
 

@@ -181,7 +181,8 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
         return replace(decision, old=None if position is None else analysis.strokes[position].number)
     for stroke in strokes:
         if stroke.number == decision.stroke:
-            stick = None if None in (stroke.onset, stroke.break_away) else (stroke.onset, stroke.break_away)
+            onset, end = stroke.onset, stroke.break_away
+            stick = None if onset is None or end is None else (onset, end)
             return replace(decision, old=stick if decision.what == "stick" else getattr(stroke, decision.what))
     count = f"it has {len(strokes)}" if strokes else "none was found in it"
     raise DecisionError(f"there is no {decision.target_text}: {count}")

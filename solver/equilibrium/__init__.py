@@ -397,4 +397,4 @@ def lower_onto_surface(body: CondensedBody, start: EquilibriumState) -> Equilibr
 
 def load_arguments(load: LoadState) -> LoadArguments:
     """Return `load` as an argument of the kernels."""
-    return LoadArguments(float(load.depth), float(load.mu), float(load.tau), int(load.sense))
+    return LoadArguments(float(load.depth), float(load.mu), float(load.tau), load.sense)

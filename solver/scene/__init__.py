@@ -6,7 +6,18 @@ Each table (`scene.tables`) checks itself. This module checks combinations of ta
 import math
 from dataclasses import dataclass, field, replace
 
-from solver.scene.tables import LAWS_OF, TISSUES, Finger, Friction, Loading, Materials, Receptor, SceneError, Solve
+from solver.scene.tables import (
+    LAWS_OF,
+    TISSUES,
+    Finger,
+    Friction,
+    Loading,
+    Materials,
+    Receptor,
+    SceneError,
+    Slide,
+    Solve,
+)
 
 STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond it, round-off swamps the softer one
 
@@ -116,7 +127,7 @@ class Scene:
     def earlier_slides(self) -> tuple["Scene", ...]:
         """Return the settled slides before the last one that go the other way, a scene each."""
         opposite = set(self.loading.directions[:-1]) - {self.loading.direction}
-        way = {1: "+x", -1: "-x"}
+        way: dict[int, Slide] = {1: "+x", -1: "-x"}
         solve = replace(self.solve, course="steady")
         return tuple(replace(self, loading=replace(self.loading, slide=way[d]), solve=solve) for d in opposite)
 

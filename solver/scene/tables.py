@@ -45,7 +45,7 @@ class Table:
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - of any type
     value = value.tolist() if hasattr(value, "tolist") else value
-    return tuple(map(_plain, cast("list[Any]", value))) if isinstance(value, list | tuple) else value
+    return tuple(map(_plain, cast("list[Any]", value))) if isinstance(value, (list, tuple)) else value
 
 
 def _row(value: object) -> tuple[object, ...]:

@@ -47,8 +47,13 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
 def _solve_refined(scenes: Sequence[Scene]) -> Array:
     """Return the numbers (n, 3) of the nested mesh of answers with a tight tolerance."""
     tolerance = _REFINED[scenes[0].solve.kinematics]
-    tight = {"tolerance": tolerance, "contrast_tolerance": tolerance if len(scenes) > 1 else None, "evidence": "quick"}
-    answers = solve_many([replace(scene, solve=replace(scene.solve, **tight)) for scene in scenes])
+    contrast = tolerance if len(scenes) > 1 else None
+    answers = solve_many(
+        [
+            replace(s, solve=replace(s.solve, tolerance=tolerance, contrast_tolerance=contrast, evidence="quick"))
+            for s in scenes
+        ]
+    )
     numbers = [
         answer.nested.numbers[:3] for answer in answers if isinstance(answer, Prediction) and answer.nested is not None
     ]

@@ -15,7 +15,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -59,7 +59,7 @@ def _axis(draw: Draw, number: int, _: Kinematics) -> Scene:
         neighbour = Material(tissue.E * _by_logarithm(draw, 0.4, 2.5), draw.uniform(0.3, 0.499))
         return replace(tissues, **{name: neighbour})
 
-    changes: Sequence[Callable[[], dict[str, object]]] = (
+    changes: Sequence[Callable[[], dict[str, Any]]] = (
         lambda: {"loading": replace(loads, indentation=draw.uniform(0.2, 2.2))},
         lambda: {"friction": replace(rubs, mu=draw.uniform(0.0, 0.7))},
         lambda: {"friction": replace(rubs, tau_max=_by_logarithm(draw, 1e-3, 0.1))},
@@ -81,7 +81,7 @@ def _fingers(draw: Draw, number: int, _: Kinematics) -> Scene:
     scene, usual = _common(draw), Finger()
     part = draw.uniform(0.7, 1.3, 7)
     names = ("tip_radius", "epidermis", "dermis", "shaft_length", "bone_radius")
-    lengths = {name: float(getattr(usual, name) * p) for name, p in zip(names, part, strict=False)}
+    lengths: dict[str, Any] = {name: float(getattr(usual, name) * p) for name, p in zip(names, part, strict=False)}
     if number % 2:
         wide = {"tip_radius": (3.5, 8.0), "epidermis": (0.3, 1.2), "dermis": (0.5, 1.8), "bone_radius": (0.8, 2.0)}
         lengths |= {name: float(draw.uniform(*ends)) for name, ends in wide.items()}

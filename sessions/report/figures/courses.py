@@ -1,6 +1,5 @@
 """What runs in time: forces of a recording, forces, friction and speed of its strokes, and predicted responses."""
 
-# pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
 import math

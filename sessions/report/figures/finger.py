@@ -1,6 +1,5 @@
 """The deformed finger at true scale: strain-energy density in it, layers, receptor, tractions of the contact."""
 
-# pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
 import itertools

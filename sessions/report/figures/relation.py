@@ -1,6 +1,5 @@
 """Scores against the index, predicted responses against scores and along many paths, and two sessions compared."""
 
-# pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
 import math

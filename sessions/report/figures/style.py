@@ -1,6 +1,5 @@
 """How all pictures look: palette (Okabe and Ito 2008), sizes, and SVG that is the same on every run and machine."""
 
-# pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
 import io

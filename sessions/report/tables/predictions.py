@@ -153,8 +153,10 @@ def variant_forces_table(report: Report) -> Table | None:
         error = alternative.indentation_error if pressed else alternative.normal_force_error
         value = None if alternative.sed is None else value
         intervals = alternative.interval
-        interval = intervals and (intervals.indentation if pressed else intervals.normal_force)
-        without = intervals and intervals.reason
+        interval = without = None
+        if intervals is not None:
+            interval = intervals.indentation if pressed else intervals.normal_force
+            without = intervals.reason
         estimate = _Estimate(value, error, alternative.reason, interval, without, alternative.doubt)
         return _cell(estimate, places(2), 2)
 

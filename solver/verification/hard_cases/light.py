@@ -40,7 +40,7 @@ def of_light_touch(scene: Scene) -> Outcome:
         for name, number, exact, off in pairs
         if abs(number - exact) > off * number + _MODEL * exact
     ]
-    flaws = ", ".join(filter(None, [outcome.flaw, *far]))
+    flaws = ", ".join(flaw for flaw in (outcome.flaw, *far) if flaw)
     summary = (
         f"{outcome.summary}; SED by Hertz {true.sed:.4g}, width {answer.contact_width:.3g} by Hertz {true.width:.3g}"
     )

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 from solver.scene import Scene
 from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Slide, Solve
@@ -68,7 +68,7 @@ def _scene(
     bound: float | None = None,
     depth: float = 1.5,
     slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x",
-    **parts: Finger | Materials | Receptor | Solve,
+    **parts: Any,  # noqa: ANN401  tables of a scene
 ) -> Scene:
     usual = Scene(friction=Friction(mu, bound), loading=Loading(depth, slide), solve=Solve(kinematics))
     return replace(usual, **parts)

@@ -37,7 +37,7 @@ def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str
         _ratio(sed),
         _ratio(by_number[1]),
         f"{spearmanr([(row.estimate, row.error) for row in sed]).statistic:.2f}" if len(sed) > 2 else "–",
-        _share([bool(row.towards) for row in true]),
+        _share([row.towards for row in true]),
         f"{median(halves):.2f}" if halves else "–",
     )
 
