@@ -44,6 +44,12 @@ def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> 
     return Digest(count, {name: digest.hexdigest() for name, digest in sums.items()}, log.hexdigest())
 
 
+def content_sha256(recording: Recording) -> str:
+    """Return the SHA-256 of plan, readings and events, however files hold them: an import of an export keeps it."""
+    content = [recording.head["plan"], asdict(digest_of(recording.blocks(), recording.events))]
+    return sha256(compact_json(content).encode()).hexdigest()
+
+
 def different(stored: Digest, computed: Digest) -> Iterable[str]:
     """Yield a sentence for each part in which two digests differ."""
     if stored.readings != computed.readings:

@@ -82,8 +82,8 @@ def pool_visits(
     `ground_truth` is that of a synthetic study; nothing but the comparison uses it.
     """
     in_order = tuple(sorted(visits, key=lambda visit: visit.session))
-    same_files = by_key((visit.sha256, visit.session) for visit in in_order if visit.sha256)
-    copies = {session: original for original, *repeats in same_files.values() for session in repeats}
+    same_content = by_key((visit.content_sha256, visit.session) for visit in in_order if visit.content_sha256)
+    copies = {session: original for original, *repeats in same_content.values() for session in repeats}
     included = [
         (visit, [row for row in visit.rows if exclusion_of(exclusions, visit.subject, row.descriptor) is None])
         for visit in in_order

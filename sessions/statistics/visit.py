@@ -16,7 +16,7 @@ from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.derived import gain_error_set, reveal
 from sessions.recording.log import TrialRecord
-from sessions.recording.manifest import file_sha256
+from sessions.recording.manifest import content_sha256, file_sha256
 from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
@@ -63,7 +63,7 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
 
 
 Number = float | None
-FORM = 11  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 12  # raised when a row holds something else: what was stored before is then computed anew
 NO_INTERVAL = "intervals of the SED were not asked for"
 
 
@@ -158,6 +158,7 @@ class Visit:
     losses: tuple[str, ...]
     made_by: Mapping[str, str]  # versions
     sha256: str = ""  # of its `session.sqlite`
+    content_sha256: str = ""  # of its plan, readings and events: the same in every copy and import
     sealed: str = ""  # whether its predictions were sealed before its scores, "" where it predicts nothing
     decisions: tuple[str, ...] = ()  # of people about its strokes, in force
     calibration: str = ""  # the calibration's uncertainty that its intervals hold, set or assumed
@@ -212,6 +213,7 @@ def visit_from(
         losses=(*recording.losses, *recording.flaws),
         made_by=dict(made_by),
         sha256=file_sha256(recording.folder / LIVE_FILE),
+        content_sha256=content_sha256(recording),
         sealed="" if prediction is None else sealed_sentence(recording, numbers),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
         calibration=analysis.bootstrap.calibration,

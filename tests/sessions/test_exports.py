@@ -27,6 +27,8 @@ from sessions.exchange.session_tables import tables
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.derived import gain_error_set
+from sessions.recording.manifest import content_sha256, file_sha256
+from sessions.recording.schema import LIVE_FILE
 from sessions.strokes import analyse
 
 READABLE = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]
@@ -68,6 +70,16 @@ def test_no_file_of_a_real_session_says_that_it_was_simulated(exports, form):
         content = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
         assert b"SIMULATED" not in content
         assert b"simulated\t" not in content
+
+
+@pytest.mark.parametrize("form", READABLE)
+@pytest.mark.parametrize("name", ["whole", "scores_only"])
+def test_an_import_has_the_content_of_its_session_in_another_file(sources, exports, tmp_path, form, name):
+    original = sources[name].recording
+    import_session(read_export(exports[form, name]), tmp_path / "s")
+    copy = Recording.open(tmp_path / "s")
+    assert content_sha256(copy) == content_sha256(original)
+    assert file_sha256(copy.folder / LIVE_FILE) != file_sha256(original.folder / LIVE_FILE)
 
 
 @pytest.mark.parametrize("form", READABLE)

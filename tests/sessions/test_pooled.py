@@ -77,7 +77,7 @@ def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
 
 @pytest.mark.usefixtures("words_alone")
 def test_the_same_recording_in_two_folders_counts_once_and_is_named():
-    first, again = replace(VISITS[0], sha256="a" * 64), replace(VISITS[0], session="S01-backup", sha256="a" * 64)
+    first, again = (replace(VISITS[0], session=name, content_sha256="a" * 64) for name in ("S01", "S01-backup"))
     findings = pool_visits([*VISITS[1:], again, first])
     assert findings.descriptors == pool_visits([*VISITS[1:], first]).descriptors
     assert "Session S01-backup holds the same recording as S01" in study_page(findings, "x")
