@@ -7,7 +7,19 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QComboBox, QPushButton, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp
-from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, label_grid, scroll_area, set_text, vbox
+from daq_app.qt.parts import (
+    EntryLine,
+    Panel,
+    WrappedLabel,
+    button,
+    choice,
+    hbox,
+    label,
+    label_grid,
+    scroll_area,
+    set_text,
+    vbox,
+)
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.live_feed import LOADS
@@ -157,13 +169,13 @@ class BenchStrip(Panel):
         self._lamp = Lamp(tr("transducer"))
         self._bars = {name: LoadBar(name) for name in LOADS}
         self.setFixedWidth(px(150))
-        self._status_label = label("", "quiet", wrap=True)
+        self._status_label = WrappedLabel("quiet")
         lamp = hbox(self._lamp, (self._status_label, 1))
         vbox(button(tr("Bench  B"), tr("show the bench"), expand), lamp, *self._bars.values(), 1, on=self, margins=GRID)
 
     def show_view(self, view: BenchView) -> None:
         self._lamp.show_grade(view.lamp, view.lamp_text)
-        set_text(self._status_label, view.lamp_text)
+        self._status_label.show_text(view.lamp_text)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QPushButton
 from qt_events import click
 
 from daq_app.qt import preferences, tokens
+from daq_app.qt.bench_panel import BenchStrip
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.middle import InspectedTrial, TrialStrip
 from daq_app.qt.preferences import DRAWER, DRAWER_SIZES
@@ -122,6 +124,22 @@ def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(
     place = tile.mapTo(strip.viewport(), tile.rect().center())
     assert strip.viewport().rect().contains(place)
     assert all(widget.size().expandedTo(widget.sizeHint()) == widget.size() for widget in strip.tiles)
+    strip.hide()
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_the_folded_bench_cuts_no_words_and_covers_none_where_it_is_lowest(application, type_size, scale):
+    type_size(scale)
+    strip = BenchStrip(lambda: None)
+    strip.setStyleSheet(tokens.style_sheet(tokens.LIGHT))
+    strip.show()
+    strip.show_view(SimpleNamespace(lamp="wrong", lamp_text="does not answer", bars=()))
+    application.processEvents()
+    strip.resize(strip.width(), strip.minimumSizeHint().height())
+    application.processEvents()
+    text = strip.findChild(QLabel)
+    assert text.height() >= text.heightForWidth(text.width()) > text.fontMetrics().height()
+    assert text.geometry().top() > strip.findChild(QPushButton).geometry().bottom()
     strip.hide()
 
 
