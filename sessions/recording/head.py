@@ -34,7 +34,7 @@ class Setting:
     """A value that shaped the recording, and whether anybody chose it."""
 
     name: str
-    value: float | str | bool | None
+    value: int | float | str | bool | None
     unit: str  # "" for none
     origin: Origin
 
