@@ -39,6 +39,7 @@ from sessions.toml_file import SettingsError, from_table
 
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
+_VERBS = {ANALYSIS: "analyse", PREDICTION: "predict"}  # that make them
 
 
 def analyse_session(
@@ -113,7 +114,7 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
 
     Raises RecordingError where it is damaged: what it holds, or which verb makes it anew.
     """
-    verb = "analyse" if name == ANALYSIS else "predict"
+    verb = _VERBS[name]
     try:
         document = load_derived(folder, name)
         if document is not None:
@@ -199,7 +200,10 @@ def repeat(
 def changes(name: str, document: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
     sentences = first_sentences(list(differences(document, json.loads(json.dumps(fresh)), name)))
-    return [*sentences, explain_differences(name, document, software_versions())] if sentences else []
+    if not sentences:
+        return []
+    reason = explain_differences(name, document, software_versions())
+    return [*sentences, f"{reason}; 'daq-app {_VERBS[name]}' makes it anew"]
 
 
 def _predict(

@@ -123,7 +123,7 @@ def exclusion_sentences(study: StudyFindings) -> list[str]:
     """Return a sentence for each thing that is excluded from the results, with who decided it and why."""
     sentences = [f"Session {name} could not be read, and nothing of it counts: {text}." for name, text in study.failed]
     sentences += [
-        f"Session {session} holds the same recording as {first} (their plans, readings and events agree), and counts nothing."
+        f"Session {session} holds the same recording as {first}, to the last reading and event, and counts nothing."
         for session, first in study.copies
     ]
     sentences += [
