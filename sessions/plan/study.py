@@ -30,7 +30,7 @@ from sessions.file_access import (
 )
 from sessions.plan.orders import opaque_codes, shuffle
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.plan.protocols import Body, Labels, Protocol, StudyPlace, design_rows, is_code
+from sessions.plan.protocols import CODE_RULE, Body, Labels, Protocol, StudyPlace, design_rows, is_code
 from sessions.plan.protocols.planning import check_body
 from sessions.toml_file import NotAllowed, SettingsError, from_toml
 
@@ -186,7 +186,7 @@ def free_slot(members: Sequence[Member]) -> int:
 def check_code(label: str, code: str) -> None:
     """Raise SettingsError unless `code` is one: no name, nothing a file's name could not hold."""
     if not is_code(code):
-        raise SettingsError(f'{label} "{code}" is not allowed: a code of letters, digits, - and _, never a name')
+        raise SettingsError(f'{label} "{code}" is not allowed: {CODE_RULE}')
 
 
 STUDY_FILE = "study.sqlite"

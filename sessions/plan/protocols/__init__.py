@@ -1,6 +1,15 @@
 """The protocols we run, a validated TOML file each, their reader, and the plan of a session. The folder is the list."""
 
-from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, blind, design_rows, is_code, plan
+from sessions.plan.protocols.planning import (
+    CODE_RULE,
+    Body,
+    StudyPlace,
+    VisitSetting,
+    blind,
+    design_rows,
+    is_code,
+    plan,
+)
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -12,6 +21,7 @@ from sessions.plan.protocols.protocol import (
 )
 
 __all__ = [
+    "CODE_RULE",
     "BlockOutline",
     "Body",
     "Face",

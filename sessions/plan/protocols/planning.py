@@ -77,7 +77,7 @@ def plan(
     planned_phases = protocol.phases if phases is None else phases
     try:
         protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
-        check(is_code(subject), "subject", subject, "a code of letters, digits, - and _, never a name")
+        check(is_code(subject), "subject", subject, CODE_RULE)
         check_range("seed", seed, 0, LARGEST_SEED)
         check_phases(protocol, planned_phases)
         check_body(subject_body, protocol)
@@ -122,6 +122,9 @@ def _order_rule(protocol: Protocol, row: int | None, first_block: BlockOutline) 
     rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {design_rows(protocol)}"
     counterbalanced = protocol.order.blocks == "counterbalanced"
     return f"{rule}; blocks counterbalanced, {first_block.name} first" if counterbalanced else rule
+
+
+CODE_RULE = "a code of letters, digits, - and _ (at most 32), never a name"
 
 
 def is_code(text: str) -> bool:
