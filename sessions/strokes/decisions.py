@@ -39,20 +39,22 @@ class Kind(NamedTuple):
 
     form: Any  # the type that msgspec holds it against
     sentence: str  # the same, for people
+    unit: str = ""
 
 
 # What can be decided. Times are on the device's clock.
 OF_STROKE: Mapping[str, Kind] = {
-    "onset": Kind(_Instant, "an instant [s]"),
-    "lift": Kind(_Instant, "an instant [s]"),
-    "steady": Kind(_Stretch, "two instants [s], the earlier first: where the mean of T/N and the speed are taken"),
+    "onset": Kind(_Instant, "an instant [s]", "s"),
+    "lift": Kind(_Instant, "an instant [s]", "s"),
+    "steady": Kind(_Stretch, "two instants [s], the earlier first: where the mean of T/N and the speed are taken", "s"),
     "stick": Kind(
         _Stretch,
         "two instants [s], the earlier first: the stick phase, whose greatest T/N is mu_static and whose end the "
         "break-away",
+        "s",
     ),
     "slide_onset": Kind(
-        _Instant, "an instant [s]: from which the contact slides; a static peak is looked for up to then"
+        _Instant, "an instant [s]: from which the contact slides; a static peak is looked for up to then", "s"
     ),
     "direction": Kind(Literal[1, -1], "1 (proximal to distal) or -1 (distal to proximal)"),
     "kept": Kind(bool, "true, or false where the stroke is left out"),
@@ -62,6 +64,7 @@ OF_SESSION: Mapping[str, Kind] = {
     "tilt": Kind(
         tuple[_Angle, _Angle],
         "two angles [degrees]: how far the face's normal leans to +x and to +y, which is levelled",
+        "degrees",
     )
 }
 
@@ -105,14 +108,15 @@ class Decision:
         """The decision, for people.
 
         >>> Decision("E02", "a ramp", "steady", 3, 1, (1.0, 2.0), (1.2, 2.0), number=4).sentence
-        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 and 2 (it was 1 and 2): a ramp'
+        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 to 2 s (it was 1 to 2 s): a ramp'
         """
         opening = f"decision {self.number} by {self.by}: "
         if self.undoes is not None:
             return f"{opening}decision {self.undoes} is undone: {self.why}"
         if self.what == "kept":
             return f"{opening}{self.target_text} is {'kept' if self.new else 'left out'}: {self.why}"
-        values = f"is {value_text(self.new)} (it was {value_text(self.old)})"
+        unit = {**OF_STROKE, **OF_TRIAL, **OF_SESSION}[self.what].unit
+        values = f"is {_value_text(self.new, unit)} (it was {_value_text(self.old, unit)})"
         return f"{opening}{self.what} of {self.target_text} {values}: {self.why}"
 
     @property
@@ -128,11 +132,12 @@ class Decision:
         return {**record, "undoes": undoes} if undoes is not None else {**record, **document}
 
 
-def value_text(value: Value) -> str:
-    """Return a value for people."""
-    if isinstance(value, tuple):
-        return " and ".join(f"{number:.6g}" for number in value)
-    return "not known" if value is None else f"{value:.6g}"
+def _value_text(value: Value, unit: str) -> str:
+    """Return a value for people: a stretch of time from its begin to its end, else one number or two."""
+    if value is None:
+        return "not known"
+    numbers = value if isinstance(value, tuple) else (value,)
+    return f"{(' to ' if unit == 's' else ' and ').join(f'{number:.6g}' for number in numbers)} {unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)
