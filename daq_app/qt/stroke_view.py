@@ -82,14 +82,14 @@ class EdgeHandle(QPushButton):
             self.setText(name)
             self.setAccessibleName(tr("{name}: no stroke", name=name))
             return
-        time_text = f"{self._time - self._origin:.3f}"
+        time_text = f"{self._time - self._origin:.3f} s"
         mark = "✎ " if placed.decision else "" if placed.present else "○ "
         self.setText(f"{mark}{name} {time_text}{' ⏎' if self._away else ''}")
         state = placed.decision or (tr("as found") if placed.present else tr("not found; where it could be"))
         tool_tip = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
         self.setToolTip(tool_tip)
         speech = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
-        self.setAccessibleName(f"{speech} {time_text} s, {state}{tr(', Enter records') if self._away else ''}")
+        self.setAccessibleName(f"{speech} {time_text}, {state}{tr(', Enter records') if self._away else ''}")
 
 
 class StrokeView(QWidget):

@@ -215,7 +215,7 @@ def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes
     window.take(m.Problem("The disk is full."))  # it was not recorded: the edge goes back
     assert line.value() == pytest.approx(stroke.steady[0] - stroke.trace.origin)
     handle = view.handles["onset"]
-    before = handle.text()
+    assert (before := handle.text()).endswith(" s")
     QTest.keyClick(handle, Qt.Key.Key_Left)
     assert handle.text() != before
     QTest.keyClick(handle, Qt.Key.Key_Escape)
