@@ -45,6 +45,7 @@ def port_calls(monkeypatch):
             return len(data)
 
         def read(self, size):
+            time.sleep(0.01)  # a silent port keeps its reader waiting
             return b""[:size]
 
         def close(self):
