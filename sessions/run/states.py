@@ -1,6 +1,7 @@
 """Where a session is: the states of its course, and the position in the plan that each of them stands at."""
 
 from dataclasses import dataclass, replace
+from itertools import accumulate, chain, islice
 
 from msgspec import Struct
 
@@ -30,12 +31,13 @@ class Position:
     @property
     def trial(self) -> Trial:
         """Return the trial in hand."""
-        return self.plan.trials[self.index]
+        return next(islice(chain.from_iterable(block.trials for block in self.plan.blocks), self.index, None))
 
     @property
     def block(self) -> Block:
         """Return the block of the trial in hand."""
-        return next(block for block in self.plan.blocks if self.trial in block.trials)
+        ends = accumulate(len(block.trials) for block in self.plan.blocks)
+        return next(block for block, end in zip(self.plan.blocks, ends, strict=True) if self.index < end)
 
     @property
     def take(self) -> int:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -20,7 +21,16 @@ from sessions.plan.protocols.languages import (
     check_translations,
     languages_of,
 )
-from sessions.toml_file import NotAllowed, SettingsError, check, check_range, check_scale_ends, check_text, load_toml
+from sessions.toml_file import (
+    NotAllowed,
+    SettingsError,
+    check,
+    check_range,
+    check_scale_ends,
+    check_text,
+    from_toml,
+    text_of,
+)
 
 FOLDER = Path(__file__).parent
 LARGEST_SEED = 2**31 - 1  # a whole number that every language can hold
@@ -297,7 +307,13 @@ def protocol(name_or_path: str | Path) -> Protocol:
 
     Raises SettingsError for an unknown name and for anything wrong in the file, FileNotFoundError for a missing file.
     """
-    return load_toml(protocol_file(name_or_path), Protocol)
+    path = protocol_file(name_or_path)
+    return _protocol_of(text_of(path), str(path))
+
+
+@lru_cache  # the window asks for it with each key that is typed
+def _protocol_of(text: str, where: str) -> Protocol:
+    return from_toml(text, Protocol, where)
 
 
 def protocol_file(name_or_path: str | Path) -> Path:
