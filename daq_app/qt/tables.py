@@ -184,7 +184,10 @@ class _Model(QAbstractTableModel):
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: ANN401
         if role != Qt.ItemDataRole.DisplayRole or orientation != Qt.Orientation.Horizontal:
             return None
-        return (*map(tr, _COLUMNS), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
+        channel = section - len(_COLUMNS) + 1
+        if channel < 1:
+            return tr(_COLUMNS[section])
+        return tr("raw {channel}", channel=channel) if channel <= 6 else ("N [N]", "T [N]")[channel - 7]
 
     def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
         readings = self._readings
