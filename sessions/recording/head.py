@@ -10,6 +10,7 @@ import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any
@@ -105,6 +106,7 @@ def software_versions() -> dict[str, str]:
     }
 
 
+@cache  # the metadata of one library take milliseconds to parse, and a loaded library stays as it is
 def _version(name: str) -> str | None:
     try:
         return version(name)
