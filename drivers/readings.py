@@ -23,14 +23,14 @@ class ReadingBlock:
     def __post_init__(self) -> None:
         """Check that the columns belong together and make them read-only views."""
         n = len(self.sequence)
-        for field in fields(self):
-            column = getattr(self, field.name)
-            shape = (n, 6) if field.name == "raw" else (n,)
+        for name in _COLUMNS:
+            column = getattr(self, name)
+            shape = (n, 6) if name == "raw" else (n,)
             if column.shape != shape:
-                raise ValueError(f"{field.name} has shape {column.shape}, not {shape}")
+                raise ValueError(f"{name} has shape {column.shape}, not {shape}")
             view = column.view()
             view.flags.writeable = False
-            object.__setattr__(self, field.name, view)
+            object.__setattr__(self, name, view)
 
     def __len__(self) -> int:
         """Return the number of readings."""
@@ -38,7 +38,7 @@ class ReadingBlock:
 
     def between(self, start: int, stop: int) -> "ReadingBlock":
         """Return the readings at positions start <= i < stop."""
-        return ReadingBlock(**{field.name: getattr(self, field.name)[start:stop] for field in fields(self)})
+        return ReadingBlock(**{name: getattr(self, name)[start:stop] for name in _COLUMNS})
 
     @staticmethod
     def empty() -> "ReadingBlock":
@@ -52,8 +52,12 @@ class ReadingBlock:
         non_empty = [block for block in blocks if len(block)]
         if not non_empty:
             return ReadingBlock.empty()
-        names = [field.name for field in fields(ReadingBlock)]
-        return ReadingBlock(**{name: np.concatenate([getattr(block, name) for block in non_empty]) for name in names})
+        return ReadingBlock(
+            **{name: np.concatenate([getattr(block, name) for block in non_empty]) for name in _COLUMNS}
+        )
+
+
+_COLUMNS = tuple(field.name for field in fields(ReadingBlock))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
