@@ -7,6 +7,7 @@ replace the logarithm in the last term by a best fit.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, Protocol, cast
 
 import numpy as np
@@ -175,7 +176,10 @@ def log1p(x: Array) -> Array:
     return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+Stress = tuple[Array, Array, Array, Array]  # xx, yy, xy, zz of plane strain [MPa], tension positive
+
+
+@dataclass(frozen=True, eq=False)  # without slots, for cached properties
 class LocalState:
     """Deformation and moduli of n points, in c states of the body each. All arrays broadcast to (n, c).
 
@@ -199,18 +203,18 @@ class LocalState:
         """J, volume by undeformed volume at the point itself [-]."""
         return 1.0 + self._volume_growth
 
-    @property
+    @cached_property
     def log_volume(self) -> Array:
         """Logarithm of J at the point itself, without cancellation [-]."""
         return log1p(self._volume_growth)
 
-    @property
+    @cached_property
     def excess(self) -> Array:
         """Tr C - 3 - 2 ln J at the point itself, without cancellation [-]."""
         squares = self.xx**2 + self.xy**2 + self.yx**2 + self.yy**2
         return 2.0 * (self.trace - self.log_volume) + squares
 
-    @property
+    @cached_property
     def _volume_growth(self) -> Array:
         return self.trace + self.xx * self.yy - self.xy * self.yx
 
@@ -223,6 +227,30 @@ class LocalState:
     def engineering_shear(self) -> Array:
         """The engineering shear strain between x and y, at small strain [-]."""
         return self.xy + self.yx
+
+    @cached_property
+    def small_stress(self) -> Stress:
+        """The stress sigma = 2 G eps + lambda theta 1 at small strain [MPa]."""
+        bulk = self.lame * self.dilatation
+        return (
+            2.0 * self.shear * self.xx + bulk,
+            2.0 * self.shear * self.yy + bulk,
+            self.shear * self.engineering_shear,
+            bulk,
+        )
+
+    @cached_property
+    def finite_stress(self) -> Stress:
+        """Cauchy's stress sigma = (G f (F F^T - 1) + lambda ln J 1) / J [MPa]."""
+        J = self.volume
+        shear = self.shear * slopes(self.stiffening, self.excess)[0] / J
+        bulk = self.lame * self.dilatation / J
+        return (
+            shear * (2.0 * self.xx + self.xx**2 + self.xy**2) + bulk,
+            shear * (2.0 * self.yy + self.yy**2 + self.yx**2) + bulk,
+            shear * (self.xy + self.yx + self.xx * self.yx + self.xy * self.yy),
+            bulk,
+        )
 
 
 def shape(exponent: Array, Q: Array) -> Array:

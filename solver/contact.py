@@ -26,12 +26,14 @@ square root of the distance. So the force beyond a line between elements has its
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.arrays import Array
+from solver.body.validation import finite
 
 STATE_NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", SHEAR_LIMITED: "cap"}
 
@@ -65,6 +67,64 @@ class FrictionLaw:
     def bound(self, length: Array) -> Array:
         """Return the traction bound as a force (n,) [N/mm] on the tributary `length` (n,) [mm] of points."""
         return np.full(length.shape, np.inf) if self.tau_max == np.inf else self.tau_max * length
+
+
+class LoadState(NamedTuple):
+    """Position of the surface relative to the bone, and its friction."""
+
+    depth: float  # indentation: travel of the bone towards the surface [mm]
+    mu: float  # [-]
+    tau: float = np.inf  # traction bound [MPa]
+    sense: int = 0  # of the friction force on the skin in settled sliding, +1 or -1; 0: it sticks or slips
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether no tangential force is possible."""
+        return self.mu == 0.0 or self.tau == 0.0
+
+    @property
+    def path_dependent(self) -> bool:
+        """Whether a state depends on its load path: friction on each node then opposes the node's last motion."""
+        return self.sense == 0 and not self.frictionless
+
+    def towards(self, target: "LoadState", part: float) -> "LoadState":
+        """Return the load state a `part` of the way to `target`; a bound where there was none is taken whole."""
+        if part == 1.0:
+            return target
+        tau = self.tau + part * (target.tau - self.tau) if max(self.tau, target.tau) < np.inf else target.tau
+        depth, mu, travel = (
+            begin + part * (end - begin)
+            for begin, end in ((self.depth, target.depth), (self.mu, target.mu), (self.travel, target.travel))
+        )
+        return LoadState(depth, mu, tau, target.sense, travel)
+
+    def validate(self) -> "LoadState":
+        """Return a copy with floats, for the kernels. Raises ValueError for values that are not allowed."""
+        law = FrictionLaw(float(self.mu), float(self.tau))
+        if self.sense not in (-1, 0, 1):
+            raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
+        depth, travel = finite("depth", self.depth), finite("travel", self.travel)
+        return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
+
+
+class ForceLoad(NamedTuple):
+    """Given forces on the skin: the normal force, and the tangential force along +x or the surface's travel."""
+
+    normal: float  # [N/mm]
+    tangential: float | None  # [N/mm]; None: `travel` is given instead
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def validate(self) -> "ForceLoad":
+        """Return a copy with floats, for the kernels. Raises ValueError for a value that is not finite."""
+        drag = None if self.tangential is None else finite("tangential", self.tangential)
+        return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
+
+    def towards(self, target: "ForceLoad", part: float) -> "ForceLoad":
+        """Return the forces a `part` of the way to `target`, which gives the same quantities."""
+        start, drag = self.tangential or 0.0, target.tangential
+        normal, travel = self.normal + part * (target.normal - self.normal), target.travel - self.travel
+        return ForceLoad(normal, None if drag is None else start + part * (drag - start), self.travel + part * travel)
 
 
 FRICTION_LAWS = (FrictionLaw,)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive import LocalState, shape, slopes
+from solver.constitutive import LocalState, Stress, shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,33 +174,6 @@ STRETCH_ALONG = Quantity(
 )
 
 
-Stress = tuple[Array, Array, Array, Array]  # xx, yy, xy, zz [MPa], tension positive
-
-
-def _small_stress(local: LocalState) -> Stress:
-    """Return sigma = 2 G eps + lambda theta 1 of plane strain."""
-    bulk = local.lame * local.dilatation
-    return (
-        2.0 * local.shear * local.xx + bulk,
-        2.0 * local.shear * local.yy + bulk,
-        local.shear * local.engineering_shear,
-        bulk,
-    )
-
-
-def _finite_stress(local: LocalState) -> Stress:
-    """Return sigma = (G f (F F^T - 1) + lambda ln J 1) / J of plane strain."""
-    J = local.volume
-    shear = local.shear * slopes(local.stiffening, local.excess)[0] / J
-    bulk = local.lame * local.dilatation / J
-    return (
-        shear * (2.0 * local.xx + local.xx**2 + local.xy**2) + bulk,
-        shear * (2.0 * local.yy + local.yy**2 + local.yx**2) + bulk,
-        shear * (local.xy + local.yx + local.xx * local.yx + local.xy * local.yy),
-        bulk,
-    )
-
-
 def _pressure(stress: Stress) -> Array:
     xx, yy, _, zz = stress
     return -(xx + yy + zz) / 3.0
@@ -227,8 +200,8 @@ def _of_stress(
         label,
         "MPa",
         meaning,
-        lambda local: invariant(_small_stress(local)),
-        lambda local: invariant(_finite_stress(local)),
+        lambda local: invariant(local.small_stress),
+        lambda local: invariant(local.finite_stress),
         signed,
     )
 

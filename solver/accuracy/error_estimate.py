@@ -28,7 +28,8 @@ from solver._kernels.active_set import SINGULAR
 from solver.accuracy.convergence_order import ORDER, from_halving
 from solver.arrays import Array
 from solver.body import Patches
-from solver.equilibrium import EquilibriumState, ForceLoad, Newton
+from solver.contact import ForceLoad
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger
 from solver.failures import NotConverged
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent

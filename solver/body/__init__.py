@@ -226,17 +226,17 @@ class Probes:
         return np.swapaxes(slopes.reshape(len(local), 2, *local.shape[2:]), 1, 2)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots, for cached properties
 class Endings:
     """Quadrature points of r receptor endings (patches of tissue): p points in all."""
 
     probes: Probes
     weights: Array  # (p,) areas [mm2]
-    patch: Indices  # (p,) number of the ending to which each probe belongs
+    patch: Indices  # (p,) number of the ending to which each probe belongs, ascending
     count: int
     tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
 
-    @property
+    @cached_property
     def areas(self) -> Array:
         """Area of each ending (r,) [mm2]; nan for one that lies outside the skin."""
         area = np.bincount(self.patch, self.weights, self.count)
@@ -245,9 +245,10 @@ class Endings:
     def means(self, values: Array) -> Array:
         """Return the averages (r, ...) of values (p, ...) over each ending; nan for one outside the skin."""
         wide = (slice(None), *([None] * (values.ndim - 1)))
-        total = np.zeros((self.count, *values.shape[1:]), values.dtype)
-        np.add.at(total, self.patch, values * self.weights[wide])
-        return total / self.areas[wide]
+        first = np.flatnonzero(np.diff(self.patch, prepend=-1))
+        out = np.full((self.count, *values.shape[1:]), np.nan, values.dtype)
+        out[self.patch[first]] = np.add.reduceat(values * self.weights[wide], first, axis=0)
+        return out / self.areas[wide]
 
 
 VALUES = Q2P1.shape(Q2P1.points)[0]  # (9 points, 9 nodes)
@@ -259,7 +260,6 @@ class Places(NamedTuple):
     probes: "Probes"
     hosts: Indices  # (m,) elements that hold probes
     number: Indices  # (p,) which of these elements holds each probe
-    gradients: Array  # (2, m, q, 9) gradients of their shape functions at the quadrature points
     modes: Array  # (p, 3) orthonormal volume modes at the probes
     constants: Array  # (5, p) shear modulus, first Lamé constant, stiffening exponent, tangent of the skin x, y
 
@@ -281,43 +281,44 @@ class MeshElements:
         """Integrate the elements of `mesh` with `materials` by region. Raises MeshError for a folded element."""
         return cls(*integrate_elements(mesh, materials, np.full((len(mesh.elements), 16), -1, np.int32)))
 
-    def volume_modes(self, volume: Array, element: Indices | slice = slice(None)) -> Array:
-        """Return the least-squares volume modes (e, 3, ...) of values (e, q, ...) at the quadrature points."""
-        return np.einsum("eq,eqm,eq...->em...", self.elements.weight[element], self.elements.modes[element], volume)
-
-    def volume(self, xx: Array, xy: Array, yx: Array, yy: Array) -> Array:  # noqa: ARG002 - as at finite strain
-        """Return the volume strain of a displacement gradient: its trace at small strain, ln J at finite strain."""
-        return xx + yy
-
     def places(self, probes: "Probes", tangent: Array | None = None) -> "Places":
         """Return `Places` of probes; `tangent` (p, 2) is the skin's direction, by default along x."""
         of, element, hosts = self.elements, probes.element, distinct(probes.element)
         along = np.tile([1.0, 0.0], (len(element), 1)) if tangent is None else tangent
         constants = np.stack([of.shear[element], of.lame[element], of.stiffening[element], *along.T])
-        gradients = np.stack([of.grad_x[hosts], of.grad_y[hosts]])
-        return Places(probes, hosts, np.searchsorted(hosts, element), gradients, self.modes_at(probes), constants)
+        return Places(probes, hosts, np.searchsorted(hosts, element), self.modes_at(probes), constants)
 
     def state(self, places: "Places", displacement: Array) -> LocalState:
         """Return strains and moduli at places, arrays (p, ...), for displacements (nodes, 2, ...)."""
         hosts, wide = places.hosts, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
         local = self.mesh.about_centre(displacement, hosts)
         gradient = places.probes.gradient_of(local.take(places.number, axis=0))
-        gradients = places.gradients @ local.reshape(len(hosts), 9, -1)
-        gradients = np.moveaxis(gradients.reshape(2, len(hosts), 9, *displacement.shape[1:]), 3, 1)
-        volume = self.volume(gradients[0, 0], gradients[1, 0], gradients[0, 1], gradients[1, 1])
-        fit = self.volume_modes(volume, hosts)[places.number]
+        fit = self.volume_modes(hosts, local)[places.number]
+        dilatation = np.sum(places.modes[wide] * fit, axis=1)
         shear, lame, stiffening, x, y = places.constants[wide]
         return LocalState(
             gradient[:, 0, 0], gradient[:, 0, 1], gradient[:, 1, 0], gradient[:, 1, 1],
-            np.einsum("pm,pm...->p...", places.modes, fit), shear, lame, stiffening, (x, y),
+            dilatation, shear, lame, stiffening, (x, y),
         )  # fmt: skip
+
+    def volume_modes(self, element: Indices, local: Array) -> Array:
+        """Return the least-squares modes (m, 3, ...) of the volume strain of elements, ln J at finite strain.
+
+        `local` (m, 9, 2, ...) are the displacements of their nodes.
+        """
+        modes = self.divergence[element] @ local.reshape(len(element), 18, -1)
+        return modes.reshape(len(element), 3, *local.shape[3:])
+
+    @cached_property
+    def weighted_modes(self) -> Array:
+        """Matrices (e, 3, q) from values at the quadrature points to their least-squares volume modes."""
+        return np.swapaxes(self.elements.weight[:, :, None] * self.elements.modes, 1, 2)
 
     @cached_property
     def divergence(self) -> Array:
         """Matrices (e, 3, 18) from nodal displacements x, y, x, y, ... to the volume modes of the small strain."""
-        weighted_modes = np.swapaxes(self.elements.weight[:, :, None] * self.elements.modes, 1, 2)
-        by_axis = np.stack([weighted_modes @ self.elements.grad_x, weighted_modes @ self.elements.grad_y], axis=-1)
-        return by_axis.reshape(-1, 3, 18)
+        by_axis = [self.weighted_modes @ slope for slope in (self.elements.grad_x, self.elements.grad_y)]
+        return np.stack(by_axis, axis=-1).reshape(-1, 3, 18)
 
     def modes_at(self, probes: "Probes") -> Array:
         """Return the orthonormal volume modes (p, 3) at probes."""

@@ -83,7 +83,7 @@ class FiniteBody(MeshElements):
 
     def pressure(self, u: Array) -> Array:
         """Return the modes (e, 3) of the pressure lambda ln J at `u`."""
-        return self.elements.lame[:, None] * self._logarithm(self.gradient(u))[1]
+        return self.elements.lame[:, None] * self._volume(self.gradient(u))[1]
 
     def energy(self, u: Array) -> float:
         """Return the energy stored in the body [N mm per mm]."""
@@ -105,7 +105,7 @@ class FiniteBody(MeshElements):
     def forces(self, displacement: Array) -> Array:
         """Do as `Body` says."""
         H = self.gradient(displacement)
-        log, volume = self._logarithm(H)
+        log, volume = self._volume(H)
         inverse, exceeds = _inverse_and_excess(H)
         G = self.elements.shear[:, None] * slopes(self.elements.stiffening[:, None], _excess(H, log))[0]
         pressure = self.elements.lame[:, None] * (self.elements.modes @ volume[:, :, None])[:, :, 0]
@@ -120,20 +120,29 @@ class FiniteBody(MeshElements):
         local = self.mesh.local(u)
         return np.stack([self.elements.grad_x @ local, self.elements.grad_y @ local], axis=-1)
 
-    def volume(self, xx: Array, xy: Array, yx: Array, yy: Array) -> Array:
-        """Return ln J of a displacement gradient."""
-        return log1p(xx + yy + (xx * yy - xy * yx))
+    def volume_modes(self, element: Indices, local: Array) -> Array:
+        """Do as `MeshElements` says."""
+        slopes = np.stack([self.elements.grad_x[element], self.elements.grad_y[element]])
+        gradient = slopes @ local.reshape(len(element), 9, -1)  # (2, m, q, 2 c)
+        x, y = np.moveaxis(gradient.reshape(2, len(element), -1, 2, local[0, 0, 0].size), 3, 1)
+        log = _logarithm(x[0], y[0], x[1], y[1])
+        return (self.weighted_modes[element] @ log).reshape(len(element), 3, *local.shape[3:])
 
-    def _logarithm(self, H: Array) -> tuple[Array, Array]:
+    def _volume(self, H: Array) -> tuple[Array, Array]:
         """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
-        log = self.volume(H[..., 0, 0], H[..., 0, 1], H[..., 1, 0], H[..., 1, 1])
-        return log, self.volume_modes(log)
+        log = _logarithm(H[..., 0, 0], H[..., 0, 1], H[..., 1, 0], H[..., 1, 1])
+        return log, (self.weighted_modes @ log[..., None])[..., 0]
 
     def _energy(self, H: Array) -> complex:
-        log, volume = self._logarithm(H)
+        log, volume = self._volume(H)
         growth = shape(self.elements.stiffening[:, None], _excess(H, log))
         shear = np.sum(self.elements.weight * self.elements.shear[:, None] / 2.0 * growth)
         return complex(shear + np.sum(self.elements.lame / 2.0 * (volume**2).T))
+
+
+def _logarithm(xx: Array, xy: Array, yx: Array, yy: Array) -> Array:
+    """Return ln J of a displacement gradient."""
+    return log1p(xx + yy + (xx * yy - xy * yx))
 
 
 def _inverse_and_excess(H: Array) -> tuple[Array, Array]:

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from solver.arrays import Array
 from solver.body.skin import SkinCompression
 from solver.constitutive import Law, stress, tangent
-from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, Newton, Termination
 from solver.failures import NotConverged
 from solver.progress import check_stop, report_progress
 
@@ -56,6 +57,7 @@ class BranchControl:
 
 
 BRANCH = BranchControl()
+_ON_BRANCH = Termination(BRANCH.tolerance)
 
 
 class BranchBody(Protocol):
@@ -139,7 +141,7 @@ class Continuation:
         for part in BRANCH.hop:
             load = self._with_value(last.load, min((1.0 + part) * branch.value, target))
             try:
-                state = self.body.newton.settle(last, load, BRANCH.tolerance)
+                state = self.body.newton.settle(last, load, _ON_BRANCH)
             except NotConverged:
                 continue
             near = abs(state.force - last.force).max() <= BRANCH.force_change * abs(last.force).max()
@@ -210,7 +212,7 @@ class Continuation:
             return Branch(branch.states[: after + 1], values[after], limited=False)
         for near in branch.states[max(after - 1, 0) : after + 1]:
             with suppress(NotConverged):
-                state = self.body.newton.settle(near, self._with_value(near.load, target), BRANCH.tolerance)
+                state = self.body.newton.settle(near, self._with_value(near.load, target), _ON_BRANCH)
                 if not jumped_branch(self.body, near, state):
                     return Branch((*branch.states[:after], state), target, limited=False)
         return Branch(branch.states[:after], values[after - 1], limited=True, lost=True)

@@ -15,8 +15,9 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED
 from solver._kernels.contact_system import STEEP
 from solver.arrays import Array
+from solver.contact import LoadState
 from solver.continuation import BRANCH, LARGEST_MU, Branch, Continuation, folds_at
-from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.failures import NoSteadyState, NotConverged

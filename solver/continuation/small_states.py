@@ -15,7 +15,8 @@ from threading import get_ident
 import numpy as np
 
 from solver.arrays import Array
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import forces_of, slide_from_guess, slide_under, sliding_load

@@ -26,8 +26,7 @@ from solver.arrays import (
     SkinPosition,
 )
 from solver.body import CondensedBody
-from solver.body.validation import finite
-from solver.contact import FrictionLaw
+from solver.contact import ForceLoad, LoadState
 from solver.failures import ContactLost, NotConverged
 
 States = NDArray[np.int32]
@@ -59,66 +58,19 @@ class NewtonControl:
 CONTROL = NewtonControl()
 
 
-class LoadState(NamedTuple):
-    """Position of the surface relative to the bone, and its friction."""
+class Termination(NamedTuple):
+    """When iterations for an equilibrium end: at the larger of two errors, as estimated, or without one."""
 
-    depth: float  # indentation: travel of the bone towards the surface [mm]
-    mu: float  # [-]
-    tau: float = np.inf  # traction bound [MPa]
-    sense: int = 0  # of the friction force on the skin in settled sliding, +1 or -1; 0: it sticks or slips
-    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+    tolerance: float = 1e-10  # of displacements [mm]
+    part: float = 0.0  # the same, by the first step
+    limit: int = 30  # iterations, at most
 
-    @property
-    def frictionless(self) -> bool:
-        """Whether no tangential force is possible."""
-        return self.mu == 0.0 or self.tau == 0.0
 
-    @property
-    def path_dependent(self) -> bool:
-        """Whether a state depends on its load path: friction on each node then opposes the node's last motion."""
-        return self.sense == 0 and not self.frictionless
-
-    def towards(self, target: "LoadState", part: float) -> "LoadState":
-        """Return the load state a `part` of the way to `target`; a bound where there was none is taken whole."""
-        if part == 1.0:
-            return target
-        tau = self.tau + part * (target.tau - self.tau) if max(self.tau, target.tau) < np.inf else target.tau
-        depth, mu, travel = (
-            begin + part * (end - begin)
-            for begin, end in ((self.depth, target.depth), (self.mu, target.mu), (self.travel, target.travel))
-        )
-        return LoadState(depth, mu, tau, target.sense, travel)
-
-    def validate(self) -> "LoadState":
-        """Return a copy with floats, for the kernels. Raises ValueError for values that are not allowed."""
-        law = FrictionLaw(float(self.mu), float(self.tau))
-        if self.sense not in (-1, 0, 1):
-            raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
-        depth, travel = finite("depth", self.depth), finite("travel", self.travel)
-        return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
+TO_ROUND_OFF = Termination()
 
 
 _UNLOADED = LoadState(0.0, 0.0)
 Anchor = Callable[[LoadState], Array]  # positions along x (k,) at which nodes stick under a load [mm]
-
-
-class ForceLoad(NamedTuple):
-    """Given forces on the skin: the normal force, and the tangential force along +x or the surface's travel."""
-
-    normal: float  # [N/mm]
-    tangential: float | None  # [N/mm]; None: `travel` is given instead
-    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
-
-    def validate(self) -> "ForceLoad":
-        """Return a copy with floats, for the kernels. Raises ValueError for a value that is not finite."""
-        drag = None if self.tangential is None else finite("tangential", self.tangential)
-        return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
-
-    def towards(self, target: "ForceLoad", part: float) -> "ForceLoad":
-        """Return the forces a `part` of the way to `target`, which gives the same quantities."""
-        start, drag = self.tangential or 0.0, target.tangential
-        normal, travel = self.normal + part * (target.normal - self.normal), target.travel - self.travel
-        return ForceLoad(normal, None if drag is None else start + part * (drag - start), self.travel + part * travel)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -279,13 +231,13 @@ class Newton:
         return corrected, max(largest, abs(deeper), abs(along)), changes
 
     def settle(
-        self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
+        self, start: EquilibriumState, load: LoadState, termination: Termination = TO_ROUND_OFF
     ) -> EquilibriumState:
-        """Return the equilibrium under `load`, from `start`, with displacements accurate to `tolerance` [mm].
+        """Return the equilibrium under `load`, from `start`.
 
         Tangents and their factors are kept where steps are small or decrease fast. The remaining error is estimated
         from consecutive steps: convergence is quadratic with a new tangent, linear with a kept one. Raises NotConverged
-        after `limit` iterations, or where the body would turn inside out.
+        after the iterations of `termination`, or where the body would turn inside out.
         """
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
         position = self._position(start.u, load, start.place(self.condensed)[:, 0].copy())
@@ -293,10 +245,10 @@ class Newton:
         begin = replace(start, state=states.state, sense=states.sense, load=load)
         if self.condensed.constant and self.condensed.motions.shape[1]:
             begin = lower_onto_surface(self.condensed, begin)
-        return self.settle_from(begin, start, None, tolerance, limit)
+        return self.settle_from(begin, start, None, termination)
 
     def settle_from(
-        self, begin: EquilibriumState, start: EquilibriumState, forces: ForceLoad | None, tolerance: float, limit: int
+        self, begin: EquilibriumState, start: EquilibriumState, forces: ForceLoad | None, termination: Termination
     ) -> EquilibriumState:
         """Return the equilibrium one step from `start`, as `settle` does, with iterations that begin at `begin`.
 
@@ -312,16 +264,16 @@ class Newton:
         def linearise(state: EquilibriumState, *, reuse: bool = False) -> bool:
             return self.linearise(state, state.load, anchor(state.load), rounds, forces, reuse=reuse)
 
-        return self._iterate(begin, linearise, anchor, tolerance, limit)
+        return self._iterate(begin, linearise, anchor, termination)
 
     def _iterate(
-        self, begin: EquilibriumState, linearise: Callable[..., bool], anchor: Anchor, tolerance: float, limit: int
+        self, begin: EquilibriumState, linearise: Callable[..., bool], anchor: Anchor, termination: Termination
     ) -> EquilibriumState:
         """Return the equilibrium that iterations from `begin` end in. Raises NotConverged."""
         state = previous = begin
         reuse = self.condensed.equilibrium is begin.u
-        scale, last, new, equal_steps = 1.0, 0.0, False, 0
-        for _ in range(limit):
+        scale, first, last, new, equal_steps = 1.0, 0.0, 0.0, False, 0
+        for _ in range(termination.limit):
             if reuse:
                 if not linearise(state, reuse=True):
                     reuse = False
@@ -337,12 +289,14 @@ class Newton:
             state, largest, changes = self.correct(previous, anchor, scale)
             if not largest < CONTROL.unbounded:
                 raise NotConverged("the displacements grow without bound")
+            first = first or largest
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
             equal_steps = equal_steps + 1 if changes and abs(largest - last) <= CONTROL.same * last else 0
             if equal_steps == CONTROL.repeats:
                 raise NotConverged("states of contact come again and again")
             remainder = min((2.0 * fall) ** 2 if not reuse else 4.0 * fall if new else 2.0 * fall, 1.0)
-            if largest * remainder < CONTROL.margin * tolerance and not changes and scale == 1.0:
+            accuracy = max(termination.tolerance, termination.part * first)
+            if largest * remainder < CONTROL.margin * accuracy and not changes and scale == 1.0:
                 self.condensed.equilibrium = state.u
                 return state
             new = not reuse
@@ -350,7 +304,7 @@ class Newton:
             # A kept tangent has turned by then. Its step changes volume to second order, which a stiff body resists.
             reuse = (still if reuse else fall < CONTROL.fast and scale == 1.0) and self.bulk * largest < CONTROL.turn
             last = largest
-        raise NotConverged(f"no equilibrium within {limit} iterations")
+        raise NotConverged(f"no equilibrium within {termination.limit} iterations")
 
     def solve_linear(
         self,

@@ -15,7 +15,8 @@ import numpy as np
 from solver._kernels.compiling import OPEN, STICK
 from solver.arrays import Array
 from solver.body import Patches
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
+from solver.contact import ForceLoad, LoadState
+from solver.equilibrium import EquilibriumState, Newton, Termination, lower_onto_surface
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_stepping import StepControl, advance, load_of, solve_under_forces
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
@@ -158,7 +159,7 @@ class LoadPath:
             state = solve_under_forces(self.newton, lower_onto_surface(self.newton.condensed, previous), forces)
         else:
             load = previous.load._replace(depth=aim.press, travel=-aim.along)
-            state = self.newton.settle(previous, load, self._tolerance)
+            state = self.newton.settle(previous, load, Termination(self._tolerance))
         if self.tissue is not None:
             self.energies.append(self.tissue.commit(state, step))
         return state

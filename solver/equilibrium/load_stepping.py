@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
+from solver.contact import ForceLoad, LoadState
+from solver.equilibrium import TO_ROUND_OFF, EquilibriumState, Newton, Termination, lower_onto_surface
 from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
@@ -93,7 +94,7 @@ def march(
     it was, or slips from there. Raises NotConverged, saying where, Cancelled, and ValueError for a load that is not
     allowed.
     """
-    state = EquilibriumState.undeformed(newton.condensed) if start is None else start
+    state, end = EquilibriumState.undeformed(newton.condensed) if start is None else start, Termination(tolerance)
     for number, aim in enumerate(aims := [aim.validate() for aim in course]):
         if len(aims) > 1:
             report_progress("pressing and sliding step by step", number / len(aims))
@@ -105,7 +106,7 @@ def march(
                 forces = ForceLoad(normal, drag, begin.load.travel).towards(aim, part)
                 state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), forces)
             else:
-                state = newton.settle(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), tolerance)
+                state = newton.settle(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), end)
 
         advance(step, lambda _fraction, _part, why: at_end_of_path(state.load.depth, state.load.travel, why))
         yield state
@@ -148,19 +149,19 @@ def find_root(function: Callable[[float], tuple[float, State]], start: float, cl
 
 
 def solve_under_forces(
-    newton: Newton, start: EquilibriumState, forces: ForceLoad, tolerance: float = 1e-10, limit: int = 30
+    newton: Newton, start: EquilibriumState, forces: ForceLoad, termination: Termination = TO_ROUND_OFF
 ) -> EquilibriumState:
     """Return the equilibrium under `forces`, one backward Euler step from `start`, with its friction and sense.
 
-    Raises NotConverged after `limit` iterations.
+    Raises NotConverged.
     """
     try:
-        state = newton.settle_from(start, start, forces, tolerance, limit)
+        state = newton.settle_from(start, start, forces, termination)
     except ContactLost:  # for example where friction is so small that all but one node slip
         if forces.tangential is None:
             raise
-        return _find_travel(newton, start, start, forces, tolerance, limit)
-    return _find_travel(newton, start, state, forces, tolerance, limit) if _slips_freely(state, forces) else state
+        return _find_travel(newton, start, start, forces, termination)
+    return _find_travel(newton, start, state, forces, termination) if _slips_freely(state, forces) else state
 
 
 def _slips_freely(state: EquilibriumState, forces: ForceLoad) -> bool:
@@ -171,7 +172,7 @@ def _slips_freely(state: EquilibriumState, forces: ForceLoad) -> bool:
 
 
 def _find_travel(
-    newton: Newton, start: EquilibriumState, state: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
+    newton: Newton, start: EquilibriumState, state: EquilibriumState, forces: ForceLoad, termination: Termination
 ) -> EquilibriumState:
     """Return the equilibrium under the given drag, one step from `start`, by a search for its travel from `state` on.
 
@@ -181,7 +182,7 @@ def _find_travel(
 
     def drag_error(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
-        near = newton.settle_from(near, start, ForceLoad(forces.normal, None, travel), tolerance, limit)
+        near = newton.settle_from(near, start, ForceLoad(forces.normal, None, travel), termination)
         return float(near.force[0]) - drag, near
 
     state_at_drag = find_root(drag_error, state.load.travel, DRAG_TOLERANCE * state.load.mu * forces.normal)
@@ -227,7 +228,8 @@ def solve_full_slip(
         nonlocal state
         if part < 1.0:
             report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
-        state = newton.settle(state, begin.towards(load, part), tolerance if part == 1.0 else SLIP_CONTROL.leading)
+        termination = Termination(tolerance if part == 1.0 else SLIP_CONTROL.leading)
+        state = newton.settle(state, begin.towards(load, part), termination)
 
     def refusal(fraction: float, part: float, reason: NotConverged) -> NotConverged:
         last = begin.towards(load, fraction)

@@ -18,10 +18,10 @@ from solver._kernels.contact_system import assemble_contact_system, bounded_leng
 from solver.arrays import Array, ContactStates, SkinPosition
 from solver.body import Patches
 from solver.body.finite import IMAGINARY
-from solver.contact import STATE_NAMES
+from solver.contact import STATE_NAMES, ForceLoad, LoadState
 from solver.continuation import jumped_branch
 from solver.continuation.existence import sound
-from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_arguments
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_arguments
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import slide_from_guess, sliding_load, solve_full_slip, solve_under_forces
 from solver.failures import NotConverged
@@ -180,7 +180,8 @@ class Nearby:
         load = state.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         if scene.normal_force is None:
             return solve_full_slip(newton, load._replace(depth=scene.loading.depth), state, GOOD)
-        return solve_under_forces(newton, replace(state, load=load), ForceLoad(scene.normal_force, None), GOOD)
+        force = ForceLoad(scene.normal_force, None)
+        return solve_under_forces(newton, replace(state, load=load), force, Termination(GOOD))
 
     def _on_branch(self, near: EquilibriumState) -> bool:
         """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves."""

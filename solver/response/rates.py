@@ -14,7 +14,8 @@ import numpy as np
 from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
-from solver.equilibrium import EquilibriumState, ForceLoad
+from solver.contact import ForceLoad
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger
 from solver.equilibrium.load_path import PRESSING_TIME, LoadPath, march
 from solver.failures import SolveFailure

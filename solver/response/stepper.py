@@ -15,8 +15,9 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.body import Endings, Patches, Probes
+from solver.contact import ForceLoad, LoadState
 from solver.continuation.small_states import expected_depth
-from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lower_onto_surface
+from solver.equilibrium import BY_DEPTH, EquilibriumState, lower_onto_surface
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing

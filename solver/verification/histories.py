@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from solver.equilibrium import LoadState
+from solver.contact import LoadState
 from solver.equilibrium.load_stepping import march
 from solver.scene import Scene
 from solver.verification.methods import MESHED, Kinematics

@@ -10,10 +10,11 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.body.linear import LinearBody
+from solver.contact import LoadState
 from solver.continuation.existence import steady
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled_state
-from solver.equilibrium import EquilibriumState, LoadState
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.load_stepping import sliding_load
 from solver.failures import SolveFailure

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.equilibrium import EquilibriumState, LoadState
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.response.stepper import Stepper, stepper
 from solver.scene import Scene

@@ -9,8 +9,8 @@ from solver import ContactLost, Finger, Loading, Receptor
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
-from solver.contact import FrictionLaw
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
+from solver.contact import ForceLoad, FrictionLaw, LoadState
+from solver.equilibrium import EquilibriumState, Newton, lower_onto_surface
 from solver.equilibrium.load_path import Aim, LoadPath
 from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing, finger_mesh

@@ -5,8 +5,7 @@ import pytest
 
 from solver.body.finite import FiniteBody
 from solver.constitutive import LAWS, stress
-from solver.contact import FrictionLaw
-from solver.equilibrium import LoadState
+from solver.contact import FrictionLaw, LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.verification.published import contacts
 from solver.verification.published.contacts import ELEMENT

@@ -8,8 +8,8 @@ import pytest
 
 from solver import Friction, Loading, Material, Materials, Scene
 from solver._kernels.compiling import SHEAR_LIMITED, SLIP
-from solver.contact import FrictionLaw
-from solver.equilibrium import EquilibriumState, LoadState
+from solver.contact import FrictionLaw, LoadState
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import march
 from solver.equilibrium.load_stepping import sliding_load, solve_full_slip

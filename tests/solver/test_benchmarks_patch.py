@@ -13,7 +13,8 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import MATERIALS, Hooke
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import Q2P1, block
 from solver.verification.published.bodies import distort

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Receptor
-from solver.equilibrium import LoadState
+from solver.contact import LoadState
 from solver.equilibrium.finger import MeshTransfer, Places
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh.mesher import Sizing, finger_mesh

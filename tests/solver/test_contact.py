@@ -9,7 +9,8 @@ from solver import ContactLost
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
+from solver.contact import ForceLoad, LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.load_stepping import slide_from_guess, slide_under, solve_full_slip, solve_under_forces
 from solver.mesh import block
 

@@ -9,8 +9,9 @@ from solver._kernels.compiling import SLIP
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke, stress
+from solver.contact import LoadState
 from solver.continuation.finite_states import solve_dead_load
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.equilibrium import EquilibriumState, Newton
 from tests.solver.finite_examples import block, boundary_nodes
 
 DERMIS = NeoHooke(0.08, 0.48)

@@ -12,8 +12,9 @@ from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.constitutive import NeoHooke, Ogden
 from solver.constitutive import shape as grown
+from solver.contact import ForceLoad, LoadState
 from solver.continuation.small_states import settled_state
-from solver.equilibrium import ForceLoad, LoadState, Newton
+from solver.equilibrium import Newton, Termination
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing
@@ -186,7 +187,7 @@ def slip(finger, scene, start=None):
     state = solve_full_slip(finger.newton, load_of(scene, depth), start, 1e-12)
     if scene.normal_force is None:
         return state
-    return solve_under_forces(finger.newton, state, ForceLoad(scene.normal_force, None), 1e-12)
+    return solve_under_forces(finger.newton, state, ForceLoad(scene.normal_force, None), Termination(1e-12))
 
 
 def finite_numbers(finger, scene, start):
@@ -226,7 +227,10 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     places = Probes.at(mesh, body.centre, elements, local)
     count = len(elements)
     probes = FinitePatches(
-        body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1)))
+        body,
+        Endings(
+            places, np.linspace(1.0, 2.0, count), np.arange(count) * 3 // count, 3, np.tile([1.0, 0.0], (count, 1))
+        ),
     )
     rng = np.random.default_rng(2)
     u, steps = rng.uniform(-0.015, 0.015, mesh.nodes.shape), rng.normal(size=(*mesh.nodes.shape, 2))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
+from solver.contact import LoadState
 from solver.continuation.existence import steady
-from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.response.finite_answers import Meshes, coarse_solution, refine
 from tests.solver.finite_examples import published

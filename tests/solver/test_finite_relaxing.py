@@ -15,7 +15,8 @@ from solver.body.finite import FiniteBody
 from solver.constitutive import Hooke, NeoHooke, Past, Prony, overstress
 from solver.constitutive import stress as relaxed_stress
 from solver.constitutive import tangent as relaxed_tangent
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState, Newton, Termination
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.progress import listening
 from tests.solver.finite_examples import block
@@ -219,7 +220,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     pushes = []
     for depth, duration in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
         newton.condensed.ready(duration)
-        state = newton.settle(state, LoadState(depth, 0.3), 1e-9)
+        state = newton.settle(state, LoadState(depth, 0.3), Termination(1e-9))
         force, _ = oracle.forces_and_tangents(body, state.u, np.zeros((len(body.elements.nodes), 3)))
         total = np.zeros(body.mesh.nodes.shape)
         np.add.at(total, body.elements.nodes, (force + newton.condensed.excess(state.u)).reshape(-1, 9, 2))
@@ -239,7 +240,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     state, states, rates, steps, time = EquilibriumState.undeformed(body.condensed), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
         newton.condensed.ready(time / steps)
-        state = newton.settle(state, LoadState(0.2 * number / steps, 0.3), 1e-9)
+        state = newton.settle(state, LoadState(0.2 * number / steps, 0.3), Termination(1e-9))
         newton.condensed.commit(state.u, time / steps)
         states.append(state)
         metrics = [

@@ -10,7 +10,7 @@ import pytest
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.accuracy.error_estimate import NO_NESTED_STATE
-from solver.equilibrium import LoadState
+from solver.contact import LoadState
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.response import finite_answers
 from solver.response.finite_answers import Meshes, coarse_solution, refine

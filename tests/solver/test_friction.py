@@ -13,15 +13,8 @@ from solver.arrays import ContactStates, LoadArguments, StateChanges
 from solver.body import CondensedLinear
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
-from solver.contact import FRICTION_LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
-from solver.equilibrium import (
-    BY_DEPTH,
-    BY_FRICTION,
-    BY_TRAVEL,
-    EquilibriumState,
-    LoadState,
-    Newton,
-)
+from solver.contact import FRICTION_LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw, LoadState
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, BY_TRAVEL, EquilibriumState, Newton, Termination
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import block
 from solver.response.stepper import SmallStepper
@@ -126,7 +119,7 @@ def rub(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06, 0.0
                                  (0.06, 0.05), (0.03, 0.05), (-0.1, 0.05))):  # fmt: skip
     states = [EquilibriumState.undeformed(newton.condensed)]
     for depth, travel in drives:
-        states.append(newton.settle(states[-1], LoadState(depth, law.mu, law.tau_max, 0, travel), 1e-13))
+        states.append(newton.settle(states[-1], LoadState(depth, law.mu, law.tau_max, 0, travel), Termination(1e-13)))
     return states
 
 
@@ -256,7 +249,7 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     law = BOUND_OF_CUSHION
     start = rub(cushion, law, ((0.06, 0.0), (0.06, 0.004)))[-1]
     load = LoadState(0.06, law.mu, law.tau_max, 0, 0.015)
-    state = cushion.settle(start, load, 1e-13)
+    state = cushion.settle(start, load, Termination(1e-13))
     assert set(state.state.tolist()) == {OPEN, STICK, SLIP, SHEAR_LIMITED}
     anchor = start.place(cushion.condensed)[:, 0] + load.travel - start.load.travel
     assert cushion.linearise(state, load, anchor)
@@ -264,7 +257,8 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     for column, name in ((BY_DEPTH, "depth"), (BY_FRICTION, "mu"), (BY_TRAVEL, "travel")):
         step = 1e-5
         ahead, behind = (
-            cushion.settle(start, load._replace(**{name: getattr(load, name) + h}), 1e-13) for h in (step, -step)
+            cushion.settle(start, load._replace(**{name: getattr(load, name) + h}), Termination(1e-13))
+            for h in (step, -step)
         )
         np.testing.assert_array_equal(ahead.state, behind.state)
         slope = (ahead.u[skin] - behind.u[skin]).ravel() / (2.0 * step)

@@ -8,9 +8,9 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
 from solver.constitutive import Hooke, NeoHooke, Ogden, Prony
-from solver.contact import FrictionLaw
+from solver.contact import ForceLoad, FrictionLaw, LoadState
 from solver.continuation.finite_states import solve_dead_load
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
 from solver.mesh import Mesh, MeshError, block

@@ -12,7 +12,8 @@ from solver._kernels import elements as element_loops
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive import LAWS, NeoHooke
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 

@@ -8,8 +8,9 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke, Ogden
+from solver.contact import LoadState
 from solver.continuation import Continuation, existence, finite_states, folds_at
-from solver.equilibrium import BY_FRICTION, LoadState, Newton
+from solver.equilibrium import BY_FRICTION, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import grid_mesh, mesher

@@ -7,7 +7,8 @@ import pytest
 
 from solver import Friction, Loading, Scene
 from solver.body import Probes
-from solver.equilibrium import EquilibriumState, LoadState
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.response.stepper import LivePicture

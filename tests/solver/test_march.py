@@ -7,7 +7,8 @@ import pytest
 
 from solver._kernels.compiling import SLIP, STICK
 from solver.accuracy.audits import course_audits
-from solver.equilibrium import EquilibriumState, LoadState
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.verification.histories import press_and_slide
 from tests.solver.finite_examples import finger

@@ -9,7 +9,8 @@ from solver.accuracy.error_estimate import PARTS, estimate_errors
 from solver.body.finite import FiniteBody
 from solver.body.linear import Elastic, LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke
-from solver.equilibrium import ForceLoad, LoadState, Newton
+from solver.contact import ForceLoad, LoadState
+from solver.equilibrium import Newton
 from solver.equilibrium.load_stepping import march, slide_under, solve_full_slip
 from solver.mesh import HalvedMesh, block, quality
 

@@ -9,8 +9,9 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
 from solver.constitutive import Hooke, NeoHooke
+from solver.contact import LoadState
 from solver.continuation.finite_states import solve_dead_load
-from solver.equilibrium import LoadState, Newton
+from solver.equilibrium import Newton
 from solver.equilibrium.load_stepping import march
 from solver.mesh import Mesh
 from solver.mesh import block as round_block

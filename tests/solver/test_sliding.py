@@ -8,7 +8,8 @@ import pytest
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
-from solver.equilibrium import LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import Newton
 from solver.equilibrium.load_stepping import solve_full_slip
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle

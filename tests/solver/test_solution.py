@@ -25,7 +25,7 @@ from solver import (
 )
 from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
-from solver.equilibrium import LoadState
+from solver.contact import LoadState
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh.mesher import Sizing

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve, stepper
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState
+from solver.contact import ForceLoad, LoadState
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import march
 from solver.mesh.mesher import Sizing

@@ -8,7 +8,8 @@ import pytest
 from solver._kernels.compiling import STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.mesh import grid_mesh
 
 RADIUS, YOUNG, NU, MU = 5.0, 0.08, 0.4999, 0.3  # nearly incompressible: normal and shear do not couple

@@ -9,7 +9,8 @@ from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke, NeoHooke
-from solver.equilibrium import EquilibriumState, LoadState, Newton
+from solver.contact import LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.mesh import Mesh, block

@@ -13,8 +13,8 @@ from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke
-from solver.contact import OPEN, STICK, FrictionLaw
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
+from solver.contact import OPEN, STICK, ForceLoad, FrictionLaw, LoadState
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.mesh import Mesh
 from solver.verification.methods import Kinematics
