@@ -38,6 +38,17 @@ def test_a_stored_number_that_comes_out_otherwise_is_named_with_exit_code_3(sess
     assert why.startswith("analysis.json was made by the same versions as now")
 
 
+def test_an_analysis_that_names_a_damaged_decision_comes_out_the_same_again(session_folder, tmp_path, capsys):
+    session = shutil.copytree(session_folder, tmp_path / "P07")
+    (session / "decisions.jsonl").write_text("junk\n")
+    run(["analyse", str(session), "--json"])
+    capsys.readouterr()
+    assert run(["verify", str(session), "--json"]) == 3
+    problems = json.loads(capsys.readouterr().out)["problems"]
+    assert problems == ["line 1 of decisions.jsonl is left out: it holds no decision"]
+    assert run(["replay", str(session), "--fast", "--json"]) == 0
+
+
 def test_a_replay_leaves_the_session_as_it_was(session_folder):
     before = {path.name: path.read_bytes() for path in session_folder.iterdir()}
     assert run(["replay", str(session_folder), "--speed", "500", "--json"]) == 0

@@ -4,6 +4,7 @@ Exit code 0: whole; 3: readable, with what is lost or differs named; 1: unreadab
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, decisions_of, is_current, repeat, stored_document
@@ -44,7 +45,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
                 continue
             if not is_current(document, decisions):
                 flaws.append(f"{name} was made under other decisions than those in force: make it anew")
-            fresh = repeat(name, document, recording, decisions_of(document))
+            made_with = replace(decisions_of(document), problems=decisions.problems)
+            fresh = repeat(name, document, recording, made_with)
         except (RecordingError, SettingsError) as damaged:
             flaws.append(" ".join(str(damaged).split()))
             continue
