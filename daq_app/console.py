@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Generator, Mapping
@@ -224,11 +225,19 @@ def point_advice(text: str) -> str:
     return ", its fraction behind a point" if re.fullmatch(r"'?[+-]?\d*,\d+'?", text.strip()) else ""
 
 
+class _Help(argparse.HelpFormatter):
+    """Fills each paragraph of a text to the width of the terminal, but for those with indented lines."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:  # noqa: ARG002  argparse's own
+        paragraphs = text.strip().split("\n\n")
+        return "\n\n".join(one if "\n  " in one else textwrap.fill(one, width) for one in paragraphs)
+
+
 class Parser(argparse.ArgumentParser):
     """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401  argparse's own
-        super().__init__(*args, **kwargs)
+        super().__init__(*args, **kwargs, formatter_class=_Help)
         # argparse's own takes -1e-3 and -inf for options
         self._negative_number_matcher = re.compile(r"-(\.?\d|inf$|nan$)", re.IGNORECASE)
 

@@ -120,12 +120,11 @@ def _overview() -> argparse.ArgumentParser:
         prog="daq-app",
         usage="daq-app VERB [options]",
         description="Friction psychophysics: the experiment, the transducer, the finite-element finger.",
-        epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example.\n"
-        "'daq-app' alone opens the window, 'daq-app window SESSION' a session in it.\n"
-        "'daq-app --version' tells the program's version.\n"
+        epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example. "
+        "'daq-app' alone opens the window, 'daq-app window SESSION' a session in it. "
+        "'daq-app --version' tells the program's version.\n\n"
         "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a file, "
         "3 done with named losses or flaws, 130 stopped",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
 
 
@@ -140,7 +139,6 @@ def parser_of(name: str, verb: ModuleType) -> argparse.ArgumentParser:
         prog=f"daq-app {name}",
         description=verb.__doc__,
         epilog=f"example:\n  {verb.EXAMPLE}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     verb.add_arguments(parser)

@@ -39,9 +39,15 @@ def test_an_unknown_verb_is_one_sentence_and_exit_code_2(capsys):
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_every_verb_explains_itself_with_an_example(verb, capsys):
+def test_every_verb_explains_itself_within_the_terminal_with_an_example(verb, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     assert run([verb, "--help"]) == 0
     output = capsys.readouterr().out
+    explanation = output.partition("\n\n")[2].partition("\nexample:")[
+        0
+    ]  # argparse keeps each choice of the usage whole
+    assert explanation
+    assert all(len(line) <= 80 for line in explanation.splitlines())
     module = importlib.import_module(f"daq_app.cli.verbs.{verb.replace('import', 'import_').replace('-', '_')}")
     assert module.EXAMPLE in output
     assert "--json" in output
