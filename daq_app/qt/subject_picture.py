@@ -11,7 +11,7 @@ from daq_app.qt.parts import Openness, WrappedLabel, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, missing_glyphs, px
 from daq_app.window.new_session import Refusal, SessionForm
-from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, preview, translator
+from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, first_question, preview, translator
 from daq_app.wording import tr
 from sessions.plan.protocols.languages import ENGLISH
 
@@ -85,10 +85,10 @@ class Thumbnail(SubjectPicture):
         if source == self._source:
             return
         self._source = source
-        pages = preview(form, translator(form.language or ENGLISH))
-        self.setVisible(not isinstance(pages, Refusal))
-        if not isinstance(pages, Refusal):
-            self.show_page(next((page.view for page in pages if page.view.asks), pages[0].view), size)
+        view = first_question(form, translator(form.language or ENGLISH))
+        self.setVisible(not isinstance(view, Refusal))
+        if not isinstance(view, Refusal):
+            self.show_page(view, size)
 
 
 class Mirror(QWidget):

@@ -1,6 +1,6 @@
 """The subject: texts and pages, all pages before there is a session, an answer as it is given, and whose a key is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
@@ -220,21 +220,33 @@ def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage,
 
     The session's own machine goes through every trial, and each page is the window's; codes and orders are an example.
     """
+    plan = _plan(form)
+    return plan if isinstance(plan, Refusal) else tuple(_pages(plan, translate))
+
+
+def first_question(form: SessionForm, translate: Translate = str) -> SubjectView | Refusal:
+    """Return the first page of `preview` that asks something, or the first of all, or what is wrong with the form."""
+    plan = _plan(form)
+    if isinstance(plan, Refusal):
+        return plan
+    pages = _pages(plan, translate)
+    first = next(pages).view
+    return next((page.view for page in pages if page.view.asks), first)
+
+
+def _plan(form: SessionForm) -> SessionPlan | Refusal:
+    """Return an example of a plan of the form's protocol."""
     folder = form.folder if form.study.strip() else "."  # nothing is written
     plain = replace(
         form, subject=PILOT, folder=folder, seed="", height="", normal="", area="", simulated=False, pilot=True
     )
     session_plan = check_form(plain, Bench(connected=True, simulated=True, frame=Frame()), datetime.now(), 0)
-    if isinstance(session_plan, Refusal):
-        return session_plan
-    language = session_plan.plan.language
-    first = PreviewPage(tr("before the session"), subject_view(None, translate, language))
-    thanks = SubjectView("read", translate(SubjectText.THANKS), language=language)
-    *course, end = _pages(session_plan.plan, translate)
-    return (first, *course, PreviewPage(tr("an answer was given"), thanks), end)
+    return session_plan if isinstance(session_plan, Refusal) else session_plan.plan
 
 
-def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
+def _pages(plan: SessionPlan, translate: Translate) -> Iterator[PreviewPage]:
+    """Yield the pages of a session in the order in which they come first, that of its end last."""
+    yield PreviewPage(tr("before the session"), subject_view(None, translate, plan.language))
     pages: dict[str, SubjectView] = {}
     session: SessionState = begin_session(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
     step = machine.start(plan)
@@ -245,11 +257,16 @@ def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
         if isinstance(state, states.Settling):
             session = replace(session, phase="settling")
         if session.phase in OF_A_BLOCK or session.phase in _NAMES:
-            pages.setdefault(_name(session), replace(subject_view(session, translate), key=(len(pages) + 1, 1)))
+            name = _name(session)
+            if name not in pages:
+                pages[name] = replace(subject_view(session, translate), key=(len(pages) + 1, 1))
+                if name != _NAMES["closing"]:
+                    yield PreviewPage(tr(name), pages[name])
         step = machine.advance(state, _next_event(state))
-    pages[_NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
-    pages[_NAMES["closing"]] = pages.pop(_NAMES["closing"])  # the last one
-    return tuple(PreviewPage(tr(name), view) for name, view in pages.items())
+    yield PreviewPage(tr(_NAMES["paused"]), subject_view(replace(session, phase="paused"), translate))
+    thanks = SubjectView("read", translate(SubjectText.THANKS), language=plan.language)
+    yield PreviewPage(tr("an answer was given"), thanks)
+    yield PreviewPage(tr(_NAMES["closing"]), pages[_NAMES["closing"]])
 
 
 def _name(session: SessionState) -> str:
