@@ -99,7 +99,7 @@ def tables_in(text: str, where: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         number = _COMMA.search(text)
         comma = f"; in {number[1]} write the fraction behind a point" if number else ""
-        raise SettingsError(f"{where}: this is not TOML: {error}{comma}") from error
+        raise SettingsError(f"{where}: this is not TOML: {error}; correct it there{comma}") from error
     except RecursionError as error:
         raise SettingsError(f"{where}: lists or tables are nested too deep; write it with fewer brackets") from error
     except ValueError as error:  # Python's limit, 4300 by default

@@ -146,7 +146,8 @@ def _sliding_under(
         for state in _increase_force(newton, load, force):
             states.append(state)  # those before a failure count
     except NotConverged:
-        if not states:
+        if not states:  # a small part of the force is more than any slide carries
+            _refuse_beyond_deepest(finger.scene, load, force)
             raise
         return _deeper(finger, states[-1], force)
     *before, last = states
@@ -154,6 +155,15 @@ def _sliding_under(
         return steady(finger, last.load, start=last)
     except NoSteadyState:  # it lies beyond a limit, which has a force as well as a depth
         return _deeper(finger, before[-1], force)
+
+
+def _refuse_beyond_deepest(scene: Scene, load: LoadState, force: float) -> None:
+    """Raise NoSteadyState where the deepest slide with the friction of `load` carries less than `force` [N/mm]."""
+    proof = of_depth(scene, load._replace(depth=scene.finger.bone_depth()))
+    if proof.limited and not proof.lost and proof.numbers[1] < force:
+        raise NoSteadyState(
+            "None carries it.", limit_indentation=proof.value, limit_normal_force=float(proof.numbers[1])
+        )
 
 
 def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:

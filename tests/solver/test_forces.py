@@ -269,8 +269,10 @@ def test_a_force_that_one_mesh_does_not_meet_is_met_on_another_or_refused_in_a_s
 
 
 @pytest.mark.slow
-def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_deeper():
-    scene = Scene(friction=Friction(1.108), loading=Loading(normal_force=0.2568), solve=Solve("finite", tolerance=0.1))
+@pytest.mark.parametrize(("mu", "normal_force"), [(1.108, 0.2568), (0.3, 100.0)])
+def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_deeper(mu, normal_force):
+    loading = Loading(normal_force=normal_force)
+    scene = Scene(friction=Friction(mu), loading=loading, solve=Solve("finite", tolerance=0.1))
     with pytest.raises(NoSteadyState) as refusal:
         solve(scene)
     deepest = refusal.value.limit_indentation
