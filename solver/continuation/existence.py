@@ -58,6 +58,11 @@ class Reach:
     numbers: Array  # (3,) SED of the ending, normal and tangential force at its last state
 
     @property
+    def ends(self) -> bool:
+        """Whether the branch is known to end there."""
+        return self.limited and not self.lost
+
+    @property
     def near(self) -> bool:
         """Whether the last state lies near a limit."""
         return self.least < self.folds + PROOF.nearly
@@ -281,7 +286,7 @@ def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     """
     with suppress(NotConverged):
         proof = _reach_towards(scene, load)
-        if proof.limited and not proof.lost and proof.value < PROOF.far * load.mu:
+        if proof.ends and proof.value < PROOF.far * load.mu:
             raise _refusal(scene, load, proof)
 
 
@@ -345,7 +350,7 @@ def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | Not
     with suppress(NotConverged):
         deepest = of_depth(scene, load)
         further = load._replace(depth=(1.0 + BEYOND_LIMIT) * deepest.value)
-        if deepest.limited and not deepest.lost and _none_at(scene, further, load):
+        if deepest.ends and _none_at(scene, further, load):
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"
     return NoSteadyState(
@@ -373,7 +378,7 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
         return True
     shallower = further.depth < load.depth
     proof = of_friction(scene, further, load.mu) if shallower else of_depth(scene, further)
-    return proof.limited and not proof.lost
+    return proof.ends
 
 
 def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:

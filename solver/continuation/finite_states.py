@@ -145,25 +145,18 @@ def _sliding_under(
     try:
         for state in _increase_force(newton, load, force):
             states.append(state)  # those before a failure count
-    except NotConverged:
-        if not states:  # a small part of the force is more than any slide carries
-            _refuse_beyond_deepest(finger.scene, load, force)
-            raise
-        return _deeper(finger, states[-1], force)
+    except NotConverged as failure:
+        if states:
+            return _deeper(finger, states[-1], force)
+        proof = of_depth(scene, load._replace(depth=scene.finger.bone_depth()))
+        if proof.ends and proof.numbers[1] < force:  # even the deepest slide carries less
+            raise _beyond(proof.value, float(proof.numbers[1])) from failure
+        raise
     *before, last = states
     try:
         return steady(finger, last.load, start=last)
     except NoSteadyState:  # it lies beyond a limit, which has a force as well as a depth
         return _deeper(finger, before[-1], force)
-
-
-def _refuse_beyond_deepest(scene: Scene, load: LoadState, force: float) -> None:
-    """Raise NoSteadyState where the deepest slide with the friction of `load` carries less than `force` [N/mm]."""
-    proof = of_depth(scene, load._replace(depth=scene.finger.bone_depth()))
-    if proof.limited and not proof.lost and proof.numbers[1] < force:
-        raise NoSteadyState(
-            "None carries it.", limit_indentation=proof.value, limit_normal_force=float(proof.numbers[1])
-        )
 
 
 def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:
@@ -198,7 +191,7 @@ def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> Equi
     continues there. Raises as `settled_state`.
     """
     proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
-    if proof.limited and not proof.lost and proof.numbers[1] < force:
+    if proof.ends and proof.numbers[1] < force:
         state = _slide_reaching_force(finger, state, proof, force)
     state = _at_force(finger.newton, state, force)
     return steady(finger, state.load, start=state)
@@ -218,9 +211,14 @@ def _slide_reaching_force(
         try:
             state = steady(finger, state.load._replace(depth=(1.0 + BEYOND_LIMIT) * depth), start=state)
         except NoSteadyState as failure:
-            raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
+            raise _beyond(depth, most) from failure
         depth, most = state.load.depth, float(state.force[1])
     return state
+
+
+def _beyond(depth: float, force: float) -> NoSteadyState:
+    """Return the failure of a force beyond that of the deepest slide, at a `depth` [mm] with a `force` [N/mm]."""
+    return NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=force)
 
 
 def solve_dead_load(
