@@ -126,7 +126,7 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
             for pairs in zip(row.values.T, row.errors.T, strict=True)
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
-        console.say(table(lines, header=["arc [mm]", *NAMES]).lstrip("\n"))
+        console.say(table(lines, header=["arc [mm]", *(quantity.label for quantity in QUANTITIES)]).lstrip("\n"))
     effects = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
