@@ -1,4 +1,4 @@
-"""The contact law of a point: unilateral contact with a flat surface, and Coulomb friction with a traction bound.
+"""The contact law of a point, with Coulomb friction and a traction bound, and the loads by a flat rigid surface.
 
 For a point, g is the gap, N >= 0 the normal force of the surface along y, and T the force along x. v is its slip
 relative to the surface along x within a step, and L its tributary length of skin:

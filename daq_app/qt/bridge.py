@@ -113,7 +113,7 @@ class Bridge(QObject):
                 self._client.close()
                 self._client = self._start()
                 self._fold(m.Gone(True, ""))
-            self._client.send(message)  # it is one of REQUESTS
+            self._client.send(message)
         self._show()
 
     def search(self) -> None:

@@ -82,7 +82,8 @@ def _polygon(points: Array) -> QPolygonF:
     """Return points (n, 2), n > 0, as Qt holds them: written into its own memory, as pyqtgraph does it."""
     polygon = QPolygonF()
     polygon.resize(len(points))
-    memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyrefly: ignore[bad-argument-type, bad-argument-count]  its stub knows none
+    # VoidPtr's stub does not know these arguments.
+    memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyrefly: ignore[bad-argument-type, bad-argument-count]
     np.frombuffer(memory, np.float64).reshape(-1, 2)[:] = points
     return polygon
 

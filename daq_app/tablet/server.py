@@ -73,7 +73,7 @@ class TabletServer:
             self._talk,
             sock=listener,
             process_request=self._answer,
-            origins=[self.url],  # a text, of a type of its own
+            origins=[self.url],
             max_size=LARGEST,
             ping_interval=ALIVE / 2,
             ping_timeout=ALIVE / 2,

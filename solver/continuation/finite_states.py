@@ -36,9 +36,10 @@ class ForceSearch:
 
 
 FORCE_SEARCH = ForceSearch()
-# Of the solution on a nested mesh, which starts from that on the coarser one: its first step is the difference between
-# both, which estimates the error. 2 to 5 iterations are usual. Without `part` there are three more, which changed the
-# estimates of 48 scenes by 2e-5 in the median and 7 % at most; halving or doubling it changed no more.
+# Iterations on a nested mesh start from the solution on the coarser one, so that their first step is the difference
+# between both, which estimates the error. They end once a twentieth of it remains. In 48 scenes at finite strain,
+# 1e-10 mm in its place took half as long again, and changed estimates by 2e-5 in the median and 7 % at most. Half of
+# the part or double of it changed no more.
 ON_NESTED_MESH = Termination(part=0.05, limit=10)
 
 

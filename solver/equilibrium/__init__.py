@@ -59,10 +59,10 @@ CONTROL = NewtonControl()
 
 
 class Termination(NamedTuple):
-    """When iterations for an equilibrium end: at the larger of two errors, as estimated, or without one."""
+    """When the iterations for an equilibrium end: at the larger of two errors, or with a failure at the limit."""
 
     tolerance: float = 1e-10  # of displacements [mm]
-    part: float = 0.0  # the same, by the first step
+    part: float = 0.0  # of displacements, by the largest of the first step [-]
     limit: int = 30  # iterations, at most
 
 
