@@ -63,7 +63,7 @@ class Termination(NamedTuple):
 
     tolerance: float = 1e-10  # of displacements [mm]
     part: float = 0.0  # of displacements, by the largest of the first step [-]
-    limit: int = 30  # iterations, at most
+    limit: int = 25  # iterations, at most
 
 
 TO_ROUND_OFF = Termination()
