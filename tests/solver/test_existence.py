@@ -22,6 +22,17 @@ def refine_from_coarse(scene, depth, fineness):
     return refine(scene, fineness, coarse_solution(scene, depth, fineness, meshes), meshes).top
 
 
+@pytest.mark.slow
+def test_a_press_deep_into_the_tissue_is_refused_with_the_same_depth_as_one_a_little_too_deep():
+    deepest = []
+    for depth in (2.8, 3.4, 3.7):
+        with pytest.raises(NoSteadyState) as refusal:
+            solve(Scene(friction=Friction(0.2), loading=Loading(depth), solve=Solve("finite", tolerance=0.1)))
+        deepest.append(refusal.value.limit_indentation)
+    assert deepest == pytest.approx([deepest[0]] * 3, rel=0.03)
+    assert deepest[0] < 2.8
+
+
 @pytest.mark.parametrize(
     ("mu", "tau", "deepest"),
     [
