@@ -7,7 +7,6 @@ replace the logarithm in the last term by a best fit.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import ClassVar, Protocol, cast
 
 import numpy as np
@@ -174,83 +173,6 @@ def log1p(x: Array) -> Array:
     """Return ln(1 + x); NumPy's own loses digits of a small complex x. Imaginary parts must be infinitesimal."""
     log = np.log1p(x.real)
     return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
-
-
-Stress = tuple[Array, Array, Array, Array]  # xx, yy, xy, zz of plane strain [MPa], tension positive
-
-
-@dataclass(frozen=True, eq=False)  # without slots, for cached properties
-class LocalState:
-    """Deformation and moduli of n points, in c states of the body each. All arrays broadcast to (n, c).
-
-    The displacement gradient is du_a/dx_b; at small strain only its symmetric part. `tangent` is a unit vector along
-    the undeformed skin above the point, towards the tip; its normal points into the tissue. Numbers may be complex, for
-    complex-step derivatives.
-    """
-
-    xx: Array
-    xy: Array
-    yx: Array
-    yy: Array
-    dilatation: Array  # volume strain at small strain, ln J at finite: the element's best fit [-]
-    shear: Array  # modulus [MPa]
-    lame: Array  # Lamé's first constant [MPa]
-    stiffening: Array  # Ogden's exponent [-]; at small strain unused
-    tangent: tuple[Array, Array]
-
-    @property
-    def volume(self) -> Array:
-        """J, volume by undeformed volume at the point itself [-]."""
-        return 1.0 + self._volume_growth
-
-    @cached_property
-    def log_volume(self) -> Array:
-        """Logarithm of J at the point itself, without cancellation [-]."""
-        return log1p(self._volume_growth)
-
-    @cached_property
-    def excess(self) -> Array:
-        """Tr C - 3 - 2 ln J at the point itself, without cancellation [-]."""
-        squares = self.xx**2 + self.xy**2 + self.yx**2 + self.yy**2
-        return 2.0 * (self.trace - self.log_volume) + squares
-
-    @cached_property
-    def _volume_growth(self) -> Array:
-        return self.trace + self.xx * self.yy - self.xy * self.yx
-
-    @property
-    def trace(self) -> Array:
-        """Trace of the displacement gradient: at small strain, the volume strain at the point itself [-]."""
-        return self.xx + self.yy
-
-    @property
-    def engineering_shear(self) -> Array:
-        """The engineering shear strain between x and y, at small strain [-]."""
-        return self.xy + self.yx
-
-    @cached_property
-    def small_stress(self) -> Stress:
-        """The stress sigma = 2 G eps + lambda theta 1 at small strain [MPa]."""
-        bulk = self.lame * self.dilatation
-        return (
-            2.0 * self.shear * self.xx + bulk,
-            2.0 * self.shear * self.yy + bulk,
-            self.shear * self.engineering_shear,
-            bulk,
-        )
-
-    @cached_property
-    def finite_stress(self) -> Stress:
-        """Cauchy's stress sigma = (G f (F F^T - 1) + lambda ln J 1) / J [MPa]."""
-        J = self.volume
-        shear = self.shear * slopes(self.stiffening, self.excess)[0] / J
-        bulk = self.lame * self.dilatation / J
-        return (
-            shear * (2.0 * self.xx + self.xx**2 + self.xy**2) + bulk,
-            shear * (2.0 * self.yy + self.yy**2 + self.yx**2) + bulk,
-            shear * (self.xy + self.yx + self.xx * self.yx + self.xy * self.yy),
-            bulk,
-        )
 
 
 def shape(exponent: Array, Q: Array) -> Array:

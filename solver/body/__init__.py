@@ -11,8 +11,9 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import NEO_HOOKEAN, Array, ElementArrays, Indices, Narrow, inverse
-from solver.constitutive import Elasticity, LocalState
+from solver.constitutive import Elasticity
 from solver.mesh import Q2P1, Mesh, distinct, integrals
+from solver.quantities import LocalState
 
 UNHELD = 1e14  # product of the largest entries of stiffness and compliance, from which the body counts as loose [-]
 
