@@ -5,7 +5,7 @@ import shutil
 import sqlite3
 import tempfile
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -157,7 +157,7 @@ class Recording:
     def _all_readings(self) -> ReadingBlock:
         """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
         path = self.folder / schema.LIVE_FILE
-        bytes_held = sum(file.stat().st_size for file in (path, _side_file(path, "-wal")) if file.is_file())
+        bytes_held = _size(path) + _size(_side_file(path, "-wal"))
         capacity = min(bytes_held // schema.BYTES_A_READING, self._row_capacity())
         shapes = {name: (capacity, 6) if name == "raw" else (capacity,) for name in schema.COLUMNS}
         buffers = {name: np.empty(shapes[name], dtype) for name, dtype in schema.COLUMNS.items()}
@@ -311,7 +311,7 @@ def _event(number: int, row: Sequence[object]) -> LoggedEvent:
 def _connect(path: Path) -> Generator[sqlite3.Connection]:
     """Open the file for reading, in place where SQLite can do so without writing to it, else as a copy."""
     sides = (_side_file(path, "-wal"), _side_file(path, "-journal"))
-    left_over = [side for side in sides if side.is_file() and side.stat().st_size]
+    left_over = [side for side in sides if _size(side)]
     address = f"{path.resolve().as_uri()}?mode=ro"
     path.open("rb").close()  # says why it cannot be read, which SQLite does not
     if not left_over:
@@ -323,11 +323,12 @@ def _connect(path: Path) -> Generator[sqlite3.Connection]:
             yield connection
             return
     with tempfile.TemporaryDirectory() as room:
-        files = (path, *left_over)
-        if sum(file.stat().st_size for file in files) > shutil.disk_usage(room).free:
+        if sum(map(_size, (*left_over, path))) > shutil.disk_usage(room).free:
             raise OSError(errno.ENOSPC, f"the copy that is read has no room in {room}")
-        for file in files:
-            shutil.copy(file, room)
+        for side in left_over:
+            with suppress(FileNotFoundError):  # the database, which is copied last, has what a side file had that goes
+                shutil.copy(side, room)
+        shutil.copy(path, room)
         with closing(limit_values(sqlite3.connect(Path(room) / path.name))) as connection:
             yield connection
 
@@ -339,6 +340,14 @@ def _answers(connection: sqlite3.Connection) -> bool:
     except sqlite3.OperationalError:
         return False
     return True
+
+
+def _size(path: Path) -> int:
+    """Return a file's size in bytes, 0 where it is missing: a session that ends removes its side files."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
 
 
 def _side_file(path: Path, suffix: str) -> Path:

@@ -110,15 +110,16 @@ def _sums(data: bytes, order: str, sums: tuple[int, int]) -> tuple[int, int]:
 
 def torn_log(path: Path) -> Iterator[str]:
     """Name what a crash tore off the end of the live file's write-ahead log."""
-    log = path.with_name(f"{path.name}-wal")
-    if log.is_file():
-        with log.open("rb", buffering=0) as file:
+    try:
+        with path.with_name(f"{path.name}-wal").open("rb", buffering=0) as file:
             size = log_tail(file).torn_bytes
-        if size:
-            yield (
-                f"the last {size} bytes of the write-ahead log hold no whole commit and are left out:"
-                " they had not been acknowledged, or were damaged since"
-            )
+    except FileNotFoundError:  # the session has ended
+        return
+    if size:
+        yield (
+            f"the last {size} bytes of the write-ahead log hold no whole commit and are left out:"
+            " they had not been acknowledged, or were damaged since"
+        )
 
 
 Identity = tuple[int, int] | None  # device and inode, as `os.stat` tells; None where there is no such file
