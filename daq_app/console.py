@@ -86,6 +86,7 @@ class Console:
         self._start = 0.0  # the job that progress is shown of [s]
         self._fraction = 1.0  # of it
         self._line_open = False
+        self._lost_results = False
 
     @property
     def at_terminal(self) -> bool:
@@ -106,6 +107,15 @@ class Console:
         for line in lines:
             if line is not None:
                 self._print_error(harmless(line))
+
+    def lose(self, reason: object) -> None:
+        """Name the reason why a result, which may still be printed, is not kept; a verb that is done then has flaws."""
+        self._lost_results = True
+        self.note(f"not kept: {reason}")
+
+    def exit_code(self, code: int) -> int:
+        """Return the exit code of a verb that ended with `code`."""
+        return FLAWED if code == DONE and self._lost_results else code
 
     def result(self, document: Mapping[str, Any]) -> None:
         """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""

@@ -63,7 +63,7 @@ def analyse_session(
         try:
             set_gain_error(recording.folder, gain_error)
         except RecordingError as error:
-            console.note(f"not kept: {error}")
+            console.lose(error)
     settings = settings_of(previous)
     bootstrap_seed = settings.bootstrap_seed if seed is None else seed
     analysis = analyse(
@@ -289,6 +289,6 @@ def _store(recording: Recording, name: str, document: Mapping[str, Any], console
     try:
         store_derived(recording.folder, name, document)
     except RecordingError as error:
-        console.note(f"not kept: {error}")
+        console.lose(error)
         return False
     return True

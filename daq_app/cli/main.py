@@ -98,7 +98,8 @@ def _dispatch(arguments: list[str]) -> int:
         parser.print_help()
         return DONE
     options = parser.parse_args(_join_values(verb_arguments))
-    return verb.run(options, Console(as_json=options.json))
+    console = Console(as_json=options.json)
+    return console.exit_code(verb.run(options, console))
 
 
 def _join_values(arguments: list[str]) -> list[str]:

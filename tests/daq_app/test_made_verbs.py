@@ -352,7 +352,7 @@ def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_
     assert run(["verify", str(small)]) == 0
     with monkeypatch.context() as full_disk:
         full_disk.setattr("daq_app.batch.derived.store_derived", Mock(side_effect=RecordingError("the disk is full")))
-        run(["predict", str(small), "--beside", "none"])
+        assert run(["predict", str(small), "--beside", "none"]) == 3  # done, with a loss that is named
     errors = capsys.readouterr().err
     assert ("not kept: the disk is full" in errors, "intervals" in errors) == (True, False)  # the file still holds them
     run(["predict", str(small), "--beside", "none"])

@@ -97,7 +97,9 @@ def _stroke_sed(p: PredictionFinding) -> Cell:
 
 def _limits(interval: SedInterval | None) -> tuple[Ends | None, str | None]:
     """Return the limits of an interval, and why it has none."""
-    return (None, None) if interval is None else (bounds(interval.low, interval.high), interval.reason or None)
+    if interval is None:
+        return None, "none was asked for (--intervals)"
+    return bounds(interval.low, interval.high), interval.reason or None
 
 
 def afferent_table(report: Report) -> Table | None:
