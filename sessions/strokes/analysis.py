@@ -43,11 +43,26 @@ class Analysis:
 
     @property
     def bootstrap(self) -> BootstrapSettings:
-        """Return what the intervals are drawn from."""
-        tilt = self.tilt
-        if tilt is None or len(tilt.presses) < self.settings.press.press_fewest:  # the hand's own push is not known
-            return BootstrapSettings.of(self.settings)
-        return BootstrapSettings.of(self.settings, tilt.lean, tilt.error, len(tilt.presses))
+        """Return what the intervals are drawn from; enough presses measure how the face leans."""
+        settings, tilt = self.settings, self.tilt
+        gain_error, cross_talk = settings.gain_uncertainty, settings.systematic.cross_talk
+        prior = settings.systematic.tilt_prior
+        bootstrap = BootstrapSettings(
+            seed=settings.bootstrap_seed,
+            gain_error=gain_error,
+            gain_error_origin="assumed" if settings.gain_error is None else "set",
+            cross_talk=gain_error if cross_talk is None else cross_talk,
+            tilt_error=(prior, prior),
+            confidence=settings.confidence,
+            detector=settings.detector,
+            climb=settings.climb,
+        )
+        if tilt is None or len(tilt.presses) < settings.press.press_fewest:  # the hand's own push is not known
+            return bootstrap
+        count, lean = len(tilt.presses), (tilt.lean[0] - settings.tilt[0], tilt.lean[1] - settings.tilt[1])
+        return replace(
+            bootstrap, tilt=lean, tilt_error=tilt.error, tilt_presses=count, tilt_origin=f"by {count} presses"
+        )
 
     @property
     def flawed(self) -> bool:
@@ -89,25 +104,24 @@ def analyse(
     main = [(trial, recording.readings(trial.number)) for trial in takes if trial.phase == "main"]
     warm_up = [(trial, recording.readings(trial.number)) for trial in takes if trial.phase != "main"]
     context = TrialContext(recording.plan, recording.info, settings, decisions)
-    analysis = _without_intervals(main if recording.plan.blocks else [(None, recording.readings())], context, losses)
-    plain_context = TrialContext(recording.plan, recording.info, settings)
-    presses = _without_intervals(warm_up, plain_context, ()).presses + analysis.presses
+    analysis = _without_intervals(main if recording.plan.blocks else [(None, recording.readings())], context)
+    presses = _without_intervals(warm_up, context._replace(decisions=Decisions())).presses + analysis.presses
     analysis = replace(analysis, simulated=recording.simulated, presses=presses)
-    return _with_intervals(replace(analysis, flaws=(*analysis.flaws, *_assumed_tilt_flaw(analysis))))
+    return _with_intervals(replace(analysis, flaws=(*losses, *analysis.flaws, *_assumed_tilt_flaw(analysis))))
 
 
 def analyse_blocks(blocks: Blocks, context: TrialContext) -> Analysis:
     """Return the strokes in the readings of trials."""
-    return _with_intervals(_without_intervals(blocks, context, ()))
+    return _with_intervals(_without_intervals(blocks, context))
 
 
-def _without_intervals(blocks: Blocks, context: TrialContext, flaws_before: Iterable[Flaw]) -> Analysis:
+def _without_intervals(blocks: Blocks, context: TrialContext) -> Analysis:
     """Return an analysis whose intervals are not drawn yet: they depend on all presses of a session."""
     plan, info, settings, decisions = context
     strokes: list[Stroke] = []
     friction: list[FrictionParameters] = []
     presses: list[Press] = []
-    flaws = [*flaws_before, *(Flaw(FlawName.DECISION, problem, "doubtful") for problem in decisions.problems)]
+    flaws = [Flaw(FlawName.DECISION, problem, "doubtful") for problem in decisions.problems]
     filtered = ""
     for trial, block in blocks:
         result = analyse_trial(trial, block, context)

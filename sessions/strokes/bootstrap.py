@@ -187,14 +187,11 @@ class _Repeats:
         if stroke.tau_max is not None and stroke.peak_tangential:
             area = stroke.contact_area or stroke.peak_tangential / stroke.tau_max
             if curve.crests is None:
-                crest, peak_error = (
-                    int(np.nanargmax(curve.tangential)),
-                    self._peak_error(curve.tangential, self._noise_t),
-                )
+                crests, peak_error = curve.tangential, self._peak_error(curve.tangential, self._noise_t)
             else:
-                above_crest = curve.crest_gap * self._draw.uniform(size=self._settings.repeats)
-                crest = int(np.nanargmax(curve.crests))
-                peak_error = self._peak_error(curve.crests, curve.crest_noise, filtered=False) + above_crest
+                crests, peak_error = curve.crests, curve.crest_gap * self._draw.uniform(size=self._settings.repeats)
+                peak_error += self._peak_error(crests, curve.crest_noise, filtered=False)
+            crest = int(np.nanargmax(crests))
             normal_share, _ = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
             offset = self._zero_t + peak_error + normal_share * curve.normal[crest]
             peak = stroke.tau_max * area * self._gain_t + offset
@@ -276,15 +273,11 @@ class _Repeats:
             velocity = self._slopes(sample, weight) * self._systematic.gain_torque[:, None]
             normal_gain = self._gain_n + drag_share * self._stroke.mu_dynamic
             numbers["speed"] = np.hypot(velocity[:, 0], velocity[:, 1]) / normal_gain
-        if self._stroke.heading is not None:
-            numbers["heading"] = self._headings(velocity, self._stroke.heading)
+        if (heading := self._stroke.heading) is not None:
+            gain_ratio = 1.0 + settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(velocity))
+            angle = np.degrees(np.arctan2(velocity[:, 1] * gain_ratio, velocity[:, 0]))
+            numbers["heading"] = heading + (angle - heading + 180.0) % 360.0 - 180.0  # by whole turns nearest to it
         return numbers
-
-    def _headings(self, velocity: Array, heading: float) -> Array:
-        """Return the angles (repeats,) [degrees] of velocities (repeats, 2), by whole turns nearest to `heading`."""
-        gain_ratio = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(velocity))
-        angle = np.degrees(np.arctan2(velocity[:, 1] * gain_ratio, velocity[:, 0]))
-        return heading + (angle - heading + 180.0) % 360.0 - 180.0
 
     def _instants(self, speed: Array | None) -> dict[str, Array]:
         """Return the instants (repeats,) that the analysis found and no person decided."""

@@ -182,7 +182,7 @@ class Contact:
     lift: float | None  # [s, device time]; None where it ends in contact
     valleys: tuple[int, ...] = ()  # readings of least force between it and neighbours without a lift
     reversals: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
-    uncut: tuple[int, int] | None = None  # first reading and past the last of the contact that turns cut it out of
+    uncut: "Contact | None" = None  # that turns cut it out of
 
 
 def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:
@@ -291,7 +291,7 @@ def split_at_reversals(
             onset=contact.onset if start == contact.start else float(time[start]),
             lift=contact.lift if stop == contact.stop else float(time[stop]),
             reversals=tuple(reversal for reversal in reversals if reversal in (start, stop)),
-            uncut=(contact.start, contact.stop),
+            uncut=contact,
         )
         for start, stop in pairwise(bounds)
     )

@@ -4,7 +4,7 @@ Each threshold has its source or its reason beside it. Names of fields are uniqu
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from sessions.strokes.stroke import FIXED, AreaLaw
@@ -233,11 +233,6 @@ class AnalysisSettings:
         """Standard uncertainty of each axis' gain [-]: the one that was set, or the one assumed."""
         return ASSUMED_GAIN_ERROR if self.gain_error is None else self.gain_error
 
-    @property
-    def cross_talk_uncertainty(self) -> float:
-        """Standard uncertainty of what each force shows of another [-]: the one that was set, or that of a gain."""
-        return self.gain_uncertainty if self.systematic.cross_talk is None else self.systematic.cross_talk
-
     def to_dict(self) -> dict[str, Any]:
         """Return every setting by its group, and for one release each also under its name alone, as it was before."""
         groups = asdict(self)
@@ -280,43 +275,17 @@ class BootstrapSettings:
     detector: DetectorSettings = field(default_factory=DetectorSettings)  # those of the analysis
     climb: ClimbSettings = field(default_factory=ClimbSettings)  # likewise
 
-    @classmethod
-    def of(
-        cls, settings: AnalysisSettings, lean: Pair = (0.0, 0.0), lean_error: Pair | None = None, presses: int = 0
-    ) -> "BootstrapSettings":
-        """Return what the intervals of an analysis are drawn from; `presses`, where any, measured the `lean`."""
-        prior = settings.systematic.tilt_prior
-        bootstrap = cls(
-            seed=settings.bootstrap_seed,
-            gain_error=settings.gain_uncertainty,
-            gain_error_origin="assumed" if settings.gain_error is None else "set",
-            cross_talk=settings.cross_talk_uncertainty,
-            tilt_error=lean_error or (prior, prior),
-            tilt_presses=presses,
-            confidence=settings.confidence,
-            detector=settings.detector,
-            climb=settings.climb,
-        )
-        if not presses:
-            return bootstrap
-        remaining = (lean[0] - settings.tilt[0], lean[1] - settings.tilt[1])
-        return replace(bootstrap, tilt=remaining, tilt_origin=f"by {presses} presses")
-
     @property
     def kind(self) -> str:
         """What an interval is, for people."""
+        x, y = (f"{angle:.2g} ± {error:.2g}°" for angle, error in zip(self.tilt, self.tilt_error, strict=True))
         return (
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
             f"{self.block:g} s, widened for correlation between blocks, seed {self.seed}): sensor noise, zero and its "
             f"drift, calibration ({self.calibration}; cross-talk {100 * self.cross_talk:g} % of each other force), "
-            f"tilt of the face ({self.lean_sentence}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
+            f"tilt of the face ({x} to +x and {y} to +y, {self.tilt_origin}), "
+            f"choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
-
-    @property
-    def lean_sentence(self) -> str:
-        """The tilt of the face that is not levelled, and its standard uncertainty, for people."""
-        x, y = (f"{angle:.2g} ± {error:.2g}°" for angle, error in zip(self.tilt, self.tilt_error, strict=True))
-        return f"{x} to +x and {y} to +y, {self.tilt_origin}"
 
     @property
     def calibration(self) -> str:

@@ -129,17 +129,18 @@ def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array
     return finite[: count * length].reshape(count, length, values.shape[1]).mean(axis=1)
 
 
-def slide(
-    findings: Findings, span: Span, track: Track, interval: Pair | None = None, uncut: Track | None = None
-) -> slice | None:
+def slide(findings: Findings, span: Span, track: Track, uncut: Track, interval: Pair | None) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 
     The window of an `interval` [s, device clock] that a person decided is taken, with its flaws. `uncut` is the contact
-    that turns cut the stroke out of.
+    that turns cut the stroke out of, the stroke itself where none did.
     """
     window, settings = None, track.settings
     if interval is not None:
-        window = _decided_window(track, interval)
+        start = int(np.searchsorted(track.time, interval[0] - _ROUNDING))
+        stop = int(np.searchsorted(track.time, interval[1] + _ROUNDING, "right"))
+        has_ratios = np.isfinite(track.ratio[start:stop]).sum() >= settings.steady.steady_readings
+        window = slice(start, stop) if has_ratios else None
     elif np.isfinite(track.speed).any():
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
@@ -148,7 +149,7 @@ def slide(
     if trouble is not None and interval is None:  # the centre of pressure does not show when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         motion, trouble = _speed(span, track, window)
-    refusal = _refusal(span, track, track if uncut is None else uncut, window)
+    refusal = _refusal(span, track, uncut, window)
     if window is not None and refusal is not None and interval is not None:
         sentence = f"{refusal[1]} The window was decided by a person: its numbers are given."
         findings.flaw(refusal[0], sentence, "doubtful")
@@ -172,14 +173,6 @@ def slide(
     if trouble is None and motion is not None:
         _side_load(findings, track, window, motion)
     return window
-
-
-def _decided_window(track: Track, instants: tuple[float, float]) -> slice | None:
-    """Return the readings between two instants; None where too few of them have a ratio."""
-    start = int(np.searchsorted(track.time, instants[0] - _ROUNDING))
-    stop = int(np.searchsorted(track.time, instants[1] + _ROUNDING, "right"))
-    has_ratios = np.isfinite(track.ratio[start:stop]).sum() >= track.settings.steady.steady_readings
-    return slice(start, stop) if has_ratios else None
 
 
 def _refusal(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple[FlawName, str] | None:

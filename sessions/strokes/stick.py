@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.arrays import Array, Mask
 from sessions.strokes.settings import AnalysisSettings, ClimbSettings
+from sessions.strokes.sliding import block_means
 
 
 class Climb(NamedTuple):
@@ -214,22 +215,20 @@ def _beginnings(mask: Mask) -> NDArray[np.intp]:
     return np.flatnonzero(mask & ~np.concatenate([[False], mask[:-1]]))
 
 
-def power_of_normal_force(normal: Array, ratio: Array, length: int, settings: AnalysisSettings) -> float:
+def power_of_normal_force(normal: Array, ratio: Array, rate: float, settings: AnalysisSettings) -> float:
     """Return by what power T/N (n,) [-] may follow N (n,) [N]: the steepest fall to `law_steepest` readings allow.
 
-    Means of `length` readings are fitted, and two standard errors are allowed. Never above 0.
+    Means over blocks are fitted, and two standard errors are allowed. Never above 0.
     """
     steepest = settings.ratio.law_steepest
     valid = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)
-    blocks = np.count_nonzero(valid) // length
-    if blocks < settings.ratio.law_fewest:
+    blocks = block_means(np.log(np.column_stack([normal[valid], ratio[valid]])), rate, settings)
+    if len(blocks) < settings.ratio.law_fewest:
         return steepest
-    means = np.column_stack([np.log(normal[valid]), np.log(ratio[valid])])[: blocks * length]
-    x, y = means.reshape(blocks, length, 2).mean(axis=1).T
-    x, y = x - x.mean(), y - y.mean()
+    x, y = (column - column.mean() for column in blocks.T)
     spread = float(x @ x)
     if spread <= 0.0:
         return steepest
     slope = float(x @ y) / spread
-    error = float(np.sqrt(((y - slope * x) ** 2).sum() / (blocks - 2) / spread))
+    error = float(np.sqrt(((y - slope * x) ** 2).sum() / (len(blocks) - 2) / spread))
     return min(0.0, float(np.clip(steepest, slope - 2.0 * error, slope + 2.0 * error)))

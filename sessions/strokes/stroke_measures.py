@@ -1,7 +1,5 @@
 """The numbers of one stroke, and what forbids some of them."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from drivers.arrays import Array
@@ -44,26 +42,23 @@ def measure_stroke(
     contact: Contact,
     zero: StrokeZero,
     plan: SessionPlan,
-    trial: Trial | None = None,
-    number: int = 1,
-    decisions: StrokeDecisions | None = None,
+    trial: Trial | None,
+    number: int,
+    decisions: StrokeDecisions,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
     """Return a contact's stroke and its flaws; `plan` gives the face's frame and the area for tau_max.
 
     `number` is that of the stroke within its trial; a person's `decisions` about it go before what is found.
     """
-    findings, crest_gap, decisions = Findings(), None, decisions or StrokeDecisions({})
+    findings, crest_gap = Findings(), None
     track = track_of(span, contact, zero)
     _judge_ends(findings, contact, track)
     _judge_zero(findings, zero, track)
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
         _judge_gaps(findings, span, contact)
         _judge_loads(findings, track, plan.contact_area)
-        uncut = None
-        if contact.uncut is not None:
-            start, stop = contact.uncut
-            uncut = track_of(span, replace(contact, start=start, stop=stop), zero)
-        window = slide(findings, span, track, decisions.value("steady"), uncut)
+        uncut = track if contact.uncut is None else track_of(span, contact.uncut, zero)
+        window = slide(findings, span, track, uncut, decisions.value("steady"))
         _decide_slide_onset(findings, track, decisions)
         if window is not None:
             crest_gap = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area)
@@ -304,8 +299,7 @@ def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZe
         return
     peak = int(np.nanargmax(ratios))
     settled = int(np.searchsorted(track.time, float(track.time[peak] + settings.ratio.static_after)))
-    length = max(1, round(settings.filter.block * track.rate))
-    power = power_of_normal_force(track.normal[settled:], track.ratio[settled:], length, settings)
+    power = power_of_normal_force(track.normal[settled:], track.ratio[settled:], track.rate, settings)
     with np.errstate(invalid="ignore"):
         comparable = track.ratio * (track.normal[peak] / track.normal) ** power  # as T/N would be under the peak's N
     level = float(np.nanmedian(comparable[peak : settled + 1]))

@@ -154,11 +154,11 @@ def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[C
     strokes: list[Contact] = []
     for piece in pieces:
         piece_zero = zero if context.zero_is_stated else zero_for(span, piece, idle)
-        strokes += (
-            (piece,)
-            if piece_zero is None
-            else split_at_reversals(piece, span.time, span.smooth - piece_zero.level, piece_zero.unsure[0], settings)
-        )
+        if piece_zero is None:
+            strokes.append(piece)
+            continue
+        wrench, unsure = span.smooth - piece_zero.level, piece_zero.unsure[0]
+        strokes += split_at_reversals(piece, span.time, wrench, unsure, settings)
     contacts, flaws = _worth_measuring(strokes, span, smooth)
     return contacts, idle, flaws
 
@@ -176,13 +176,13 @@ def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[
         if not tapped and peak >= limits.light_share * greatest:
             contacts.append(piece)
             continue
-        gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < margin or abs(gap.start - stop) < margin]
-        if gaps:
+        gaps = (gap for gap in span.quality.gaps if abs(gap.stop - start) < margin or abs(gap.start - stop) < margin)
+        if gap := next(gaps, None):
             sentence = (
                 f"The contact from {start:.2f} to {stop:.2f} s goes on into readings that are not sound "
-                f"({gaps[0].cause}): its length is not known, so it is not measured."
+                f"({gap.cause}): its length is not known, so it is not measured."
             )
-            flaws.append(Flaw(gaps[0].cause, sentence, "doubtful"))
+            flaws.append(Flaw(gap.cause, sentence, "doubtful"))
         else:
             label, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
             sentence = f"A {label} from {start:.2f} to {stop:.2f} s, up to {significant(peak, 2)} N, is not a stroke."
@@ -264,9 +264,8 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
         return None
     high = np.flatnonzero(track.normal >= limits.press_held * peak)
     hold = slice(int(high[0]), int(high[-1]) + 1)
-    duration = float(track.time[hold.stop - 1] - track.time[hold.start])
-    distance = displacement(track.position[hold])
-    if duration < limits.press_shortest or not distance <= limits.press_moves:
+    start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
+    if stop - start < limits.press_shortest or not displacement(track.position[hold]) <= limits.press_moves:
         return None
     values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
     blocks = block_means(values, track.rate, settings)
@@ -280,7 +279,6 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
     # What was levelled before counts too: the lean is that against the transducer.
     x, y = (np.degrees(np.arctan(ratio.mean(axis=0))) + settings.tilt).tolist()
     error_x, error_y = error.tolist()
-    start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
     return Press(trial, start, stop, (x, y), (error_x, error_y))
 
 
