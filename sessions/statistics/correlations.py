@@ -46,15 +46,14 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     """
     n = len(x)
     without = tuple((label, pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
-    r = pearson(x, y)
-    if r is None:
+    r, rho = pearson(x, y), spearman(x, y)
+    if r is None or rho is None:
         points = "1 point is" if n == 1 else f"{n} points are"
         reason = f"{points} too few for a correlation" if n < 3 else "one of the two does not vary"
         return Relation(n, without=without, reason=reason)
     slope, intercept = np.polyfit(x, y, 1)
     low, high = fisher_interval(r, n)
     reason = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
-    rho = _rank_correlation(x, y)
     rho_interval = fisher_interval(rho, n, 1 + rho * rho / 2)  # Bonett & Wright 2000, Psychometrika 65:23, equation 4
     line = float(slope), float(intercept)
     return Relation(n, r, low, high, rho, *rho_interval, _exact_p(x, y, rho), *line, without, reason)
@@ -104,7 +103,7 @@ def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
 
 def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
     """Return Spearman's rho, None for fewer than three points or where one of the two does not vary."""
-    return None if pearson(x, y) is None else _rank_correlation(x, y)
+    return None if pearson(x, y) is None else float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
 
 
 def fisher_interval(r: float, n: int, inflation: float = 1.0) -> tuple[float | None, float | None]:
@@ -121,10 +120,6 @@ def fisher_interval(r: float, n: int, inflation: float = 1.0) -> tuple[float | N
 def _varies(values: Sequence[float]) -> bool:
     """Say whether values differ by more than round-off."""
     return float(np.ptp(values)) > 1e-12 * float(np.max(np.abs(values)))
-
-
-def _rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
-    return float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
 
 
 def _ranks(values: Sequence[float]) -> Array:

@@ -20,13 +20,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from scipy import special
 from scipy.sparse import csgraph
 
-from drivers.arrays import Array, Indices
+from drivers.arrays import Array
 from sessions.statistics.correlations import LEAST_CASES, jackknife
 from sessions.statistics.mixed_model import Term, mixed_model
 from sessions.statistics.psychometric import QUARTILE, binomial_deviance
@@ -307,18 +307,29 @@ def latent_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, 
     complete = [[row[i] for i in indices] for row in map(by_key, by_subject.values()) if len(row) == len(indices)]
     if len(complete) < LEAST_CASES or len(indices) < 2:
         return {}
-    cells = np.array([[np.mean(cell) for cell in row] for row in complete])
-    table = _AnswerTable(
-        cells - cells.mean(axis=1, keepdims=True),
+    means = np.array([[np.mean(cell) for cell in row] for row in complete])
+    table = (
+        means - means.mean(axis=1, keepdims=True),
         np.array([[float(len(cell)) for cell in row] for row in complete]),
         np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in complete]),
     )
-    people = np.arange(len(complete))
-    values = table.values(people[None])[0]
-    without = table.values(np.array([np.delete(people, n) for n in people]))
+    values = _latent_values(*table)
+    without = np.array([_latent_values(*(np.delete(part, n, axis=0) for part in table)) for n in range(len(complete))])
     if not np.isfinite([values, *without]).all():
         return {}
     return dict(zip(indices, _estimates(values, without), strict=True))
+
+
+def _latent_values(cells: Array, counts: Array, within: Array) -> Array:
+    """Return surfaces' means over s subjects by √2 s (k,); nan where nothing scatters about them.
+
+    `cells` (s, k) are means of repeats, each subject's own mean taken away; `counts` (s, k) are the repeats, and
+    `within` (s,) is their sum of squares about the means.
+    """
+    means = cells.mean(axis=0)
+    squares = float((counts * (cells - means) ** 2).sum() + within.sum())
+    unit = math.sqrt(2.0 * squares / (float(counts.sum()) - sum(cells.shape) + 1.0))
+    return means / unit if unit > 1e-9 * float(np.abs(means).max()) else np.full_like(means, np.nan)
 
 
 def latent_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:
@@ -334,21 +345,3 @@ def latent_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, flo
         low, high = sorted((log_mu - middle) * bound for bound in bounds)
         estimates[index] = IntervalEstimate((log_mu - middle) * value, low, high)
     return estimates
-
-
-class _AnswerTable(NamedTuple):
-    """The answers of s subjects to k surfaces."""
-
-    cells: Array  # (s, k) means of repeats, each subject's own mean taken away
-    counts: Array  # (s, k) repeats
-    within: Array  # (s,) sum of squares of repeats about their means
-
-    def values(self, samples: Indices) -> Array:
-        """Return means over the subjects `samples` (b, s) by √2 s: (b, k); nan where nothing scatters about them."""
-        cells, counts = self.cells[samples], self.counts[samples]
-        means = cells.mean(axis=1)
-        squares = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[samples].sum(axis=1)
-        freedom = counts.sum(axis=(1, 2)) - cells.shape[1] - cells.shape[2] + 1
-        unit = np.sqrt(2.0 * squares / freedom)[:, None]
-        varies = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
-        return np.where(varies, means, np.nan) / np.where(varies, unit, 1.0)

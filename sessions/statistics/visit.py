@@ -231,7 +231,18 @@ def _row(
     block: Block, position: int, record: TrialRecord, analysis: Analysis, prediction: SessionPrediction | None
 ) -> TrialRow:
     trial = record.trial
-    row = TrialRow(
+    flaw_names = (str(flaw.name) for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note")
+    friction = next((stroke for stroke in analysis.friction if stroke.trial == trial.number), None)
+    predictions = () if prediction is None else prediction.trials
+    answer = next((answer for answer in predictions if answer.trial == trial.number), None)
+    columns: dict[str, Any]
+    if friction is not None:
+        columns = _friction_columns(friction, analysis) | ({} if answer is None else _prediction_columns(answer))
+    elif record.outcome == "open":
+        columns = {"why": "The trial was not done."}
+    else:
+        columns = {"why": "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")}
+    return TrialRow(
         trial=trial.number,
         block=block.name,
         descriptor=trial.stimulus.descriptor,
@@ -246,56 +257,41 @@ def _row(
         estimate=record.number,
         choice=record.choice,
         standard=None if block.standard is None else block.standard.known_index,
-    )
-    flaw_names = (str(flaw.name) for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note")
-    flaws = tuple(dict.fromkeys(flaw_names))
-    friction = next((stroke for stroke in analysis.friction if stroke.trial == trial.number), None)
-    predictions = () if prediction is None else prediction.trials
-    answer = next((answer for answer in predictions if answer.trial == trial.number), None)
-    if friction is None:
-        reason = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
-        reason = "The trial was not done." if record.outcome == "open" else reason
-        return replace(row, flaws=flaws, why=reason)
-    row = replace(_with_friction(row, friction, analysis), flaws=flaws)
-    return row if answer is None else _with_prediction(row, answer)
-
-
-def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analysis) -> TrialRow:
-    stroke, intervals = analysis.strokes[friction.stroke], analysis.intervals[friction.stroke]
-    numbers = {
-        "mu": (friction.mu, intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic),
-        "tau_max": (friction.tau_max, intervals.tau_max),
-        "speed": (friction.speed, intervals.speed),
-        "normal_force": (stroke.normal_force, intervals.normal_force),
-    }
-    bounds = {name: ends for name, (value, ends) in numbers.items() if value is not None and ends is not None}
-    columns: dict[str, Any] = {
-        **{name: value for name, (value, _) in numbers.items()},
-        **{f"{name}_low": low for name, (low, _) in bounds.items()},
-        **{f"{name}_high": high for name, (_, high) in bounds.items()},
-    }
-    return replace(
-        row,
-        rule=friction.rule,
-        mu_dynamic=stroke.mu_dynamic,
-        mu_static=stroke.mu_static,
-        tangential_force=stroke.tangential_force,
+        flaws=tuple(dict.fromkeys(flaw_names)),
         **columns,
     )
 
 
-def _with_prediction(row: TrialRow, answer: TrialPrediction) -> TrialRow:
+def _friction_columns(friction: FrictionParameters, analysis: Analysis) -> dict[str, Any]:
+    stroke, intervals = analysis.strokes[friction.stroke], analysis.intervals[friction.stroke]
+    columns: dict[str, Any] = {
+        "rule": friction.rule,
+        "mu_dynamic": stroke.mu_dynamic,
+        "mu_static": stroke.mu_static,
+        "tangential_force": stroke.tangential_force,
+    }
+    for name, value, ends in (
+        ("mu", friction.mu, intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic),
+        ("tau_max", friction.tau_max, intervals.tau_max),
+        ("speed", friction.speed, intervals.speed),
+        ("normal_force", stroke.normal_force, intervals.normal_force),
+    ):
+        low, high = (None, None) if value is None or ends is None else ends
+        columns |= {name: value, f"{name}_low": low, f"{name}_high": high}
+    return columns
+
+
+def _prediction_columns(answer: TrialPrediction) -> dict[str, Any]:
     interval = answer.interval
-    return replace(
-        row,
-        sed=answer.sed,
-        sed_low=None if interval is None else interval.low,
-        sed_high=None if interval is None else interval.high,
-        sed_interval=NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
-        error_estimate=answer.error_estimate,
-        responses={name: response.value for name, response in answer.responses.items()},
-        model_normal_force=answer.normal_force,
-        model_normal_force_error=answer.normal_force_error,
-        matching_depth=answer.matching_depth,
-        why=answer.reasons.get("sed", ""),
-    )
+    return {
+        "sed": answer.sed,
+        "sed_low": None if interval is None else interval.low,
+        "sed_high": None if interval is None else interval.high,
+        "sed_interval": NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
+        "error_estimate": answer.error_estimate,
+        "responses": {name: response.value for name, response in answer.responses.items()},
+        "model_normal_force": answer.normal_force,
+        "model_normal_force_error": answer.normal_force_error,
+        "matching_depth": answer.matching_depth,
+        "why": answer.reasons.get("sed", ""),
+    }
