@@ -66,15 +66,12 @@ def paper_surfaces() -> Mapping[tuple[str, int], Surface]:
     Stickiness is judged proximal to distal, where the surface blocks the finger first; slipperiness distal to
     proximal, where the finger slides at once (the paper's section 3).
     """
-    sticky = {
-        ("stickiness", index): Surface(mu, "stickiness", index, tau_max, speed, direction=1, holds=True)
-        for index, (mu, tau_max, speed) in _TABLE_1.items()
+    surfaces = {
+        (descriptor, index): Surface(mu, descriptor, index, tau_max, speed, direction, holds=direction == 1)
+        for descriptor, direction, table in (("stickiness", 1, _TABLE_1), ("slipperiness", -1, _TABLE_2))
+        for index, (mu, tau_max, speed) in table.items()
     }
-    slippery = {
-        ("slipperiness", index): Surface(mu, "slipperiness", index, tau_max, speed, direction=-1, holds=False)
-        for index, (mu, tau_max, speed) in _TABLE_2.items()
-    }
-    return MappingProxyType(sticky | slippery)
+    return MappingProxyType(surfaces)
 
 
 PRESS = 0.10  # from touch to full normal force [s]

@@ -50,7 +50,7 @@ def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTran
 def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
     target = _target_of(address, deadline)
-    return _info(target, _configuration(target, deadline))
+    return _configuration(target, deadline).info
 
 
 def _target_of(address: Address, deadline: Deadline) -> _Target:
@@ -76,13 +76,12 @@ def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
     if not configuration.streams:
         uri = target.address.uri
         raise SetupError(f"{uri}: the box's RDT output is disabled; enable it on its Communications page")
-    if target.rate is not None and not _is_rate(configuration, target.rate):
+    info = configuration.info
+    if target.rate is not None and not _is_rate(info, target.rate):
         path = f"/comm.cgi?comrdtrate={target.rate}"
         answer = http_get(target.host, target.http_port, path, deadline)
-        if answer.status not in (200, 302) or not _is_rate(
-            configuration := _configuration(target, deadline), target.rate
-        ):
-            state = "shows no rate at all" if math.isnan(configuration.rate) else f"stays at {configuration.rate:g} Hz"
+        if answer.status not in (200, 302) or not _is_rate(info := _configuration(target, deadline).info, target.rate):
+            state = "shows no rate at all" if math.isnan(info.rate) else f"stays at {info.rate:g} Hz"
             raise SetupError(
                 f"{target.address.uri}: the box was asked for {target.rate} Hz but {state}; "
                 "set the rate on its Communications page"
@@ -90,17 +89,13 @@ def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
     results = _command(target, configuration, deadline) if target.set_bias or target.reset_latch else {}
     if target.buffered:
         results["streaming"] = "buffered"
-    info = _info(target, configuration)
     return replace(info, settings={**info.settings, **results})
 
 
 def _command(target: _Target, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
     """Send the commands that the address asks for, and return the results for the record."""
     units = wire.parse_units(_tcp(target, wire.READ_UNITS, 24, deadline))
-    if units is None or (units.counts_per_force, units.counts_per_torque) != (
-        configuration.counts_per_force,
-        configuration.counts_per_torque,
-    ):
+    if units is None or (units.counts_per_force, units.counts_per_torque) != configuration.counts:
         raise SetupError(
             f"{target.address.uri}: the box's command port does not count as its web page says; check the tcp port"
         )
@@ -114,7 +109,7 @@ def _command(target: _Target, configuration: Configuration, deadline: Deadline) 
         _wrench(target, wire.SET_BIAS, deadline)
         time.sleep(_SETTLING)
         counts = np.array(_wrench(target, wire.READ_WRENCH, deadline)) * np.array(units.scales)
-        force, torque = np.abs(configuration.calibration().matrix @ counts).reshape(2, 3).max(axis=1)
+        force, torque = np.abs(configuration.info.calibration.matrix @ counts).reshape(2, 3).max(axis=1)
         results["software bias"] = (
             f"set at opening, as the address asks; at most {force:.3g} N and {torque:.3g} N mm left"
         )
@@ -135,28 +130,13 @@ def _tcp(target: _Target, command: bytes, size: int, deadline: Deadline) -> byte
 def _identify(target: _Target) -> TransducerInfo | None:
     """Return who answers at once, None when nobody does. Raises SetupError when its page makes no sense."""
     try:
-        return _info(target, _configuration(target, Deadline(_AT_ONCE)))
+        return _configuration(target, Deadline(_AT_ONCE)).info
     except LinkLost:
         return None
 
 
-def _info(target: _Target, configuration: Configuration) -> TransducerInfo:
-    return TransducerInfo(
-        uri=target.address.uri,
-        driver="net-ft",
-        model=" ".join(filter(None, (configuration.product, configuration.model))),
-        serial=configuration.serial,
-        simulated="SIMULATED" in configuration.product.upper(),
-        rate=configuration.rate,
-        counter_rate=configuration.ticks,
-        calibration=configuration.calibration(),
-        settings=configuration.settings,
-        status=configuration.status,
-    )
-
-
-def _is_rate(configuration: Configuration, rate: int) -> bool:
-    return math.isclose(configuration.rate, true_rate(rate, configuration.ticks))
+def _is_rate(info: TransducerInfo, rate: int) -> bool:
+    return math.isclose(info.rate, true_rate(rate, info.counter_rate))
 
 
 def _configuration(target: _Target, deadline: Deadline) -> Configuration:
@@ -167,7 +147,7 @@ def _configuration(target: _Target, deadline: Deadline) -> Configuration:
             "check that the address is that of a Net F/T box or an Ethernet Axia"
         )
     try:
-        return parse_configuration(answer.body)
+        return parse_configuration(answer.body, target.address.uri)
     except SetupError as error:
         raise SetupError(f"{target.address.uri}: {error}") from None
 

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,47 +11,29 @@ from drivers.arrays import Array
 from drivers.calibration import Calibration
 from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT
 from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
-from drivers.transducer import SetupError, StatusTable
+from drivers.transducer import SetupError, StatusTable, TransducerInfo
 
 _CUT_OFFS = (838, 326, 152, 73, 35, 18, 8, 5, 1500, 2000, 2500, 3000)  # of the low-pass filters, by code from 1 [Hz]
 _FILTERS = {"0": "off"} | {str(code): f"{cut_off} Hz" for code, cut_off in enumerate(_CUT_OFFS, 1)}
 
 
-@dataclass(frozen=True, slots=True)
-class Configuration:
+class Configuration(NamedTuple):
     """What the box says of itself and of the configuration in force."""
 
-    product: str
-    status: StatusTable
-    ticks: float  # of the box's own sampling in a second [Hz]
-    serial: str  # of the calibration in force; empty where the box states none
-    model: str  # of the transducer, as the box states it, which is not always right
-    counts_per_force: float  # counts in one force unit
-    counts_per_torque: float
-    newtons: float  # in one force unit
-    newton_millimetres: float  # in one torque unit
-    rated: tuple[float, ...]  # six ranges in the box's units; empty where it states none
-    rate: float  # readings a second it streams [Hz]; nan where it states none
+    info: TransducerInfo
+    counts: tuple[float, float]  # in one force unit, and in one torque unit
     streams: bool  # false when its real-time output is switched off
-    settings: Mapping[str, str]  # what else was in force, for people
-
-    def calibration(self) -> Calibration:
-        """Return what turns its counts into N and N mm."""
-        units = np.repeat([self.newtons, self.newton_millimetres], 3)
-        counts = np.repeat([self.counts_per_force, self.counts_per_torque], 3)
-        rated: Array = np.array(self.rated) * units if self.rated else np.full(6, np.nan)
-        source = f"counts per unit read from {self.product}"
-        return Calibration(self.serial, "counts", np.diag(units / counts), rated, source)
 
 
-def parse_configuration(page: bytes) -> Configuration:
-    """Return what netftapi2.xml says. Raises SetupError where a needed element is missing, double or makes no sense."""
+def parse_configuration(page: bytes, uri: str) -> Configuration:
+    """Return what netftapi2.xml says of the box at `uri`.
+
+    Raises SetupError where a needed element is missing, double or makes no sense.
+    """
     elements = _elements(page)
     product = _required(elements, "prodname")
     status = AXIA if "axia" in product.lower() else NET_FT
     ticks = _ticks(_optional(elements, "setadcrate")) if status is AXIA else COUNTER_RATE
-    force, torque = _required(elements, "scfgfu"), _required(elements, "scfgtu")
-    rated = _ratings(elements)
     settings = {
         "configuration": _optional(elements, "cfgnam"),
         "filter": _FILTERS.get(code := _optional(elements, "setuserfilter"), code),  # itself where it is unknown
@@ -65,21 +47,25 @@ def parse_configuration(page: bytes) -> Configuration:
             "its counter is taken to tick at its converter's rate, which no manual says: held against this computer's "
             "clock while it streams"
         )
-    return Configuration(
-        product=product,
-        status=status,
-        ticks=ticks,
-        serial=_optional(elements, "cfgcalsn"),
-        model=_optional(elements, "mfgtxdmdl"),
-        counts_per_force=_positive("cfgcpf", _required(elements, "cfgcpf")),
-        counts_per_torque=_positive("cfgcpt", _required(elements, "cfgcpt")),
-        newtons=_unit("force", force, FORCE),
-        newton_millimetres=_unit("torque", torque, TORQUE),
-        rated=rated,
+    counts = _positive("cfgcpf", _required(elements, "cfgcpf")), _positive("cfgcpt", _required(elements, "cfgcpt"))
+    force, torque = _required(elements, "scfgfu"), _required(elements, "scfgtu")
+    units = np.repeat([_unit("force", force, FORCE), _unit("torque", torque, TORQUE)], 3)
+    serial = _optional(elements, "cfgcalsn")  # of the calibration in force; empty where the box states none
+    matrix, rated = np.diag(units / np.repeat(counts, 3)), _ratings(elements) * units
+    info = TransducerInfo(
+        uri=uri,
+        driver="net-ft",
+        # The model is that of the transducer as the box states it, which is not always right.
+        model=" ".join(filter(None, (product, _optional(elements, "mfgtxdmdl")))),
+        serial=serial,
+        simulated="SIMULATED" in product.upper(),
         rate=_rate(_optional(elements, "comrdtrate"), ticks),
-        streams=_optional(elements, "comrdte").lower() != "disabled",
+        counter_rate=ticks,
+        calibration=Calibration(serial, "counts", matrix, rated, f"counts per unit read from {product}"),
         settings={name: value for name, value in settings.items() if value},
+        status=status,
     )
+    return Configuration(info, counts, _optional(elements, "comrdte").lower() != "disabled")
 
 
 def true_rate(nominal: float, ticks: float = COUNTER_RATE) -> float:
@@ -142,9 +128,10 @@ def _unit(dimension: str, text: str, units: Mapping[str, float]) -> float:
     return size
 
 
-def _ratings(elements: Mapping[str, list[str]]) -> tuple[float, ...]:
-    values = tuple(number(piece) for piece in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if piece)
-    return values if len(values) == 6 and all(math.isfinite(value) and value > 0.0 for value in values) else ()
+def _ratings(elements: Mapping[str, list[str]]) -> Array:
+    """Return six ranges in the box's units, nan where it states none."""
+    values = np.array([number(piece) for piece in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if piece])
+    return values if len(values) == 6 and np.all(np.isfinite(values) & (values > 0.0)) else np.full(6, np.nan)
 
 
 def _rate(text: str, ticks: float) -> float:

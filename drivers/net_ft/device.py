@@ -34,7 +34,7 @@ class _SettingsWatch:
         self._info = info
         self._identify = identify
         self._clock = clock
-        self._look = threading.Event()
+        self.look = threading.Event()  # set: look at once, for the stream shows that something was changed
         self._stop = threading.Event()
         self._senseless = 0  # pages in a row that make no sense
         self._thread = threading.Thread(target=self._run, name=f"settings of {info.serial}", daemon=True)
@@ -44,12 +44,8 @@ class _SettingsWatch:
 
     def end(self) -> None:
         self._stop.set()
-        self._look.set()
+        self.look.set()
         self._thread.join(_ENDING)
-
-    def look_now(self) -> None:
-        """Look at once: the stream shows that something was changed."""
-        self._look.set()
 
     def is_the_same(self) -> bool:
         """Tell whether the box answers and counts as before. Raises DeviceFault when another does, or other units."""
@@ -81,13 +77,13 @@ class _SettingsWatch:
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            self._look.clear()
+            self.look.clear()
             try:
                 is_same = self.is_the_same()
             except Exception as fault:  # noqa: BLE001 - units that are watched no more must not look confirmed
                 self.fault = fault
                 return
-            self._look.wait(_EVERY if is_same else _AGAIN)
+            self.look.wait(_EVERY if is_same else _AGAIN)
 
 
 def _units(info: TransducerInfo) -> str:
@@ -288,7 +284,7 @@ class NetFtTransducer(ThreadedTransducer):
         changes = self._account.changed + self._account.restarted + self._watch.changes
         if changes != self._changes:
             self._changes = changes
-            self._settings.look_now()
+            self._settings.look.set()
         while self._unconfirmed and self._unconfirmed[0][0] < self._settings.confirmed_ns:
             self._unconfirmed.popleft()
         self._unconfirmed.append((received_ns, count))

@@ -83,7 +83,7 @@ def _find_controller(target: _Target, deadline: Deadline) -> tuple[SerialLink, i
 
 
 def _info(target: _Target, baud: int, reply: str, rate: float) -> TransducerInfo:
-    address = target.address
+    simulated = "SIMULATED" in reply.upper() or "simulated" in target.address.options
     settings = {
         "baud": f"{baud}, {'as the address says' if len(target.bauds) == 1 else 'found by trying'}",
         "output": "binary, without checksum" if target.binary else "ASCII, without checksum",
@@ -96,21 +96,17 @@ def _info(target: _Target, baud: int, reply: str, rate: float) -> TransducerInfo
     if reply:
         settings |= {"banner": reply, "rate": "measured at opening; the controller cannot be asked"}
     return TransducerInfo(
-        uri=address.uri,
+        uri=target.address.uri,
         driver="serial-ft",
-        model="SIMULATED F/T Controller" if _is_simulated(address, reply) else "F/T Controller",
+        model="SIMULATED F/T Controller" if simulated else "F/T Controller",
         serial=target.calibration.serial,
-        simulated=_is_simulated(address, reply),
+        simulated=simulated,
         rate=rate,
         counter_rate=math.nan,
         calibration=target.calibration,
         settings=settings,
         status=wire.STATUS_BITS,
     )
-
-
-def _is_simulated(address: Address, reply: str) -> bool:
-    return "SIMULATED" in reply.upper() or "simulated" in address.options
 
 
 def _target_of(address: Address) -> _Target:

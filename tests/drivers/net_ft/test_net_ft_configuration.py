@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from drivers.net_ft.configuration import parse_configuration, true_rate
 from drivers.transducer import SetupError
 
+URI = "net-ft://box"
 ELEMENTS = {
     "prodname": "Net F/T",
     "mfgtxdmdl": "SI-36-0.5",
@@ -36,15 +37,14 @@ def page(root="netft", extra="", **changes):
 
 
 def test_a_page_gives_identity_calibration_and_settings():
-    configuration = parse_configuration(page())
-    identity = (configuration.product, configuration.serial, configuration.model)
-    assert identity == ("Net F/T", "FT12345", "SI-36-0.5")
-    assert (configuration.rate, configuration.streams) == (200.0, True)
-    calibration = configuration.calibration()
+    info, _, streams = parse_configuration(page(), URI)
+    assert (info.uri, info.model, info.serial) == (URI, "Net F/T SI-36-0.5", "FT12345")
+    assert (info.rate, streams) == (200.0, True)
+    calibration = info.calibration
     assert calibration.serial == "FT12345"
     assert calibration.rated.tolist() == [36, 36, 36, 500, 500, 500]
     assert calibration.wrench(np.array([[1e6, 0, 0, 0, 0, 2e6]]), np.zeros(6)).tolist() == [[1, 0, 0, 0, 0, 2000]]
-    assert configuration.settings == {
+    assert info.settings == {
         "configuration": "Nano43",
         "filter": "35 Hz",
         "stored bias [gauge counts]": "1 -2 3 4 5 -18343",
@@ -66,42 +66,42 @@ def test_a_page_gives_identity_calibration_and_settings():
     ],
 )
 def test_units_are_converted(force, torque, newtons, newton_millimetres):
-    matrix = parse_configuration(page(scfgfu=force, scfgtu=torque)).calibration().matrix
+    matrix = parse_configuration(page(scfgfu=force, scfgtu=torque), URI).info.calibration.matrix
     np.testing.assert_allclose(np.diag(matrix) * 1e6, [newtons] * 3 + [newton_millimetres] * 3, rtol=1e-7)
 
 
 def test_the_rated_range_follows_the_units():
-    configuration = parse_configuration(page(scfgfu="lbf", cfgmr="8;8;8;0.5;0.5;0.5"))
-    np.testing.assert_allclose(configuration.calibration().rated, [35.585773] * 3 + [500.0] * 3, rtol=1e-7)
+    configuration = parse_configuration(page(scfgfu="lbf", cfgmr="8;8;8;0.5;0.5;0.5"), URI)
+    np.testing.assert_allclose(configuration.info.calibration.rated, [35.585773] * 3 + [500.0] * 3, rtol=1e-7)
 
 
 @pytest.mark.parametrize("text", [None, "", "1;2;3", "36;36;36;0.5;0.5;nan", "0;0;0;0;0;0"])
 def test_a_rated_range_that_is_not_stated_is_unknown(text):
-    assert np.all(np.isnan(parse_configuration(page(cfgmr=text)).calibration().rated))
+    assert np.all(np.isnan(parse_configuration(page(cfgmr=text), URI).info.calibration.rated))
 
 
 @pytest.mark.parametrize("name", ["prodname", "cfgcpf", "cfgcpt", "scfgfu", "scfgtu"])
 @pytest.mark.parametrize("text", [None, "", "  ", "1</{name}><{name}>1", "1<inner/>"])
 def test_what_a_client_needs_must_be_there_exactly_once_as_text(name, text):
     with pytest.raises(SetupError, match=name):
-        parse_configuration(page(**{name: text and text.format(name=name)}))
+        parse_configuration(page(**{name: text and text.format(name=name)}), URI)
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "1e999", "1_000", "1,5", "0x10", "१", "1" * 60, "1 2"])
 @pytest.mark.parametrize("name", ["cfgcpf", "cfgcpt"])
 def test_counts_per_unit_are_a_number_above_0_written_with_a_point(name, text):
     with pytest.raises(SetupError, match=name):
-        parse_configuration(page(**{name: text}))
+        parse_configuration(page(**{name: text}), URI)
 
 
 @pytest.mark.parametrize("text", ["500000.5", "1e6", " 1000000 ", "+.5E3"])
 def test_counts_per_unit_may_be_fractions(text):
-    assert parse_configuration(page(cfgcpf=text)).counts_per_force == float(text)
+    assert parse_configuration(page(cfgcpf=text), URI).counts[0] == float(text)
 
 
 def test_an_unknown_unit_is_refused():
     with pytest.raises(SetupError, match="stone"):
-        parse_configuration(page(scfgfu="stone"))
+        parse_configuration(page(scfgfu="stone"), URI)
 
 
 BOMB = '<!DOCTYPE netft [<!ENTITY a "x"><!ENTITY b "&a;&a;">]>'
@@ -124,42 +124,42 @@ BOMB = '<!DOCTYPE netft [<!ENTITY a "x"><!ENTITY b "&a;&a;">]>'
 )
 def test_a_hostile_or_broken_page_is_refused_in_a_sentence(hostile):
     with pytest.raises(SetupError, match="configuration page"):
-        parse_configuration(hostile)
+        parse_configuration(hostile, URI)
 
 
 @given(st.binary(max_size=300))
 def test_garbage_raises_nothing_but_a_sentence(garbage):
     with pytest.raises(SetupError):
-        parse_configuration(garbage)
+        parse_configuration(garbage, URI)
 
 
 @given(st.dictionaries(st.sampled_from(sorted(ELEMENTS)), st.text("0123456789;.-xeN \u00e9", max_size=12)))
 def test_any_texts_give_a_configuration_that_can_be_used_or_a_sentence(changes):
     try:
-        configuration = parse_configuration(page(**changes))
+        configuration = parse_configuration(page(**changes), URI)
     except SetupError:
         return
-    assert np.all(np.isfinite(configuration.calibration().matrix))
-    assert math.isnan(configuration.rate) or 1.0 <= configuration.rate <= 7000.0
+    assert np.all(np.isfinite(configuration.info.calibration.matrix))
+    assert math.isnan(configuration.info.rate) or 1.0 <= configuration.info.rate <= 7000.0
 
 
 def test_a_disabled_stream_is_seen():
-    assert not parse_configuration(page(comrdte="Disabled")).streams
+    assert not parse_configuration(page(comrdte="Disabled"), URI).streams
 
 
 @pytest.mark.parametrize("text", [None, "", "0", "7001", "many"])
 def test_a_rate_that_is_not_stated_is_unknown(text):
-    assert math.isnan(parse_configuration(page(comrdtrate=text)).rate)
+    assert math.isnan(parse_configuration(page(comrdtrate=text), URI).info.rate)
 
 
 def test_a_tool_transform_in_force_is_recorded():
-    configuration = parse_configuration(page(cfgtfx="0;0;4.5;0;0;90", scfgtdu="mm", scfgtau="degrees"))
-    assert configuration.settings["tool transform"] == "0 0 4.5 0 0 90 [mm, degrees]"
+    configuration = parse_configuration(page(cfgtfx="0;0;4.5;0;0;90", scfgtdu="mm", scfgtau="degrees"), URI)
+    assert configuration.info.settings["tool transform"] == "0 0 4.5 0 0 90 [mm, degrees]"
 
 
 @pytest.mark.parametrize("code", ["12", "13", "x", "-1"])
 def test_a_filter_is_named_or_its_code_kept(code):
-    filter_name = parse_configuration(page(setuserfilter=code)).settings["filter"]
+    filter_name = parse_configuration(page(setuserfilter=code), URI).info.settings["filter"]
     assert filter_name == ("3000 Hz" if code == "12" else code)
 
 
