@@ -132,15 +132,12 @@ class Visit:
             "mu_dynamic": (systematic.ratio(drag / normal, along), drag / normal, true / -float(force[2])),
             "tau_max": (drag * systematic.gain_t + systematic.shares(along)[0] * normal, drag, true),
         }
-        intervals = {
-            name: (*np.quantile(draw, (0.025, 0.975)), estimate, truth)
-            for name, (draw, estimate, truth) in draws.items()
-        }
-        levelled = settings.tilt == (0.0, 0.0)
-        return {
-            name: low <= truth <= high or (not levelled and min(low, estimate) <= truth <= max(high, estimate))
-            for name, (low, high, estimate, truth) in intervals.items()
-        }
+        holds: dict[str, bool] = {}
+        for name, (draw, estimate, truth) in draws.items():
+            estimates = [] if settings.tilt == (0.0, 0.0) else [estimate]  # of a face that is not levelled
+            low, high = np.quantile(draw, (0.025, 0.975))
+            holds[name] = min([low, *estimates]) <= truth <= max([high, *estimates])
+        return holds
 
     def _truth(self, stroke: StrokeGroundTruth) -> Truth:
         steady = np.linspace(*stroke.steady, FINE)

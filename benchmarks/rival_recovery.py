@@ -8,7 +8,6 @@ quantity by default. Prints a table for the documentation.
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,15 +24,6 @@ SPEEDS = (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5
 WIDE_FORCES = (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2)  # in no order of friction [N]
 
 
-@dataclass(frozen=True)
-class Study:
-    """A design and how many people take part."""
-
-    name: str
-    people: int
-    design: StudyDesign
-
-
 PAPER = StudyDesign(
     tuple(surface.mu for surface in STICKINESS),
     tuple(1e-2 * surface.printed_bound * AREA / surface.mu for surface in STICKINESS),
@@ -47,10 +37,10 @@ CROSSED = StudyDesign(
     SPEEDS * 2,
     (1.25, 1.75, 2.25),
 )
-STUDIES = (Study("10 × 5", 10, PAPER), Study("20 × 12", 20, WIDE), Study("24 × 8 × 3", 24, CROSSED))
+STUDIES = (("10 × 5", 10, PAPER), ("20 × 12", 20, WIDE), ("24 × 8 × 3", 24, CROSSED))  # name, people, design
 
 
-def row(study: Study, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
+def row(study: str, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
     """Return a row of the table: how often the quantity, a twin of it, and a wrong one is preferred or decided."""
     first = preferred_rivals(weights)
     sure = [name for name, study_weight in zip(first, weights, strict=True) if study_weight[name] >= DECISIVE_WEIGHT]
@@ -64,7 +54,7 @@ def row(study: Study, quantity: str, alike: set[str], weights: Sequence[Mapping[
         sum(name not in alike for name in sure),
     ]
     shares = " | ".join(f"{100 * count / len(weights):.1f} %" for count in counts)
-    return f"| {study.name} | `{quantity}` | {len(alike) - 1} | {shares} | {most} |"
+    return f"| {study} | `{quantity}` | {len(alike) - 1} | {shares} | {most} |"
 
 
 def main() -> None:
@@ -74,14 +64,13 @@ def main() -> None:
     print(f"| {header} | wrong most often |")
     print("| --- " * (header.count("|") + 2) + "|")
     only = sys.argv[3:]
-    for number, study in enumerate(STUDIES):
+    for number, (study, people, design) in enumerate(STUDIES):
         if only and str(number) not in only:
             continue
-        pool = simulated_strokes(study.design, POOL, np.random.default_rng([seed, number]))
-        surfaces = len(study.design.mu)
+        pool = simulated_strokes(design, POOL, np.random.default_rng([seed, number]))
         for quantity in TRUE_QUANTITIES:
             draw = np.random.default_rng([seed, number, TRUE_QUANTITIES.index(quantity)])
-            weights = [study_weights(pool, study.people, surfaces, quantity, EFFECTS, draw) for _ in range(count)]
+            weights = [study_weights(pool, people, len(design.mu), quantity, EFFECTS, draw) for _ in range(count)]
             print(row(study, quantity, twins(pool, quantity), weights), flush=True)
 
 

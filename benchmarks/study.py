@@ -63,7 +63,4 @@ def main(count: int, options: VisitOptions) -> None:
 
 if __name__ == "__main__":
     sessions = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    if len(sys.argv) > 2:
-        main(sessions, VisitOptions(paths="finite" if sys.argv[2] == "finite" else "small"))
-    else:
-        main(sessions, VisitOptions())
+    main(sessions, VisitOptions(paths=sys.argv[2] if len(sys.argv) > 2 else "none"))

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -42,11 +42,8 @@ Jobs = Mapping[str, tuple[Any, ...]]  # arguments of each piece of work, by its 
 Answer = dict[str, Any] | str  # what a session brings, or why it brings nothing
 
 
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """A job was not done."""
-
-    reason: str
+class Lost(str):
+    """Why a job was not done."""
 
 
 def content_of(session: Path) -> dict[str, bytes]:
@@ -278,11 +275,10 @@ def visits(
     )
     try:
         for count, (name, answer) in enumerate(answers, 1):
-            if isinstance(answer, str | Lost):
-                reason = answer if isinstance(answer, str) else answer.reason
-                failures.append((name, reason))
+            if isinstance(answer, str):
+                failures.append((name, str(answer)))
                 # Paths are relative to the current folder.
-                console.note(f"{name}: {reason}".replace(f"{name}/", f"{jobs[name][0]}/"))
+                console.note(f"{name}: {answer}".replace(f"{name}/", f"{jobs[name][0]}/"))
             else:
                 if address is not None:
                     refuse_unlike(answer["made_by"], address, "a worker")

@@ -2,14 +2,14 @@
 
 import importlib
 import math
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from drivers.arrays import Array
+from sessions.file_access import as_type
 from sessions.toml_file import SettingsError, toml_value
 from solver import Scene, SolveFailure, solve
 from solver.scene.tables import TISSUES, SceneError
@@ -87,19 +87,19 @@ def check_design(design: Mapping[str, Any], scene: Scene, file: str) -> dict[str
     for name, span in design.items():
         if _value(scene, name) is None:
             raise SettingsError(f"{file}: {name} is no number of this scene; a dotted key such as friction.mu is one")
-        limits: object = span
-        pair: list[Any] = cast("list[Any]", span) if isinstance(span, list) else []
-        most = sys.float_info.max
-        numbers = [float(limit) for limit in pair if isinstance(limit, int | float) and abs(limit) <= most]
-        if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
-            form = "[least, greatest], least below greatest"
-            raise SettingsError(f"{file}: {name} = {toml_value(limits)} is not allowed: {form}")
         try:
-            for limit in numbers:
+            low, high = as_type(span, tuple[float, float])
+        except ValueError:
+            low = high = math.nan
+        if not -math.inf < low < high < math.inf:
+            form = "[least, greatest], least below greatest"
+            raise SettingsError(f"{file}: {name} = {toml_value(span)} is not allowed: {form}")
+        try:
+            for limit in (low, high):
                 with_values(scene, {name: limit})
         except SceneError as error:
             raise SettingsError(f"{file}: {error}") from error
-        ranges[name] = (numbers[0], numbers[1])
+        ranges[name] = (low, high)
     if len(ranges) < 2:
         raise SettingsError(f"{file}: a design needs two numbers at least")
     return ranges
@@ -134,7 +134,8 @@ def sensitivity(
             f"{len(failures)} of {len(points)} scenes of the design have no settled state; narrow its ranges "
             f"(the first: {failures[0]})"
         )
-    return sobol_indices(design, responses, seed, lambda name: _one_sided(scene, name, design[name])), responses
+    one_sided = {name for name, (low, high) in design.items() if not low < (_value(scene, name) or 0.0) < high}
+    return sobol_indices(design, responses, seed, one_sided), responses
 
 
 def saltelli_points(design: Design, samples: int, seed: int) -> Array:
@@ -143,7 +144,7 @@ def saltelli_points(design: Design, samples: int, seed: int) -> Array:
     return draw.sample(_problem(design), samples, calc_second_order=False, seed=seed)
 
 
-def sobol_indices(design: Design, answers: Array, seed: int, one_sided: Callable[[str], bool]) -> tuple[Index, ...]:
+def sobol_indices(design: Design, answers: Array, seed: int, one_sided: Collection[str] = ()) -> tuple[Index, ...]:
     """Return the index of each number of a design, greatest total first, from `answers` at its `saltelli_points`."""
     analyse: Any = importlib.import_module("SALib.analyze.sobol")
     result: Any = analyse.analyze(
@@ -156,7 +157,7 @@ def sobol_indices(design: Design, answers: Array, seed: int, one_sided: Callable
     columns = zip(
         design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
     )
-    indices = [Index(name, *design[name], *values, one_sided=one_sided(name)) for name, *values in columns]
+    indices = [Index(name, *design[name], *values, one_sided=name in one_sided) for name, *values in columns]
     return tuple(sorted(indices, key=lambda index: -index.total))
 
 
@@ -183,11 +184,6 @@ def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
             f"each to ±{_NARROW:g}."
         )
     return tuple(sentences)
-
-
-def _one_sided(scene: Scene, name: str, span: tuple[float, float]) -> bool:
-    value = _value(scene, name)
-    return value is not None and not span[0] < value < span[1]
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:

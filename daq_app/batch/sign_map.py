@@ -179,8 +179,7 @@ def answers_of(
         with log as file, closing(answers):
             for key, answer in answers:
                 if isinstance(answer, Lost):
-                    advice = "run this again, with --keep from there"
-                    raise TooFewAnswers(f"a finger has no answer: {answer.reason}; {advice}")
+                    raise TooFewAnswers(f"a finger has no answer: {answer}; run this again, with --keep from there")
                 by_key[key] = answer
                 if file is not None:
                     file.write("\n" + json.dumps({"key": key, "answer": answer}))
@@ -257,4 +256,4 @@ def slope_indices(
     complete_blocks = values[np.isfinite(values).all(axis=1)]
     if len(complete_blocks) < 2:
         return (), 0
-    return sobol_indices(DESIGN, complete_blocks.ravel(), seed, lambda _: False), complete_blocks.size
+    return sobol_indices(DESIGN, complete_blocks.ravel(), seed), complete_blocks.size

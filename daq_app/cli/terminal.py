@@ -209,8 +209,7 @@ class _Attendance:
         self._interrupted = interrupted
         self._terminal: Terminal | None = None
         self._start: m.SessionBegun | None = None
-        self._folder = ""
-        self._end: SessionEnd | None = None
+        self._end: m.SessionEnded | None = None
         self._stopping = False
         self._silent = False
 
@@ -223,7 +222,7 @@ class _Attendance:
                 self._interrupted.pending = False
                 if self._end is not None:
                     self._console.note("the recorder goes on sealing the session by itself")
-                    return Outcome(self._folder, self._end, sealed=False)
+                    return Outcome(self._end.folder, self._end.end, sealed=False)
                 if self._stopping:
                     self._leave_silent_recorder()
                 self._stopping = True
@@ -266,14 +265,13 @@ class _Attendance:
             case Status():
                 self._show_status(report)
             case m.SessionEnded(folder, end, resumable):
-                self._folder, self._end = folder, end
-                self._terminal = None
+                self._end, self._terminal = report, None
                 return Outcome(folder, end, sealed=False) if resumable else None
             case m.Sealing(folder):
                 self._console.note(f"sealing {folder}")
             case m.Sealed():
                 assert self._end is not None
-                return Outcome(self._folder, self._end, sealed=True)
+                return Outcome(self._end.folder, self._end.end, sealed=True)
             case m.LinkDown(sentence) if self._start is None:
                 raise LinkLost(sentence)  # it was opened, and does not stream
             case m.Failed() if self._stopping and self._start is None:

@@ -18,10 +18,10 @@ from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display
 from daq_app.recorder.pipes import Inbox
-from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, SimulatedSubject, simulated_surface
+from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, SimulatedSubject, SurfaceOf, simulated_surface
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
-from sessions.plan.plan import SessionPlan, Trial
+from sessions.plan.plan import SessionPlan
 from sessions.plan.study import StudyError, study_key
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.head import certificate_for, simulated_sentence, software_versions, without_home
@@ -268,30 +268,25 @@ def _helper(prepared: SessionSetup, bench: Bench) -> Operator | None:
     connected = bench.connected if prepared.plan.forces else None
     if people.kind == "people":
         return None
-    subject, index_of = SimulatedSubject(people.seed), _index_of(prepared.plan, prepared.writer.folder)
-
+    subject, surface = SimulatedSubject(people.seed), _surface_of(people, prepared.plan, prepared.writer.folder)
     if people.kind == "simulated people":
-        return SimulatedPeople(
-            subject, prepared.clock, connected, lambda trial: simulated_surface(index_of(trial), people.friction)
-        )
-    return SimulatedHand(subject, connected, lambda trial: simulated_surface(index_of(trial), people.friction))
+        return SimulatedPeople(subject, prepared.clock, connected, surface)
+    return SimulatedHand(subject, connected, surface)
 
 
-def _index_of(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
-    """Return what tells a simulated bench the index of a trial's stimulus: where codes are blinded, the study's key."""
-    if not plan.blinded:
-        return lambda trial: trial
+def _surface_of(people: m.People, plan: SessionPlan, folder: Path) -> SurfaceOf:
+    """Return what tells a simulated bench the surface of a trial: where codes are blinded, by the study's key."""
     try:
-        key = study_key(folder.parent)
+        key = study_key(folder.parent) if plan.blinded else None
     except StudyError as error:
         raise NotNow(f"simulated people must know which stimulus is which: {error}") from error
-    return (lambda trial: trial) if key is None else key.reveal
+    return lambda trial: simulated_surface(trial if key is None else key.reveal(trial), people.friction)
 
 
 def _check_people(people: m.People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
     """Raise NotNow where simulated people would have to stroke a real bench, or cannot tell stimuli apart."""
     if people.kind != "people":
-        _index_of(plan, folder)
+        _surface_of(people, plan, folder)
     simulated_bench = bench.connected is not None and bench.connected.bench is not None
     if people.kind == "simulated people" and plan.forces and not simulated_bench:
         raise NotNow("simulated people stroke the simulated bench only: connect sim:")

@@ -296,14 +296,6 @@ _FIRST = 1_000_000  # seed: nobody of a study's
 _FINGERS = np.linspace(-4.0, 4.0, 9)  # solved: friction of the finger, in its standard deviations between people
 
 
-@dataclass(frozen=True, slots=True)
-class PopulationRelation:
-    """How single scores go with SEDs within people at large."""
-
-    r: float  # with the noise of judgement [-]
-    slope: float  # drift and carry-over accounted for [points per kPa]
-
-
 def population_relations(
     people: Mapping[str, float], options: PredictionOptions, area: AreaLaw
 ) -> dict[str, dict[str, float]]:
@@ -314,13 +306,15 @@ def population_relations(
     """
     if options.kinematics == "finite" or area != FIXED:
         return {}
-    by_descriptor = relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
-    return {descriptor: asdict(relation) for descriptor, relation in by_descriptor.items()}
+    return relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
 
 
-def relations(people: SubjectSettings, seds: SedsAt) -> Mapping[str, PopulationRelation]:
-    """Return the relation for each descriptor; none where a surface has no settled slide."""
-    by_descriptor: dict[str, PopulationRelation] = {}
+def relations(people: SubjectSettings, seds: SedsAt) -> dict[str, dict[str, float]]:
+    """Return how single scores go with SEDs, for each descriptor; none where a surface has no settled slide.
+
+    r is with the noise of judgement [-]; drift and carry-over are accounted for in the slope [points per kPa].
+    """
+    by_descriptor: dict[str, dict[str, float]] = {}
     for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
         surfaces = [simulated_surface(trial) for trial in block.trials]
         seds_of_finger = _seds_of_fingers(surfaces, block, people.moisture, seds)
@@ -351,7 +345,7 @@ def _seds_of_fingers(
 
 def _relation(
     people: SubjectSettings, surfaces: Sequence[Surface], seds: Callable[[float], Sequence[float]]
-) -> PopulationRelation:
+) -> dict[str, float]:
     products = np.zeros((4, 4))  # of SED, place, index before, and score, each without the person's own mean
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
     for seed in range(_FIRST, _FIRST + SAMPLE_SIZE):
@@ -370,4 +364,4 @@ def _relation(
         products += rows.T @ rows
     noise = people.judgement_noise**2 * SAMPLE_SIZE * (len(surfaces) - 1)
     r = products[0, 3] / math.sqrt(products[0, 0] * (products[3, 3] + noise))
-    return PopulationRelation(float(r), float(np.linalg.solve(products[:3, :3], products[:3, 3])[0]))
+    return {"r": float(r), "slope": float(np.linalg.solve(products[:3, :3], products[:3, 3])[0])}

@@ -9,7 +9,7 @@ score follows it. In the third the same people judge surfaces drawn afresh for e
 
 import math
 from collections import defaultdict
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,7 +122,7 @@ def at_large():
     """Return how score and SED go together among very many people, by descriptor."""
     # Without carry-over in judgements of slipperiness.
     people = {"stickiness": PEOPLE, "slipperiness": replace(PEOPLE, carry_over=0.0)}
-    return {name: asdict(relations(settings, seds)[name]) for name, settings in people.items()}
+    return {name: relations(settings, seds)[name] for name, settings in people.items()}
 
 
 def people_hits():
