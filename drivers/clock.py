@@ -31,11 +31,9 @@ class RealClock:
     factor = 1.0
 
     def now_ns(self) -> int:
-        """Return the machine's monotonic time [ns]."""
         return time.monotonic_ns()
 
     def sleep(self, seconds: float) -> None:
-        """Wait for `seconds`."""
         time.sleep(max(seconds, 0.0))
 
 
@@ -54,7 +52,6 @@ class PacedClock:
         self._lock = threading.Lock()
 
     def now_ns(self) -> int:
-        """Return the time of this clock [ns]."""
         with self._lock:
             machine_ns = time.monotonic_ns()
             self._now_ns += int(min((machine_ns - self._machine_ns) * self.factor, self._longest_ns))
@@ -62,7 +59,6 @@ class PacedClock:
             return self._now_ns
 
     def sleep(self, seconds: float) -> None:
-        """Wait for `seconds` of this clock."""
         until = self.now_ns() + int(max(seconds, 0.0) * 1e9)
         while (remaining_ns := until - self.now_ns()) > 0:
             time.sleep(min(remaining_ns, self._longest_ns) * 1e-9 / self.factor)
@@ -85,12 +81,10 @@ class SimulatedClock:
         self.at_ns = at_ns  # the time, which reading this does not move [ns]
 
     def now_ns(self) -> int:
-        """Return the simulated time [ns]."""
         self.at_ns += 1000
         return self.at_ns
 
     def sleep(self, seconds: float) -> None:
-        """Let `seconds` of simulated time pass at once."""
         self.at_ns += int(max(seconds, 0.0) * 1e9)
 
 
@@ -103,7 +97,6 @@ class StillClock:
         self.at_ns = at_ns  # where it stands [ns]
 
     def now_ns(self) -> int:
-        """Return where it stands [ns]."""
         return self.at_ns
 
     def sleep(self, seconds: float) -> None:

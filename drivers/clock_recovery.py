@@ -35,10 +35,7 @@ class RateWatch:
         self._last = 0.0  # arrival
 
     def take(self, count: int, received_ns: int) -> bool:
-        """Take the device's count at an arrival; say whether its rate has changed.
-
-        `count` includes records that are known to be lost.
-        """
+        """Take the device's count at an arrival, lost records included; say whether its rate has changed."""
         now = received_ns * 1e-9
         if self._best is None or now - self._last > self._silence:
             self._points.clear()
@@ -257,10 +254,7 @@ class ScanCount:
     """
 
     def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
-        """Expect `rate` scans in a second [Hz] of the session's clock; losses are known up to multiples of `wrap`.
-
-        The session's clock runs `factor` times real time.
-        """
+        """Expect `rate` scans a second [Hz] of a clock `factor` times real; losses are known up to multiples of `wrap`."""
         self.lost = 0
         self.watch = RateWatch(rate, factor, GAP * factor + 10.0 / rate)
         self._rate = rate

@@ -46,7 +46,6 @@ class UdpLink:
             raise LinkLost(f"cannot send to {self._location}: {_reason(error)}; check the network cable") from None
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return the next datagram, or None when none came within `timeout` seconds."""
         if timeout != self._timeout:
             self._socket.settimeout(timeout)
             self._timeout = timeout
@@ -58,7 +57,6 @@ class UdpLink:
             raise LinkLost(f"cannot receive from {self._location}: {_reason(error)}; check the network cable") from None
 
     def close(self) -> None:
-        """Give the port back."""
         self._socket.close()
 
 

@@ -56,7 +56,6 @@ class SerialLink:
             raise SetupError(f"{port} cannot be opened: {_reason(error, baud)}") from None
 
     def send(self, data: bytes) -> None:
-        """Send `data`. Raises LinkLost when the port is gone or takes nothing any more."""
         try:
             while data:
                 # pyserial's own time for writing runs out where this computer is busy.
@@ -67,7 +66,6 @@ class SerialLink:
             raise LinkLost(f"{self._port_name} takes no bytes any more; check that its plug is in") from None
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return what has arrived, or None when nothing came within `timeout` real seconds."""
         try:
             if timeout != self._timeout:
                 self._port.timeout = timeout
@@ -80,7 +78,6 @@ class SerialLink:
             raise LinkLost(f"{self._port_name} is gone; check that its plug is in") from None
 
     def close(self) -> None:
-        """Give the port back. Harmless when repeated."""
         with contextlib.suppress(*_PORT_ERRORS):  # it was pulled out
             self._port.close()
 

@@ -141,17 +141,14 @@ class StreamingTransducer(ThreadedTransducer):
             )
 
     def has_come(self) -> bool:
-        """Tell whether a reading has come."""
         return self._ever
 
     def never_came(self, seconds: float) -> str:
-        """Return why no reading came within `seconds`, in a sentence."""
         count = self.health.malformed
         description = f"{count} broken records and no reading" if count else "no reading"
         return f"{self.info.uri} sent {description} within {seconds:.1f} s; check its power, the cable and the address"
 
     def reset(self) -> None:
-        """Forget what an earlier stream left."""
         super().reset()
         self._pending.clear()
         self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
@@ -219,7 +216,6 @@ class StreamingTransducer(ThreadedTransducer):
             data = link.receive(TICK)
 
     def digest(self, *, end: bool = False) -> None:
-        """Turn pending records into readings. The lock is held."""
         while self._pending:
             arrival = self._pending.popleft()
             if arrival.records is None:

@@ -79,7 +79,6 @@ class ThreadedTransducer(ABC):
             raise self.ended
 
     def read(self, timeout: float) -> ReadingBlock:
-        """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
         deadline = time.monotonic() + timeout / self.clock.factor
         while True:
             self.news.clear()
@@ -113,14 +112,12 @@ class ThreadedTransducer(ABC):
         self._lag_ms = 0.0
 
     def stop(self) -> None:
-        """End streaming; what had arrived can still be read. Harmless when repeated."""
         self.stopping.set()
         if self._thread is not None:
             self._last_thread, self._thread = self._thread, None
             _await_end(self._last_thread, Deadline(_LEAVING))
 
     def close(self) -> None:
-        """Stop; port and thread are given back. Harmless when repeated."""
         self.stop()
 
     def _run(self) -> None:

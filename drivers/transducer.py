@@ -205,21 +205,16 @@ class WrappedTransducer:
 
     @property
     def health(self) -> Health:
-        """Totals so far."""
         return self._inner.health
 
     def start(self) -> None:
-        """Begin streaming."""
         self._inner.start()
 
     def read(self, timeout: float) -> ReadingBlock:
-        """Return all readings not yet handed over."""
         return self._inner.read(timeout)
 
     def stop(self) -> None:
-        """End streaming."""
         self._inner.stop()
 
     def close(self) -> None:
-        """Stop, and give everything back."""
         self._inner.close()

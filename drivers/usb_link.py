@@ -46,7 +46,6 @@ class UsbLink:
             raise SetupError(f"{location} cannot be opened: {_reason(error)}") from None
 
     def send(self, data: bytes) -> None:
-        """Send a request. Raises LinkLost when the device is gone."""
         try:
             self._device.write(self._endpoints.requests, data, _WRITE_MS)
         except _core.USBError as error:
@@ -73,7 +72,6 @@ class UsbLink:
         return b"".join(packets) or None
 
     def close(self) -> None:
-        """Give the device back. Harmless when repeated."""
         _util.dispose_resources(self._device)
 
 

@@ -102,10 +102,7 @@ class Bench:
             self._surface = surface
 
     def begin_stroke(self, stroke: Stroke, time: float) -> StrokeGroundTruth:
-        """Let a stroke over the mounted stimulus begin at time `time` [s]; return its ground truth.
-
-        Raises ValueError when nothing is mounted or the stroke before has not ended by then.
-        """
+        """Begin a stroke at `time` [s]; return its truth. Raises ValueError with nothing mounted, or during another."""
         with self._lock:
             surface = self._surface
             if surface is None:
@@ -248,7 +245,6 @@ class DirectTransducer:
 
     @property
     def health(self) -> Health:
-        """Totals so far."""
         return Health(received=self._sent - self._lost, lost=self._lost)
 
     def now(self) -> float:
@@ -256,19 +252,15 @@ class DirectTransducer:
         return 0.0 if self._began_ns is None else (self._clock.now_ns() - self._began_ns) * 1e-9
 
     def start(self) -> None:
-        """Begin the stream."""
         self._began_ns = self._clock.now_ns()
 
     def stop(self) -> None:
-        """End the stream."""
         self._stopped = True
 
     def close(self) -> None:
-        """End the stream."""
         self.stop()
 
     def read(self, timeout: float) -> ReadingBlock:
-        """Return the readings that are due, waiting up to `timeout` [s] for the first."""
         if self._began_ns is None or self._stopped:
             return ReadingBlock.empty()
         if self._due == self._sent:

@@ -71,7 +71,6 @@ class DigitalFtBox(LineBox):
         return names + numbers + struct.pack(">ii12H", _COUNTS, _COUNTS, *_GAINS_AND_OFFSETS)
 
     def power_up(self, now: float) -> None:
-        """Forget what is not kept over power-off."""
         self.is_on = True
         self._unlocked = False
         self._registers = bytearray(2 * _SIZE)

@@ -54,9 +54,8 @@ class NetFtBox(ServedBox):
     ) -> None:
         """Set up a box that streams at `rate` [Hz].
 
-        `ports` are those of UDP, TCP and HTTP, 0 for a free one; without one for HTTP it is 80, or a free one where
-        80 is refused. `first` holds its counter when it starts, as if it
-        had run for long, and the first number of the first stream. `product` says which box it is.
+        `ports` are those of UDP, TCP and HTTP, 0 for a free one; None for HTTP is 80, or a free one where 80 is refused.
+        `first` holds its counter when it starts, as if it had run for long, and the first number of the first stream.
         """
         super().__init__(clock, faults)
         first_tick, self._first_record = first
@@ -81,7 +80,6 @@ class NetFtBox(ServedBox):
         self.serve(self._serve, "net-ft box")
 
     def close(self) -> None:
-        """Switch the box off and give back its ports. Harmless when repeated."""
         super().close()
         for key in list((self._selector.get_map() or {}).values()):
             assert isinstance(key.fileobj, socket.socket)

@@ -51,7 +51,6 @@ class SerialFtBox(LineBox):
         )
 
     def power_up(self, now: float) -> None:
-        """Forget what is not kept over power-off."""
         self.is_on = True
         self._binary = False
         self._biases: list[Array] = []

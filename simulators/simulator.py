@@ -169,7 +169,6 @@ class LineBox(ServedBox):
         self.serve(lambda: self._serve(port), self._name)
 
     def close(self) -> None:
-        """Switch the box off and remove its port. Harmless when repeated."""
         super().close()
         if self._port is not None:
             self._port.close()

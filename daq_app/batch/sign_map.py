@@ -246,10 +246,7 @@ def shares_by_thirds(outcomes: Array, values: Array) -> list[tuple[float, float,
 def slope_indices(
     answers: Sequence[Answer | str], series: str, quantity: int, seed: int
 ) -> tuple[tuple[Index, ...], int]:
-    """Return the Sobol indices of a quantity's change over a series, and how many fingers they rest on.
-
-    A block of the design with a finger without an answer is left out whole.
-    """
+    """Return the Sobol indices of a quantity's change over a series, and of how many fingers: whole blocks alone."""
     block = len(DESIGN) + 2
     changes = [None if isinstance(answer, str) else answer[series][1][0][quantity] for answer in answers]
     values = np.array(changes, np.float64).reshape(-1, block)  # nan for None

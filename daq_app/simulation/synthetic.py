@@ -80,10 +80,9 @@ def conduct(
 
 @contextmanager
 def recordings_in(folder: Path) -> Generator[None]:
-    """Guard work that records into the folder `folder`, which must be new or empty.
+    """Guard work that records into `folder`. Raises RecordingError where that is not empty.
 
-    Raises RecordingError where `folder` is not empty. When the user stops the work after it recorded something, raises
-    RecordingKept, which names the folder, in place of KeyboardInterrupt.
+    Where the user stops the work after it recorded something, raises RecordingKept instead of KeyboardInterrupt.
     """
     if holds_something(folder):
         raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")

@@ -119,10 +119,7 @@ class Dialogue:
         self._open_keys: set[str] = set()  # keys of answers that were handed on and are not yet stored
 
     def show(self, view: SubjectView, session: SessionState | None, translate: Translate, *, mirrored: bool) -> None:
-        """Show a page, translated from English by `translate`, and acknowledge the answers that are stored.
-
-        `mirrored` says that the language is read from right to left.
-        """
+        """Show a page by `translate`, read from right to left where `mirrored`, and acknowledge answers now stored."""
         self._session = session
         if session is None or session.is_over:
             self._open_keys.clear()  # what the recorder has not stored is sent again

@@ -182,7 +182,6 @@ class StreamDecoder:
         self._skipped = 0  # bytes since the last sound packet
 
     def feed(self, data: bytes) -> Records:
-        """Take what arrived and return every packet it completes."""
         self._buffer += data
         batches: list[NDArray[np.uint8]] = []
         damaged: list[Indices] = []

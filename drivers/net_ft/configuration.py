@@ -26,10 +26,7 @@ class Configuration(NamedTuple):
 
 
 def parse_configuration(page: bytes, uri: str) -> Configuration:
-    """Return what netftapi2.xml says of the box at `uri`.
-
-    Raises SetupError where a needed element is missing, double or makes no sense.
-    """
+    """Return what netftapi2.xml says of the box at `uri`. Raises SetupError where it lacks or contradicts something."""
     elements = _elements(page)
     product = _required(elements, "prodname")
     status = AXIA if "axia" in product.lower() else NET_FT

@@ -155,7 +155,6 @@ class NetFtTransducer(ThreadedTransducer):
             )
 
     def has_come(self) -> bool:
-        """Tell whether a reading has come."""
         return self.health.received > 0
 
     def check_first(self) -> None:
@@ -168,7 +167,6 @@ class NetFtTransducer(ThreadedTransducer):
             )
 
     def reset(self) -> None:
-        """Forget what an earlier stream left."""
         super().reset()
         self._pending.clear()
         self._account = SequenceAccount(self._step, self.info.counter_rate)
@@ -234,7 +232,6 @@ class NetFtTransducer(ThreadedTransducer):
             last_request, streaming = silence, False
 
     def digest(self, *, end: bool = False) -> None:
-        """Turn pending datagrams into accounted readings. The lock is held."""
         if not self._pending and not (end and self._held_back):
             return
         datagrams = self._held_back
@@ -290,7 +287,6 @@ class NetFtTransducer(ThreadedTransducer):
         self._unconfirmed.append((received_ns, count))
 
     def never_came(self, seconds: float) -> str:
-        """Return why a start failed."""
         health = self.health
         if senseless := health.malformed + health.repeated + health.late + len(self._held_back):
             return (

@@ -57,7 +57,6 @@ class AsciiDecoder:
         self._damaged = 0  # records broken since the last good one
 
     def feed(self, data: bytes) -> Records:
-        """Take what arrived and return every record it completes."""
         self._buffer += data
         raw: list[tuple[int, ...]] = []
         status: list[int] = []
