@@ -150,7 +150,6 @@ class ClockRecovery:
         """Expect `rate` records in a second [Hz] of a session clock that runs `factor` times real time."""
         self.lost = 0  # numbers that no record has
         self._period: float = 1.0 / rate
-        self._period_of_times = self._period
         self._limit = GAP * factor + 3.0 * self._period
         self._settle = _SETTLE * factor + self._period
         self._longest = _LONGEST * factor + self._period
@@ -170,7 +169,7 @@ class ClockRecovery:
             return _NONE
         self._count += len(damaged) + int(damaged.sum())
         if self.watch.take(self._count, received_ns):
-            self._period_of_times = self._period = 1.0 / self.watch.rate
+            self._period = 1.0 / self.watch.rate
         if self._zero_ns is None:
             damaged = np.concatenate([[0], damaged[1:]])  # what was before the first record is not of this stream
             self._time = -self._period
@@ -238,8 +237,8 @@ class ClockRecovery:
         self._sequence, self._time = int(sequence[-1]), float(time[-1])
         self.lost += int(damaged.sum())
         change = 1.0 + max(-0.002, min(0.002, _LEAD * share * late))
-        longest, shortest = self._period_of_times * (1.0 + SPREAD), self._period_of_times * (1.0 - SPREAD)
-        self._period = max(shortest, min(longest, self._period * change))
+        usual = 1.0 / self.watch.rate
+        self._period = max(usual * (1.0 - SPREAD), min(usual * (1.0 + SPREAD), self._period * change))
         return Placement(sequence, time)
 
 
@@ -254,7 +253,7 @@ class ScanCount:
     """
 
     def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
-        """Expect `rate` scans a second [Hz] of a clock `factor` times real; losses are known up to multiples of `wrap`."""
+        """Expect `rate` scans a second [Hz] of a clock `factor` times real; losses are known up to `wrap` times n."""
         self.lost = 0
         self.watch = RateWatch(rate, factor, GAP * factor + 10.0 / rate)
         self._rate = rate

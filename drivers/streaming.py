@@ -5,7 +5,6 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -91,14 +90,6 @@ def _end_stream(conversation: Conversation, link: Link) -> None:
         conversation.end(Deadline(ENDING).bound(link))
 
 
-@dataclass(frozen=True, slots=True)
-class _Arrival:
-    """Records that arrived together; None where the stream restarted."""
-
-    records: Records | None
-    received_ns: int
-
-
 class StreamingTransducer(ThreadedTransducer):
     """One device at the end of a line that is opened at each start. A thread takes and decodes what comes.
 
@@ -123,7 +114,7 @@ class StreamingTransducer(ThreadedTransducer):
         self._conversation = conversation
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
         self._gather = _GATHER if self._period < _GATHER else 0.0
-        self._pending: deque[_Arrival] = deque()
+        self._pending: deque[tuple[Records | None, int]] = deque()  # and arrival [ns]; None: the stream restarted
         self.reset()
 
     @property
@@ -152,7 +143,7 @@ class StreamingTransducer(ThreadedTransducer):
         super().reset()
         self._pending.clear()
         self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
-        self._held_back: list[_Arrival] = []  # arrivals that the numbering keeps back
+        self._held_back: list[tuple[Records, int]] = []  # that the numbering keeps back
         self._restarted = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()
@@ -179,7 +170,7 @@ class StreamingTransducer(ThreadedTransducer):
         try:
             first = self._conversation.begin(limit.bound(link))
             if self._ever:
-                self._pending.append(_Arrival(None, self.clock.now_ns()))
+                self._pending.append((None, self.clock.now_ns()))
             with self.lock:
                 self._malformed_before += self._decoder.malformed
                 self._decoder = self._conversation.decoder()
@@ -201,7 +192,7 @@ class StreamingTransducer(ThreadedTransducer):
             silence += min(now - last_look, TICK + _GATHER)  # beyond that this computer was busy, and records may wait
             last_look = now
             if records is not None and len(records.status):
-                self._pending.append(_Arrival(records, received_ns))
+                self._pending.append((records, received_ns))
                 self._last_arrival, self._ever = now, True
                 silence, quiet = 0.0, _QUIET + 4.0 * self._period
                 if not self.news.is_set():
@@ -217,14 +208,14 @@ class StreamingTransducer(ThreadedTransducer):
 
     def digest(self, *, end: bool = False) -> None:
         while self._pending:
-            arrival = self._pending.popleft()
-            if arrival.records is None:
+            records, received_ns = self._pending.popleft()
+            if records is None:
                 self._hand_on(self._numbering.release())
-                self._numbering.bridge(arrival.received_ns)
+                self._numbering.bridge(received_ns)
                 self._restarted += 1
             else:
-                self._held_back.append(arrival)
-                self._hand_on(self._numbering.take(arrival.records.damaged, arrival.received_ns))
+                self._held_back.append((records, received_ns))
+                self._hand_on(self._numbering.take(records.damaged, received_ns))
         if end:
             self._hand_on(self._numbering.release())
 
@@ -232,16 +223,15 @@ class StreamingTransducer(ThreadedTransducer):
         """Return a block of all arrivals that the numbering has placed."""
         if not len(placement.sequence):
             return
-        arrivals, self._held_back = self._held_back, []
-        batches = [arrival.records for arrival in arrivals if arrival.records is not None]
-        received_ns = np.array([arrival.received_ns for arrival in arrivals if arrival.records is not None], np.int64)
+        batches, received_ns = zip(*self._held_back, strict=True)
+        self._held_back = []
         self.hand_over(
             ReadingBlock(
                 sequence=placement.sequence,
                 counter=placement.sequence,
                 status=np.concatenate([records.status for records in batches]),
                 time=placement.time,
-                received_ns=np.repeat(received_ns, [len(records.status) for records in batches]),
+                received_ns=np.repeat(np.array(received_ns, np.int64), [len(records.status) for records in batches]),
                 raw=np.concatenate([records.raw for records in batches]),
             )
         )

@@ -54,7 +54,7 @@ class NetFtBox(ServedBox):
     ) -> None:
         """Set up a box that streams at `rate` [Hz].
 
-        `ports` are those of UDP, TCP and HTTP, 0 for a free one; None for HTTP is 80, or a free one where 80 is refused.
+        `ports` are those of UDP, TCP and HTTP, 0 for a free one; None for HTTP: 80, or a free one where 80 is refused.
         `first` holds its counter when it starts, as if it had run for long, and the first number of the first stream.
         """
         super().__init__(clock, faults)

@@ -33,7 +33,8 @@ class Display:
         self._zero: Six = _UNLOADED
         self._load = self._peak = np.zeros(7)
         self._overload_told = False
-        self._saturated_before = self._saturated_now = 0
+        self._saturated = 0  # since somebody acknowledged
+        self._counted = 0  # of them in the totals of this stream
         self._arrivals: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
         self._live_due = self._health_due = 0.0
         self._newest_time = 0.0  # when the newest reading came, or the stream began [real s]
@@ -43,7 +44,7 @@ class Display:
         self._flush()
         self._info = info
         self._load = np.zeros(7)
-        self._count_anew()
+        self._counted = 0
         self._health_due = 0.0
         self._newest_time = time.monotonic()
 
@@ -58,12 +59,7 @@ class Display:
         self._stream += 1
         self._newest_time = time.monotonic()
         self._arrivals.clear()
-        self._count_anew()
-
-    def _count_anew(self) -> None:
-        """Go on from what was counted so far: health begins at 0 again."""
-        self._saturated_before -= self._saturated_now
-        self._saturated_now = 0
+        self._counted = 0
 
     def set_zero(self, mean: Six) -> None:
         """Subtract this zero from now on [raw units]."""
@@ -74,7 +70,7 @@ class Display:
         """Forget the greatest loads."""
         self._peak = np.zeros(7)
         self._overload_told = False
-        self._saturated_before = self._saturated_now
+        self._saturated = 0
         self._health_due = 0.0
 
     def take(self, block: ReadingBlock) -> None:
@@ -124,7 +120,8 @@ class Display:
         span = now - self._arrivals[0][0] if self._arrivals else 0.0
         # The first readings of the span came before it began.
         count = sum(readings for _, readings in self._arrivals) - (self._arrivals[0][1] if self._arrivals else 0)
-        self._saturated_now = health.saturated + health.doubtful
+        previous, self._counted = self._counted, health.saturated + health.doubtful
+        self._saturated += self._counted - previous
         rated = np.full(6, np.nan) if self._info is None else self._info.calibration.rated
         unknown = np.isnan(np.append(rated, rated.sum()))
         load, peak = np.where(unknown, np.nan, self._load), np.where(unknown, np.nan, self._peak)
@@ -134,7 +131,7 @@ class Display:
                 count / span / self._factor if span > 0.2 * RATE_OVER else 0.0,
                 tuple(load.tolist()),
                 tuple(peak.tolist()),
-                self._saturated_now - self._saturated_before,
+                self._saturated,
                 silence,
             )
         )

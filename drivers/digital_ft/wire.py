@@ -201,7 +201,13 @@ class StreamDecoder:
             damaged.append(np.concatenate([[loss], np.zeros(good - 2 - first, np.int64)]))
             self._buffer = self._buffer[(good - 1) * PACKET_SIZE :]
             self._in_step = True
-        return _records(batches, damaged, self._flagged)
+        if not batches:
+            return Records.of([], [], [])
+        packets = np.concatenate(batches)
+        gauges = np.ascontiguousarray(packets[:, :12]).view(">i2")[:, _ORDER].astype(np.float64)
+        at_end = np.any(np.abs(gauges + 0.5) >= 32767.0, axis=1)
+        status = np.where(packets[:, 12] & STATUS_FLAG, self._flagged, 0) + np.where(at_end, GAUGE_AT_END, 0)
+        return Records(gauges, status.astype(np.int64), np.concatenate(damaged))
 
     def _skip(self) -> None:
         """Drop bytes up to the next place where the packets in the buffer may be sound."""
@@ -216,17 +222,6 @@ class StreamDecoder:
 def _sound(packets: NDArray[np.uint8]) -> Mask:
     """Tell which of packets (n, 13) have the checksum they state."""
     return packets[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F == packets[:, 12] & 0x7F
-
-
-def _records(batches: list[NDArray[np.uint8]], damaged: list[Indices], flagged: int) -> Records:
-    """Return sound packets as records: gauges in the order G0 to G5, `flagged` as status where the flag is set."""
-    if not batches:
-        return Records.of([], [], [])
-    packets = np.concatenate(batches)
-    gauges = np.ascontiguousarray(packets[:, :12]).view(">i2")[:, _ORDER].astype(np.float64)
-    at_end = np.any(np.abs(gauges + 0.5) >= 32767.0, axis=1)
-    status = np.where(packets[:, 12] & STATUS_FLAG, flagged, 0) + np.where(at_end, GAUGE_AT_END, 0)
-    return Records(gauges, status.astype(np.int64), np.concatenate(damaged))
 
 
 def _with_crc(frame: bytes) -> bytes:

@@ -64,11 +64,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _description(device: Probe) -> dict[str, Any]:
     if device.info is None:
         return {"uri": device.uri, "problem": device.problem}
-    info = device.info
+    life = life_of(device.info.serial)
     return {
-        **identity(info),
-        "calibration": info.calibration.source,
-        "life": None if (life := life_of(info.serial)) is None else asdict(life),
+        **identity(device.info),
+        "calibration": device.info.calibration.source,
+        "life": None if life is None else asdict(life),
     }
 
 
@@ -94,11 +94,8 @@ def _probe(uri: str, console: Console) -> int:
     units = ["N"] * 3 + ["N mm"] * 3
     console.result(
         {
+            **identity(info),
             "uri": uri,
-            "model": info.model,
-            "serial": info.serial,
-            "simulated": info.simulated,
-            "rate": info.rate if np.isfinite(info.rate) else None,
             "measured_rate": _measured_rate(readings),
             "settings": dict(info.settings),
             "health": asdict(health),
