@@ -14,15 +14,12 @@ class Clock(Protocol):
     @property
     def factor(self) -> float:
         """Seconds of this clock in one real second [-]; 1 for a real clock, 0 where the two are not related."""
-        ...
 
     def now_ns(self) -> int:
         """Return the time [ns], never running backwards."""
-        ...
 
     def sleep(self, seconds: float) -> None:
         """Wait for `seconds` of this clock."""
-        ...
 
 
 class RealClock:

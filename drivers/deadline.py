@@ -13,15 +13,12 @@ class Link(Protocol):
 
     def send(self, data: bytes) -> None:
         """Send `data`. Raises LinkLost when the link is gone for good."""
-        ...
 
     def receive(self, timeout: float) -> bytes | None:
         """Return what arrived next, or None when nothing came within `timeout` real seconds."""
-        ...
 
     def close(self) -> None:
         """Give the port back. Harmless when repeated."""
-        ...
 
 
 # All in real seconds.

@@ -21,7 +21,6 @@ class ReadingBlock:
     raw: Array  # (n, 6) six raw numbers: counts or volts (`Calibration.raw_unit`), exactly representable
 
     def __post_init__(self) -> None:
-        """Check that the columns belong together and make them read-only views."""
         n = len(self.sequence)
         for name in _COLUMNS:
             column = getattr(self, name)
@@ -33,7 +32,6 @@ class ReadingBlock:
             object.__setattr__(self, name, view)
 
     def __len__(self) -> int:
-        """Return the number of readings."""
         return len(self.sequence)
 
     def between(self, start: int, stop: int) -> "ReadingBlock":
@@ -82,8 +80,6 @@ class RecordDecoder(Protocol):
     @property
     def malformed(self) -> int:
         """Records that came broken so far, those at the end of the stream included."""
-        ...
 
     def feed(self, data: bytes) -> Records:
         """Take what arrived and return every record it completes."""
-        ...

@@ -35,19 +35,15 @@ class Conversation(Protocol):
 
         Raises LinkLost when it does not answer, DeviceFault when it must not be read: the message says why.
         """
-        ...
 
     def end(self, link: Link) -> None:
         """Bring the stream to an end within 0.1 s. Raises LinkLost when the device is gone, and streams no more."""
-        ...
 
     def decoder(self) -> RecordDecoder:
         """Return a decoder for a stream about to begin."""
-        ...
 
     def numbering(self, rate: float, factor: float) -> ClockRecovery | ScanCount:
         """Return what numbers a stream of `rate` [Hz] by a session clock that runs `factor` times real time."""
-        ...
 
 
 def measured_rate(

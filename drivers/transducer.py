@@ -169,31 +169,25 @@ class Transducer(Protocol):
     @property
     def info(self) -> TransducerInfo:
         """Identity, calibration and settings; fixed from opening on."""
-        ...
 
     @property
     def health(self) -> Health:
         """Totals so far."""
-        ...
 
     def start(self) -> None:
         """Begin streaming. Raises LinkLost when the device never answers."""
-        ...
 
     def read(self, timeout: float) -> ReadingBlock:
         """Return all readings not yet handed over, waiting up to `timeout` seconds [session clock] for the first.
 
         Returns an empty block when none came in time. Raises LinkLost when the stream has ended for good.
         """
-        ...
 
     def stop(self) -> None:
         """End streaming; what had arrived can still be read. Harmless when repeated."""
-        ...
 
     def close(self) -> None:
         """Stop, and give back every port and thread. Harmless when repeated."""
-        ...
 
 
 class WrappedTransducer:

@@ -35,7 +35,6 @@ class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     status: int = 0  # bits that are set
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be carried out."""
         if self.kind not in FAULT_KINDS:
             raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(FAULT_KINDS)}")
         if not (0.0 <= self.start < self.stop and 0.0 < self.share <= 1.0 and self.delay > 0.0):

@@ -40,7 +40,6 @@ class Timetable:
     repeat: float = 0.0  # [s]
 
     def __post_init__(self) -> None:
-        """Refuse strokes that would overlap. Raises TimetableError."""
         times = [time for time, _ in self.strokes]
         if self.repeat > 0.0 and times:
             times.append(times[0] + self.repeat)

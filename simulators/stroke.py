@@ -24,7 +24,6 @@ class Surface:
     holds: bool = True  # blocks the finger first, so that T/N climbs to mu before anything slides
 
     def __post_init__(self) -> None:
-        """Refuse what no surface can be."""
         if not (self.mu > 0.0 and self.tau_max > 0.0 and self.speed > 0.0):
             raise ValueError(
                 f"surface needs mu, tau_max and speed above 0, not {self.mu}, {self.tau_max}, {self.speed}"
@@ -100,7 +99,6 @@ class Stroke:
     across: float = 0.0  # where the path crosses x = 0 [mm]
 
     def __post_init__(self) -> None:
-        """Refuse a course no hand can take."""
         if self.peak_normal_force <= 0.0 or self.speed <= 0.0 or self.approach < 0.0 or self.stick < 0.0:
             raise ValueError("a stroke needs a force and a speed above 0, and no time below 0")
         if self.direction not in (1, -1):

@@ -69,8 +69,6 @@ class Terminal:
                 self._print(sentence)
             case steps.EndSession(reason):
                 self._print(f"The session ends: {reason}.")
-            case _:
-                pass
 
     def follow(self, state: str) -> None:
         """Say that the session is paused, once it is."""
@@ -280,8 +278,6 @@ class _Attendance:
                 _raise_failure(report)
             case _ if isinstance(report, Command) and self._terminal is not None:
                 self._terminal.show(report)
-            case _:
-                pass
         return None
 
     def _show_status(self, status: Status) -> None:
@@ -302,5 +298,3 @@ def _raise_failure(report: m.Report) -> None:
             raise {"LinkLost": LinkLost, "SetupError": SetupError}.get(kind, RecordingError)(sentence)
         case m.Gone(_, sentence):
             raise RecordingError(sentence)
-        case _:
-            pass

@@ -32,7 +32,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
@@ -43,7 +43,7 @@ from daq_app.recorder.messages import REPORTS, REQUESTS, BrokenMessage, Codec, G
 _PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
 
 
-class Recorder:
+class Recorder(AbstractContextManager["Recorder"]):
     """A recorder's process, seen from outside."""
 
     def __init__(self, process: subprocess.Popen[bytes], wake: Callable[[], None]) -> None:
@@ -79,10 +79,6 @@ class Recorder:
             creationflags=0x0800_0200 if os.name == "nt" else 0,
         )
         return cls(process, wake)
-
-    def __enter__(self) -> Self:
-        """Use it inside."""
-        return self
 
     def __exit__(
         self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

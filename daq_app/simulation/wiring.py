@@ -135,8 +135,6 @@ class SimulatedHand:
                 if bench is not None and self.connected is not None and self.connected.bench_now is not None:
                     stroke = self.subject.stroke(self.surface(trial), self.take(trial))
                     bench.begin_stroke(stroke, self.connected.bench_now())
-            case _:
-                pass
 
     def take(self, trial: Trial) -> int:
         """Return how often a trial was stroked."""
@@ -193,8 +191,6 @@ class SimulatedPeople(SimulatedHand):
                 self.put(steps.Resume())
             case steps.AskFinish():
                 self.put(steps.Finish())
-            case _:
-                pass
 
     def score(self, trial: Trial) -> float:
         """Return the score of a trial, whose last take is judged."""

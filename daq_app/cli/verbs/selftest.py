@@ -159,8 +159,6 @@ class _WatchedRecorder:
                         self.newest_ns = int(received_ns[-1])
                     case m.SessionEnded():
                         self._has_ended = True  # what is shown from now on is not recorded
-                    case _:
-                        pass
                 yield report
 
 
