@@ -72,8 +72,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     transducer: Transducer = open_transducer(uri, clock_at(factor))
     if ready:
         sender_pipe, far_end = context.Pipe()
-        sender = context.Process(target=send, args=(rate, seconds + 5.0, far_end), daemon=True)
-        sender.start()
+        context.Process(target=send, args=(rate, seconds + 5.0, far_end), daemon=True).start()
         port, info = sender_pipe.recv(), replace(transducer.info, rate=float(TOP))
         transducer = NetFtTransducer(info, lambda _: UdpLink("127.0.0.1", port), lambda: info, clock_at(factor))
     calibration = transducer.info.calibration

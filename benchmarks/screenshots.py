@@ -93,8 +93,7 @@ class PlayedRecorder:
 
 def health(**counts: int) -> m.HealthReport:
     """Return a report of a bench that is well, except for these counts."""
-    totals = Health(received=123_456, lag_ms=2.0, **counts)
-    return m.HealthReport(totals, 6999.7, (0.0,) * 7, (0.0,) * 7, 0)
+    return m.HealthReport(Health(received=123_456, lag_ms=2.0, **counts), 6999.7, (0.0,) * 7, (0.0,) * 7, 0)
 
 
 def log_line(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:
@@ -150,10 +149,9 @@ def main() -> None:
 
 
 def _settings() -> list[str]:
-    combinations = itertools.product(SIZES, SCALES, THEMES)
     return [
         f"{width}x{height}-{scale:g}-{theme}-{LOCALES[number % 2]}"
-        for number, ((width, height), scale, theme) in enumerate(combinations)
+        for number, ((width, height), scale, theme) in enumerate(itertools.product(SIZES, SCALES, THEMES))
     ]
 
 

@@ -55,8 +55,7 @@ def protocol_keys() -> str:
     """Return the keys of a protocol file, table by table."""
     module = importlib.import_module(PROTOCOL)
     classes = [cls for cls in vars(module).values() if inspect.isclass(cls) and dataclasses.is_dataclass(cls)]
-    tables = [cls.__name__ for cls in classes if cls.__module__ == PROTOCOL]
-    return _keys("Keys of a protocol file", PROTOCOL, tables)
+    return _keys("Keys of a protocol file", PROTOCOL, [cls.__name__ for cls in classes if cls.__module__ == PROTOCOL])
 
 
 def _keys(title: str, module: str, tables: list[str]) -> str:

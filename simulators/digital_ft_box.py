@@ -85,8 +85,7 @@ class DigitalFtBox(LineBox):
     def work(self, port: PseudoTerminal, now: float) -> None:
         """Send packets and answer requests; while it streams, whatever is heard jams it."""
         self._send_due(port, now)
-        wait = _NAP if self._streaming_since is None else _SHORTEST_NAP
-        data = port.receive(wait)
+        data = port.receive(_NAP if self._streaming_since is None else _SHORTEST_NAP)
         if self._streaming_since is not None:
             self._jammed_by += len(data)
             if self._jammed_by >= _JAM:

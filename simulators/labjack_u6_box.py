@@ -200,14 +200,12 @@ def _short(command: int, error: int) -> bytes:
 
 
 def _long(number: int, data: bytes, command: int = 0xF8) -> bytes:
-    sixteen = (sum(data) % 65536).to_bytes(2, "little")
-    header = bytes([command, len(data) // 2, number]) + sixteen
+    header = bytes([command, len(data) // 2, number]) + (sum(data) % 65536).to_bytes(2, "little")
     return bytes([_checksum8(header)]) + header + data
 
 
 def _sums_agree(request: bytes) -> bool:
-    checksum = (sum(request[6:]) % 65536).to_bytes(2, "little")
-    return request[0] == _checksum8(request[1:6]) and request[4:6] == checksum
+    return request[0] == _checksum8(request[1:6]) and request[4:6] == (sum(request[6:]) % 65536).to_bytes(2, "little")
 
 
 def _checksum8(data: bytes) -> int:

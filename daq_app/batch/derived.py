@@ -192,8 +192,7 @@ def repeat(
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
     original = plan_of or recording
     plan = (original if blind else reveal(original)).plan
-    analysis = analyse(recording, settings_of(document), decisions)
-    prediction = _predict(analysis, plan, options, lambda _: True)
+    prediction = _predict(analyse(recording, settings_of(document), decisions), plan, options, lambda _: True)
     return with_present_names(_with_firing(prediction, _afferent_of(document)))
 
 

@@ -57,8 +57,7 @@ class Trial:
 
     def key(self, versions: Mapping[str, str]) -> str:
         """Return what its answer is kept under: all that it comes from, and the `versions` that computed it."""
-        document = json.dumps([asdict(self), versions], sort_keys=True, default=str)
-        return hashlib.sha256(document.encode()).hexdigest()
+        return hashlib.sha256(json.dumps([asdict(self), versions], sort_keys=True, default=str).encode()).hexdigest()
 
 
 # For each series the correlation with the index (r, q), then the change over the range of mu (r, q), both by place

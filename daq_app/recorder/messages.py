@@ -240,8 +240,7 @@ class Codec:
         """Return the message of these bytes, which are without the length. Raises BrokenMessage."""
         try:
             name, fields = msgspec.msgpack.decode(body, type=tuple[str, msgspec.Raw])
-            cls: Any = self._types[name]
-            return msgspec.msgpack.decode(fields, type=cls, dec_hook=_array_in)
+            return msgspec.msgpack.decode(fields, type=self._types[name], dec_hook=_array_in)
         except (KeyError, ValueError, TypeError, msgspec.MsgspecError) as error:
             raise BrokenMessage(f"a message that is none of ours ({error})") from error
 

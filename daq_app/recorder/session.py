@@ -322,8 +322,7 @@ def _reopen(request: m.ResumeSession, recording: Recording, bench: Bench) -> Tra
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")
         return None
-    uri = request.uri or _recorded_settings(recording).get("device") or recording.info.uri
-    bench.connect(uri, streaming=False)
+    bench.connect(request.uri or _recorded_settings(recording).get("device") or recording.info.uri, streaming=False)
     info = _transducer_info(bench)
     resuming.check_same_transducer(recording.info, info)
     return info

@@ -136,8 +136,7 @@ class _DigitalConversation:
         Raises LinkLost when it does not answer, DeviceFault when another transducer does or it refuses.
         """
         self.word = hold(link)
-        first = wire.calibration_address(self.number)
-        stored = read(link, first, wire.CALIBRATION_SIZE)
+        stored = read(link, wire.calibration_address(self.number), wire.CALIBRATION_SIZE)
         serial = stored[:8].split(b"\0")[0].decode("ascii", "replace").strip()
         own_serial = self.stored.calibration.serial
         if serial != own_serial:

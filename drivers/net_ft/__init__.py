@@ -49,8 +49,7 @@ def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTran
 
 def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    target = _target_of(address, deadline)
-    return _configuration(target, deadline).info
+    return _configuration(_target_of(address, deadline), deadline).info
 
 
 def _target_of(address: Address, deadline: Deadline) -> _Target:
@@ -78,8 +77,7 @@ def _prepare(target: _Target, deadline: Deadline) -> TransducerInfo:
         raise SetupError(f"{uri}: the box's RDT output is disabled; enable it on its Communications page")
     info = configuration.info
     if target.rate is not None and not _is_rate(info, target.rate):
-        path = f"/comm.cgi?comrdtrate={target.rate}"
-        answer = http_get(target.host, target.http_port, path, deadline)
+        answer = http_get(target.host, target.http_port, f"/comm.cgi?comrdtrate={target.rate}", deadline)
         if answer.status not in (200, 302) or not _is_rate(info := _configuration(target, deadline).info, target.rate):
             state = "shows no rate at all" if math.isnan(info.rate) else f"stays at {info.rate:g} Hz"
             raise SetupError(

@@ -83,13 +83,12 @@ def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # n
     if device is None:
         names = ", ".join(sorted(device.name for device in devices.values())) or "none"
         raise SetupError(f"{address.uri}: there is no device {address.host}; NI-DAQmx knows {names}")
-    simulated = bool(device.is_simulated)
     info = TransducerInfo(
         uri=address.uri,
         driver="nidaq",
         model=f"{calibration.body} {calibration.part_number} on NI {device.product_type}",
         serial=calibration.calibration.serial,
-        simulated=simulated or "SIMULATED" in calibration.part_number.upper(),
+        simulated=bool(device.is_simulated) or "SIMULATED" in calibration.part_number.upper(),
         rate=float("nan"),
         counter_rate=float("nan"),
         calibration=calibration.calibration,

@@ -120,12 +120,11 @@ def _target_of(address: Address) -> _Target:
             f"{address.uri}: the controller cannot tell its units; add ?counts_per_N=...&counts_per_Nm=... "
             "as they stand in the calibration sheet"
         )
-    ranges = np.repeat([address.positive("range_N"), 1000.0 * address.positive("range_Nm")], 3)
     calibration = Calibration(
         address.options.get("serial", ""),
         "counts",
         np.diag(np.repeat([1.0 / counts[0], 1000.0 / counts[1]], 3)),
-        ranges,
+        np.repeat([address.positive("range_N"), 1000.0 * address.positive("range_Nm")], 3),
         "counts per unit as the address says",
     )
     return _Target(address, port, (baud,) if baud else _BAUDS, form == "binary", calibration)

@@ -302,5 +302,4 @@ def _try_quota(folder: Path) -> dict[str, Any]:
 def _numbered_readings(first: int, received_ns: int, count: int = _RATE) -> ReadingBlock:
     """Return readings whose numbers follow from their place."""
     i = np.arange(first, first + count, dtype=np.int64)
-    raw = np.outer(i, np.arange(1.0, 7.0))
-    return ReadingBlock(i, i, i * 0, i / _RATE, np.full(count, received_ns, np.int64), raw)
+    return ReadingBlock(i, i, i * 0, i / _RATE, np.full(count, received_ns, np.int64), np.outer(i, np.arange(1.0, 7.0)))

@@ -218,10 +218,9 @@ def _mark(answer: Answer | str, position: int, column: int) -> str:
 
 def _print_thirds(name: str, points: Array, signs: Array, label: str, console: Console) -> None:
     """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
-    values = points[:, list(sign_map.DESIGN).index(name)]
     rows = [
         f"{100 * kept_share:.0f} % at {number(low)} to {number(high)}"
-        for low, high, kept_share in sign_map.shares_by_thirds(signs, values)
+        for low, high, kept_share in sign_map.shares_by_thirds(signs, points[:, list(sign_map.DESIGN).index(name)])
         if kept_share is not None
     ]
     console.say(f"The {label} keeps both signs, by {name}: {', '.join(rows)}.")
