@@ -49,11 +49,6 @@ class Index:
     total_error: float
     one_sided: bool  # the range does not reach to both sides of the scene's own value
 
-    @property
-    def impossible(self) -> bool:
-        """Say whether these cannot be shares of a variance, so that they are noise of too few samples."""
-        return self.first < 0.0 or self.total > 1.0 or self.first > self.total
-
 
 class TooFewAnswers(Exception):
     """Some scenes of the design have no answer: how many, and what to do."""
@@ -174,7 +169,8 @@ def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
             f"Varied to one side of the scene's own value only: {', '.join(one_sided)}; their shares, and those of all "
             "others, are of these ranges."
         )
-    wrong = [index.name for index in indices if index.impossible]
+    # No shares of a variance, so noise. A comparison with nan is false.
+    wrong = [i.name for i in indices if i.first < 0.0 or i.total > 1.0 or i.first > i.total]
     if wrong:
         widest = max(max(index.first_error, index.total_error) for index in indices)
         enough = 2 ** math.ceil(math.log2(max(samples * (widest / _NARROW) ** 2, 2.0 * samples)))

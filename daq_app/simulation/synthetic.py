@@ -117,18 +117,18 @@ def simulated_study(parent: Path, seed: int, clock: Clock, console: Console) -> 
     study_protocol = protocol(PROTOCOL)
 
     def visit(session_plan: SessionPlan, folder: Path, people: SimulatedPeople) -> SessionEnd:
-        end = conduct(session_plan, folder, people, console, settings=[_study_seed(seed)])
+        end = conduct(session_plan, folder, people, console, settings=[Setting("study seed", seed, "", "set")])
         if not end.complete:
             raise StudyCutShort(f"{end.reason}; what was recorded is in {folder.parent}")
         return end
 
     scores: list[Path] = []
     for number in range(1, SUBJECTS + 1):
-        subject, subject_seed = f"S{number:02d}", _seed(seed, number)
+        subject, subject_seed = f"S{number:02d}", 100 * seed + number
         scores.append(parent / f"{subject}-scores")
         people = SimulatedPeople(SimulatedSubject(subject_seed), clock)
         visit(plan(study_protocol, subject, subject_seed, forces=False), scores[-1], people)
-    subject, subject_seed = f"S{STROKING:02d}", _seed(seed, STROKING)
+    subject, subject_seed = f"S{STROKING:02d}", 100 * seed + STROKING
     folder = parent / f"{subject}-forces"
     with connect(f"sim:?seed={seed}&rate=200", clock) as bench:
         people = SimulatedPeople(SimulatedSubject(subject_seed), clock, bench)
@@ -139,14 +139,6 @@ def simulated_study(parent: Path, seed: int, clock: Clock, console: Console) -> 
             for trial, stroke in people.strokes.items()
         )
     return Study(tuple(scores), folder, ground_truth, end.readings, end.health.lost)
-
-
-def _seed(study: int, subject: int) -> int:
-    return study * 100 + subject
-
-
-def _study_seed(seed: int) -> Setting:
-    return Setting("study seed", seed, "", "set")
 
 
 DAMAGED = "S11"
@@ -217,7 +209,7 @@ def true_slopes(people: SubjectSettings) -> dict[str, Any]:
 
 def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
     """Record one subject's visit and return its ground truth, a row a stroke."""
-    subject, subject_seed = f"S{number:02d}", _seed(seed, number)
+    subject, subject_seed = f"S{number:02d}", 100 * seed + number
     faults = FAULTS.get(subject, VisitFaults(expected=""))
     a, b, c, d, e, f = np.random.default_rng([subject_seed, 7]).normal(1.0, CALIBRATION, 6).tolist()
     bench = Bench(subject_seed, BenchSettings(gains=(a, b, c, d, e, f)))
@@ -228,7 +220,7 @@ def _visit(parent: Path, seed: int, number: int, console: Console) -> list[dict[
     session_plan = plan(protocol(PROTOCOL), subject, subject_seed, setting=setting)
     person = SimulatedSubject(subject_seed, settings)
     people = SyntheticPeople(person, clock, Connection(transducer, bench, transducer.now), session_plan, faults)
-    study, run = [_study_seed(seed)], RunnerSettings(tick=_TICK)
+    study, run = [Setting("study seed", seed, "", "set")], RunnerSettings(tick=_TICK)
     conduct(session_plan, parent / subject, people, console, settings=study, run=run, durable=False)
     return [
         {
