@@ -281,13 +281,14 @@ def predict(
     order = sorted(scene_of_row, key=lambda n: (n != first, n))
     scenes = [scene_of_row[n] for n in order]
     is_small = options.kinematics == "small"  # a depth is matched on its finger: finite strain would put it elsewhere
-    forces = [rows[n].measured_normal if is_small else None for n in order]
-    depths = _depths(scenes, [None if force is None else force / width for force in forces])
+    forces = {n: force / width for n in order if is_small and (force := rows[n].measured_normal) is not None}
+    depths = dict(zip(forces, matching_depths([scene_of_row[n] for n in forces], [*forces.values()]), strict=True))
     solutions: dict[int, SolutionPath] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
 
     def fill_row(position: int) -> TrialPrediction:
-        return _fill_row(inputs[order[position]], answers[2 * position], answers[2 * position + 1], depths[position])
+        number = order[position]
+        return _fill_row(inputs[number], answers[2 * position], answers[2 * position + 1], depths.get(number))
 
     def take_answer(
         number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
@@ -316,13 +317,6 @@ def predict(
         gain_error=analysis.settings.gain_error,
         bootstrap_seed=analysis.settings.bootstrap_seed,
     )
-
-
-def _depths(scenes: Sequence[Scene], forces: Sequence[float | None]) -> list[float | None]:
-    """Return for each scene the depth at which it bears its force [N/mm], or None where it has none."""
-    targets = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
-    depths = iter(matching_depths([scene for scene, _ in targets], [force for _, force in targets]))
-    return [None if force is None else next(depths) for force in forces]
 
 
 def _fill_row(

@@ -207,7 +207,9 @@ class _Repeats:
             _, drag_share = self._systematic.shares(drag_direction(curve.force[crest : crest + 1]))
             offset = self._zero_n + drag_share * curve.tangential[crest]
             numbers["peak_normal"] = stroke.peak_normal * self._gain_n + offset + peak_error
-        return numbers | self._instants(numbers.get("speed")) | self._onset()
+        speed = numbers.get("speed")
+        instants = {"break_away": self._break_away(), "slide_onset": self._slide_onset(speed), "onset": self._onset()}
+        return numbers | {name: draws for name, draws in instants.items() if draws is not None}
 
     def _peak_error(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
         """Return how far the true greatest force may lie from the reported one (repeats,) [N].
@@ -279,43 +281,42 @@ class _Repeats:
             numbers["heading"] = heading + (angle - heading + 180.0) % 360.0 - 180.0  # by whole turns nearest to it
         return numbers
 
-    def _instants(self, speed: Array | None) -> dict[str, Array]:
-        """Return the instants (repeats,) that the analysis found and no person decided."""
-        stroke, curve, instants = self._stroke, self._curve, dict[str, Array]()
-        if stroke.steady is None:
-            return instants
-        inside = (curve.time >= stroke.steady[0]) & (curve.time <= stroke.steady[1])
-        if stroke.break_away is not None and "stick" not in stroke.decided:
-            stretch = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
-            columns = (curve.time[stretch], curve.ratio[stretch], curve.normal[stretch])
-            shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
-            zero = (self._zero_t, self._zero_n)
-            peaked = stroke.mu_static is not None
-            draws = break_away_draws(columns, shortest, zero, self._settings, self._draw, peaked=peaked)
-            instants |= {} if draws is None else {"break_away": draws}
-        if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
-            stretch = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
-            noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
-            threshold = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
-            draws = slide_onset_draws(curve.time[stretch], curve.speed[stretch], threshold, noise, self._draw)
-            instants |= {} if draws is None else {"slide_onset": draws}
-        return instants
+    def _break_away(self) -> Array | None:
+        """Return the break-away (repeats,), where the analysis found one and no person decided it."""
+        stroke, curve = self._stroke, self._curve
+        if stroke.steady is None or stroke.break_away is None or "stick" in stroke.decided:
+            return None
+        stretch = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
+        columns = (curve.time[stretch], curve.ratio[stretch], curve.normal[stretch])
+        shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
+        zero, peaked = (self._zero_t, self._zero_n), stroke.mu_static is not None
+        return break_away_draws(columns, shortest, zero, self._settings, self._draw, peaked=peaked)
 
-    def _onset(self) -> dict[str, Array]:
+    def _slide_onset(self, speed: Array | None) -> Array | None:
+        """Return the slide's onset (repeats,), where the analysis found one and no person decided it."""
+        stroke, curve = self._stroke, self._curve
+        if stroke.steady is None or stroke.slide_onset is None or speed is None or "slide_onset" in stroke.decided:
+            return None
+        inside = (curve.time >= stroke.steady[0]) & (curve.time <= stroke.steady[1])
+        stretch = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
+        noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
+        threshold = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
+        return slide_onset_draws(curve.time[stretch], curve.speed[stretch], threshold, noise, self._draw)
+
+    def _onset(self) -> Array | None:
         """Return the onset (repeats,), where the contact began there and no person decided it."""
         onset, curve = self._stroke.onset, self._curve
         if onset is None or "onset" in self._stroke.decided:
-            return {}
+            return None
         quiet = curve.unfiltered[curve.time < onset - self._settings.quiet_before]
         quiet = quiet[np.isfinite(quiet)]
         if len(quiet) < self._settings.fewest_quiet:
-            return {}
+            return None
         noise = float(quiet.std())
         # How large the noise is, and with it the threshold, is estimated from these readings too.
         band = self._settings.detector.leave_noise * noise / np.sqrt(2.0 * len(quiet))
         zero_error = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
-        draws = onset_draws((curve.time, curve.unfiltered), onset, noise, zero_error, self._settings, self._draw)
-        return {} if draws is None else {"onset": draws}
+        return onset_draws((curve.time, curve.unfiltered), onset, noise, zero_error, self._settings, self._draw)
 
     def _sample(self, count: int) -> tuple[Indices, Array, Array]:
         """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""

@@ -263,14 +263,13 @@ def _speed(time: Array, position: Array, span: Span) -> Array:
     limits = span.settings
     smoother = Filter(limits.filter.speed_cut_off, limits.filter.shortest_segment)
     breaks = ~(np.diff(time) < limits.signal.missing_step / span.rate)
-    for stretch in segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), breaks):
-        path = position[stretch]
-        if len(path) < 3:
-            continue
-        if span.quality.even and smoother.fits(span.rate):
-            path = smoother.apply(path, span.rate, [slice(0, len(path))])
-        velocity = np.gradient(path, time[stretch], axis=0)
-        speed[stretch] = np.hypot(velocity[:, 0], velocity[:, 1])
+    stretches = segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), breaks)
+    if span.quality.even and smoother.fits(span.rate):
+        position = smoother.apply(position, span.rate, list(stretches))
+    for stretch in stretches:
+        if stretch.stop - stretch.start > 2:
+            velocity = np.gradient(position[stretch], time[stretch], axis=0)
+            speed[stretch] = np.hypot(velocity[:, 0], velocity[:, 1])
     return speed
 
 

@@ -197,7 +197,6 @@ def _measure(
     number = None if trial is None else trial.number
     by_stroke = [context.decisions.of_stroke(number, index) for index in range(1, len(pieces) + 1)]
     flaws: list[Flaw] = []
-    idle = idle.copy()
     for index, decisions in enumerate(by_stroke):
         pieces[index], empty = _with_decided_ends(pieces[index], decisions, span)
         flaws += [] if empty is None else [replace(empty, stroke=index)]
