@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drivers.arrays import Array, Indices
-from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
+from sessions.strokes.contacts import onset_draws
 from sessions.strokes.settings import BootstrapSettings
+from sessions.strokes.sliding import slide_onset_draws
+from sessions.strokes.stick import break_away_draws
 from sessions.strokes.stroke import Interval, Rule, Stroke, StrokeCurve
 
 _OF_SESSION = 2**32 - 1  # in the seed, where a stroke has its number

@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.arrays import Array
 from sessions.strokes.forces import peaks
-from sessions.strokes.settings import AnalysisSettings, DetectorSettings
+from sessions.strokes.settings import AnalysisSettings, BootstrapSettings, DetectorSettings
 
 NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over the median absolute step between neighbours
 
@@ -170,6 +170,44 @@ def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
 def _spread(stretch: list[float]) -> float:
     mean = fmean(stretch)
     return sqrt(sum((reading - mean) ** 2 for reading in stretch) / (len(stretch) - 1))
+
+
+def onset_draws(
+    columns: tuple[Array, Array],
+    onset: float,
+    noise: float,
+    zero: Array,
+    settings: BootstrapSettings,
+    draw: np.random.Generator,
+) -> Array | None:
+    """Return where the force may have left its noise (repeats,) [s]; None where it had left it before the onset.
+
+    The detector's rule is repeated: a force that climbs as steeply leaves its noise (`leave_noise`) between two
+    readings, and noise drawn anew moves the reading that detects it. `columns` are time [s] and unfiltered N [N] (n,)
+    from before the contact on, `noise` that of N and `zero` how wrong its zero may be (repeats,) [N].
+    """
+    time, force = columns
+    fewest, detector = settings.onset_fewest, settings.detector
+    index = int(np.searchsorted(time, onset))
+    if index == 0 or len(time) < index + fewest or force[index - 1] > onset_threshold(noise, detector):
+        return None
+    rise = force[index:] < 2.0 * max(detector.leave_noise * noise, float(force[index]))
+    rise_slice = slice(index - 1, index + max(fewest, int(np.argmin(rise)) + 1))
+    step = float(np.median(np.diff(time[rise_slice])))
+    # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
+    bend, slope, _ = np.polyfit(time[rise_slice] - (onset - step / 2.0), force[rise_slice], 2).tolist()
+    chord = float(np.polyfit(time[rise_slice], force[rise_slice], 1)[0])
+    slope = max(slope if bend > 0.0 else chord, settings.onset_steep * chord)
+    if slope <= 0.0:
+        return None
+    reach = min(settings.onset_reach * noise / slope, settings.onset_most * step / 2.0)
+    offsets = np.arange(-reach, reach + step, step)
+    # Readings of each repeat, counted from the crossing: the first lies anywhere within a step.
+    times = offsets + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
+    in_noise = slope * times + noise * draw.standard_normal(times.shape) <= 0.0
+    last_in_noise = np.where(in_noise.any(axis=1), times.shape[1] - 1 - np.argmax(in_noise[:, ::-1], axis=1), -1)
+    crossing = times[:, 0] + (last_in_noise + 1) * step  # the reading after the last within the noise
+    return onset - crossing + zero / slope
 
 
 @dataclass(frozen=True, slots=True)

@@ -257,6 +257,24 @@ def _slide_onset(findings: Findings, track: Track, motion: Movement) -> None:
         findings.numbers["slide_onset"] = float(track.time[onset])
 
 
+def slide_onset_draws(
+    time: Array, speed: Array, least_speed: Array, noise: Array, draw: np.random.Generator
+) -> Array | None:
+    """Return from when the centre of pressure may have slid (repeats,) [s]; None where its speed is not known.
+
+    `speed` (n,) [mm/s] at `time` (n,) [s], from the contact's onset on, reaches to the steady window; `least_speed` is
+    that at which the slide has begun, `noise` how wrong that of the centre of pressure may be (repeats,) [mm/s]. Where
+    it was as fast as that when its speed was first known, it may have begun to slide at any instant before.
+    """
+    slow = np.flatnonzero(~np.isfinite(speed))
+    start = int(slow[-1]) + 1 if len(slow) else 0
+    if len(speed) - start < 2:
+        return None
+    least = np.minimum.accumulate(speed[start:][::-1])[::-1]  # the least speed from each instant on
+    onsets = np.interp(least_speed - noise, least, time[start:])
+    return np.where(least_speed - noise < least[0], draw.uniform(time[0], time[start], len(least_speed)), onsets)
+
+
 def _side_load(findings: Findings, track: Track, window: slice, motion: Movement) -> None:
     """Name a drag that does not lie along the movement: friction alone opposes it."""
     drag = mean_vector(track.wrench[window, :2])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.arrays import Array, Mask
-from sessions.strokes.settings import AnalysisSettings, ClimbSettings
+from sessions.strokes.settings import AnalysisSettings, BootstrapSettings, ClimbSettings
 from sessions.strokes.sliding import block_means
 
 
@@ -179,6 +179,57 @@ def _progress_and_peak(fit: Climb, t: Array) -> Array:
 def _peak_decay(fit: Climb, t: Array) -> Array:
     """Return what is left of the peak (n,) [-]: 1 up to it."""
     return np.exp(-np.maximum(t - fit.meets, 0.0) / fit.fall) if fit.fall > 0.0 else np.zeros_like(t)
+
+
+def break_away_draws(
+    columns: tuple[Array, Array, Array],
+    shortest: float,
+    zero: tuple[Array, Array],
+    settings: BootstrapSettings,
+    draw: np.random.Generator,
+    *,
+    peaked: bool,
+) -> Array | None:
+    """Return where T/N may have stopped climbing (repeats,) [s]; None where there are too few readings.
+
+    The readings' deviations from the fit are kept in place and turned by a random factor a block (a wild bootstrap: Wu
+    1986, Ann. Statist. 14:1261), since noise of T/N is greatest where N is least, and N climbs too.
+    `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
+    of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
+    [N]. `peaked` where a static peak was found. A repeat's deviations move the break-away as the fit, to first order.
+    """
+    last_instant = float(columns[0][-1])
+    finite = np.isfinite(columns[1])
+    time, ratio, normal = (column[finite] for column in columns)
+
+    def readings(until: float) -> tuple[ClimbReadings, Array]:
+        t, y, n = (thin(column[time <= until], settings.climb.climb_most) for column in (time, ratio, normal))
+        return ClimbReadings(t, y, settings.climb), n
+
+    climb = readings(last_instant)[0].fit(settings.block, peaked=peaked)
+    if climb is None:
+        return None
+    bends = climb.bend != 1.0
+    draws: list[Array] = []
+    for number, repeats in enumerate(np.array_split(np.arange(len(zero[0])), settings.climb_ends)):
+        series, n = readings(last_instant + (shortest - last_instant) * number / (settings.climb_ends - 1))
+        t, y = series.time, series.ratio
+        fit = series.refine(climb, bends=bends)
+        if fit.rise <= 0.0:
+            return None
+        edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / settings.block), prepend=-1.0))
+        blocks = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
+        # Two or three numbers were fitted to the climb's few blocks: residuals are small, and their size is uncertain.
+        dof = max(blocks - 2.0 - bends, 1.0)
+        scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(dof, len(repeats)))[:, None]
+        factors = scale * draw.standard_normal((len(repeats), len(edges)))
+        slopes, residual = fit.slopes(t), y - fit.ratio(t)
+        numbers = series.free_numbers(fit, slopes, residual, bends=bends)
+        moves = np.linalg.pinv(slopes[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
+        block_moves = np.add.reduceat(moves * residual, edges)
+        zero_t, zero_n = (errors[repeats] for errors in zero)
+        draws.append(fit.meets + factors @ block_moves + zero_t * (moves @ (1.0 / n)) - zero_n * (moves @ (y / n)))
+    return np.concatenate(draws)
 
 
 class StickSlip(NamedTuple):

@@ -9,7 +9,7 @@ import test_ground_truth as ground_truth
 from closed_form import GAINS_ALONE, PLAIN, T, analyse, block, noisy
 
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
-from sessions.strokes.event_uncertainty import onset_draws
+from sessions.strokes.contacts import onset_draws
 from sessions.strokes.stroke import StrokeCurve
 from simulators.bench import BenchSettings
 from simulators.stroke import Course
