@@ -65,12 +65,10 @@ def with_intervals(
     answers: list[Prediction | str] = [row.prediction or _reason(row, "sed") for row in rows]
     if both_ways:
         answers += [row.opposite or _reason(row, "opposite_sed") for row in rows]
-    intervals = intervals_of(answers, [*draws, *draws][: len(answers)], tau_scale(prediction.options), progress)
-    opposite_intervals = intervals[len(rows) :] or [None] * len(rows)
-    trials = tuple(
-        replace(row, interval=interval, opposite_interval=opposite)
-        for row, interval, opposite in zip(rows, intervals[: len(rows)], opposite_intervals, strict=True)
-    )
+    columns = [*draws, *draws][: len(answers)]
+    intervals = iter(intervals_of(answers, columns, tau_scale(prediction.options), progress))
+    with_own = [replace(row, interval=next(intervals)) for row in rows]
+    trials = tuple(replace(row, opposite_interval=next(intervals, None)) for row in with_own)
     return replace(prediction, trials=trials)
 
 
@@ -81,8 +79,7 @@ def draws_of(analysis: Analysis, prediction: SessionPrediction) -> list[DrawsOrR
         if row.stroke is None or row.mu is None or row.tau_max is None:
             draws.append(_reason(row, "sed"))
             continue
-        rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
-        friction = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, analysis.bootstrap)
+        friction = friction_draws(analysis.strokes[row.stroke], row.stroke, row.mu_rule, analysis.bootstrap)
         draws.append(friction or "the stroke is too short for an interval of its friction")
     return draws
 
@@ -99,20 +96,20 @@ def intervals_of(
     `scale` is what tau_max as drawn is multiplied by before the model gets it. Raises Cancelled.
     """
     taken_up = slides([answer for answer in column if not isinstance(answer, str)], progress)
-    return [
-        SedInterval(None, None, None, reason=answer)
-        if isinstance(answer, str)
-        else _interval(answer, next(taken_up), friction, scale)
+    results = (
+        answer if isinstance(answer, str) else _interval(answer, next(taken_up), friction, scale)
         for answer, friction in zip(column, draws, strict=True)
-    ]
+    )
+    return [SedInterval(None, None, None, reason=each) if isinstance(each, str) else each for each in results]
 
 
-def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrReason, scale: float) -> SedInterval:
+def _interval(prediction: Prediction, slide: Nearby | None, friction: DrawsOrReason, scale: float) -> SedInterval | str:
+    """Return the interval of a settled SED, or why there is none."""
     if slide is None:
-        return SedInterval(None, None, None, reason="the state found depends on the way to it")
+        return "the state found depends on the way to it"
     loads = _loads(prediction.scene, friction, scale)
     if isinstance(loads, str):
-        return SedInterval(None, None, None, reason=loads)
+        return loads
     names, draws, means = loads
     derivatives, width = derivatives_by(slide, prediction.scene), prediction.scene.finger.width
 

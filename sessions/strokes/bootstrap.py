@@ -16,7 +16,7 @@ from sessions.strokes.contacts import onset_draws
 from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.sliding import slide_onset_draws
 from sessions.strokes.stick import break_away_draws
-from sessions.strokes.stroke import Interval, Rule, Stroke, StrokeCurve
+from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 
 _OF_SESSION = 2**32 - 1  # in the seed, where a stroke has its number
 
@@ -133,7 +133,7 @@ class FrictionDraws(NamedTuple):
 
 
 def friction_draws(
-    stroke: Stroke, number: int, rule: Rule, settings: BootstrapSettings | None = None
+    stroke: Stroke, number: int, rule: str, settings: BootstrapSettings | None = None
 ) -> FrictionDraws | None:
     """Return mu, tau_max and normal force of each repeat; None without mu or tau_max.
 
