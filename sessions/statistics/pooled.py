@@ -66,6 +66,7 @@ from sessions.statistics.within_subjects import (
 )
 
 Trials = Sequence[tuple[Visit, TrialRow]]
+Points = Sequence[tuple[str, int, float, float]]  # subject, index, response to its own stroke, score
 
 
 def pool_visits(
@@ -129,7 +130,6 @@ def _descriptor(
     score_rows = [(subject, row, score) for subject, row, _, score in rows if score is not None]
     points = [(subject, row, x, score) for subject, row, x, score in rows if x is not None and score is not None]
     number_points = tuple((subject, row.index, x, score) for subject, row, x, score in points)
-    responses = [(subject, x, score) for subject, _, x, score in points]
     pairs = choices(trials)
     scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
     comparisons = constant_stimuli(trials)
@@ -144,11 +144,11 @@ def _descriptor(
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=number_points,
         mean_relation=_relation(number_points),
-        repeated=_correlation_within(responses),
+        repeated=_correlation_within(number_points),
         repeated_holm=None,
         rivals=rivals_within(rival_trials, quantity.label),
         rivals_of_means=rivals_of_surfaces(rival_trials, quantity.label),
-        without_subject=_without_subject(responses),
+        without_subject=_without_subject(number_points),
         normalised=_normalise(z_scores(matrix), number_points),
         differences=differences(matrix),
         estimates=estimates(trials, quantity.name),
@@ -231,8 +231,8 @@ def _surface(index: int, quantity: str, trials: Trials) -> SurfaceMean:
     return SurfaceMean(index, 0 if response is None else response.n, mu, response, normal, model, depth)
 
 
-def _relation(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
-    """Return the relation of mean scores to mean responses, of points of subject, index, response and score."""
+def _relation(points: Points) -> Relation | None:
+    """Return the relation of mean scores to mean responses."""
     responses = surface_means([(subject, index, x) for subject, index, x, _ in points])
     scores = surface_means([(subject, index, score) for subject, index, _, score in points])
     if responses is None or scores is None:
@@ -240,12 +240,13 @@ def _relation(points: Sequence[tuple[str, int, float, float]]) -> Relation | Non
     return relation(list(responses.values()), list(scores.values()), list(responses))
 
 
-def _correlation_within(points: Sequence[tuple[str, float, float]]) -> RepeatedCorrelation | None:
-    """Return the correlation within subjects of points of subject, x and y."""
-    return repeated_correlation(*zip(*points, strict=True)) if points else None
+def _correlation_within(points: Points) -> RepeatedCorrelation | None:
+    """Return the correlation of scores with responses within subjects."""
+    subjects, _, responses, scores = zip(*points, strict=True) if points else ((), (), (), ())
+    return repeated_correlation(subjects, responses, scores)
 
 
-def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
+def _without_subject(points: Points) -> tuple[tuple[str, float], ...]:
     """Return the correlation within subjects when each subject in turn is left out."""
     rows: list[tuple[str, float]] = []
     for subject in dict.fromkeys(point[0] for point in points):
@@ -254,11 +255,10 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
     return tuple(rows)
 
 
-def _normalise(table: Table, points: Sequence[tuple[str, int, float, float]]) -> NormalisedScores:
-    """Return statistics of standardised scores; `points` are subject, index, response to its own stroke, score."""
+def _normalise(table: Table, points: Points) -> NormalisedScores:
+    """Return statistics of standardised scores and the responses in `points`."""
     pairs = [(subject, i, x, table[subject][i]) for subject, i, x, _ in points if i in table.get(subject, {})]
-    within = _correlation_within([(subject, x, score) for subject, _, x, score in pairs])
-    return NormalisedScores(_averages(table), _relation(pairs), within)
+    return NormalisedScores(_averages(table), _relation(pairs), _correlation_within(pairs))
 
 
 def _averages(table: Table) -> dict[int, Average]:
@@ -282,9 +282,9 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
         subject: {index: float(np.mean(values)) for index, values in by_key(pairs).items()}
         for subject, pairs in sorted(by_subject.items())
     }
-    responses = [(subject, x, log) for subject, row, log in logs if (x := row.response(quantity)) is not None]
+    points = [(subject, row.index, x, log) for subject, row, log in logs if (x := row.response(quantity)) is not None]
     left_out = tuple(sorted(no_logarithm))
-    return Estimates(_averages(table), _averages(equal_moduli(table)), _correlation_within(responses), left_out)
+    return Estimates(_averages(table), _averages(equal_moduli(table)), _correlation_within(points), left_out)
 
 
 def exponent(trials: Trials) -> Exponent | None:

@@ -33,11 +33,6 @@ class AssumedEffects:
     slope_sd: float = 0.5  # between subjects, of the effect, by the mean effect [-]
     friction_sd: float = 0.1  # of the µ of one stroke about the surface's, by it [-]
 
-    @property
-    def rise(self) -> float:
-        """The effect of one standard deviation of a quantity that is spread evenly over its range [0–100]."""
-        return self.effect / math.sqrt(12.0)
-
 
 @dataclass(frozen=True, slots=True)
 class Power:
@@ -156,7 +151,8 @@ def study_weights(
     usable = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     finite: Array = strokes[quantity][np.isfinite(strokes[quantity])]
     level, noise = draw.standard_normal((people, 1)), draw.standard_normal(usable.shape)
-    slope = effects.rise * np.ones((people, 1))
+    # The effect spans a range over which the quantity is spread evenly: one standard deviation is its part of √12.
+    slope = effects.effect / math.sqrt(12.0) * np.ones((people, 1))
     if effects.slope_sd:
         slope *= 1.0 + effects.slope_sd * draw.standard_normal((people, 1))
     scores: Array = slope * (values[quantity] - finite.mean()) / finite.std()

@@ -4,17 +4,14 @@ import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import chdtri
 
 from drivers.arrays import Array, Indices
-from sessions.recording.log import TrialRecord
+from sessions.recording import Recording, TrialRecord
 from sessions.statistics.correlations import TAILS, pearson, t_quantile
-
-if TYPE_CHECKING:
-    from sessions.recording.reader import Recording
 
 SCORE_SCALE = (0.0, 100.0)  # ends of the scale, beyond which there is no answer
 _ALIKE = 1e-12  # of the greatest value: a spread so small is round-off
@@ -99,7 +96,7 @@ class MeanScore:
     reason: str | None
 
 
-def score_table(recording: "Recording") -> ScoreTable:
+def score_table(recording: Recording) -> ScoreTable:
     """Return a session's scores on the line, of main trials alone. Raises Blinded while the stimuli's key is sealed."""
     subject = recording.plan.subject
     scores = tuple(
@@ -110,7 +107,7 @@ def score_table(recording: "Recording") -> ScoreTable:
     return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores, _other_answers(recording))
 
 
-def _other_answers(recording: "Recording") -> str:
+def _other_answers(recording: Recording) -> str:
     """Return a sentence on the answers of a session that are no scores on the line; empty where there are none."""
     numbers = sum(record.number is not None for record in recording.trials)
     choices = sum(record.choice is not None for record in recording.trials)

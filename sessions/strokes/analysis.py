@@ -2,22 +2,20 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from drivers.readings import ReadingBlock
 from sessions.file_access import complete
 from sessions.plan.plan import Trial
+from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals, stroke_intervals
 from sessions.strokes.decisions import OF_SESSION, Decision, DecisionError, Decisions, Value, read
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
 from sessions.strokes.stroke import Flaw, FlawName, FrictionParameters, Stroke, friction_parameters
 from sessions.strokes.trial_analysis import Press, Tilt, TrialContext, analyse_trial, strokes_for_model, tilt_of
 from sessions.toml_file import SettingsError, from_table
-
-if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader
-    from sessions.recording.reader import Recording
 
 Blocks = Iterable[tuple[Trial | None, ReadingBlock]]  # readings of trials, or of a recording without any (None)
 
@@ -86,7 +84,7 @@ class Analysis:
 
 
 def analyse(
-    recording: "Recording", settings: AnalysisSettings | None = None, decisions: Decisions | None = None
+    recording: Recording, settings: AnalysisSettings | None = None, decisions: Decisions | None = None
 ) -> Analysis:
     """Return the strokes of a recording: within each trial's valid take, or anywhere where it has no trials.
 
@@ -202,7 +200,7 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
     raise DecisionError(f"there is no {decision.target_text}: {count}")
 
 
-def preview(recording: "Recording", decision: Decision, decisions: Decisions, present: Analysis) -> Analysis:
+def preview(recording: Recording, decision: Decision, decisions: Decisions, present: Analysis) -> Analysis:
     """Return the analysis as it would be with a decision more; `present` is that without it.
 
     Raises DecisionError where the decision cannot be, or would change nothing.

@@ -9,18 +9,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import msgspec
 from msgspec import Meta
 
 from sessions.file_access import as_type, json_object, name_failure, one_at_a_time
+from sessions.recording import Recording
 from sessions.recording.derived import bytes_of
 from sessions.recording.head import compact_json
 from sessions.recording.schema import RecordingError, text_crc
-
-if TYPE_CHECKING:
-    from sessions.recording.reader import Recording
 
 MOST_TILT = 20.0  # more is a face mounted wrongly, not one that leans [degrees]
 DECISIONS = "decisions.jsonl"  # in a session's folder
@@ -154,16 +152,6 @@ class StrokeDecisions:
         """Return an instant [s] that was decided."""
         return float(self.value(name)) if name in self.by_name else None
 
-    @property
-    def is_kept(self) -> bool:
-        """Say whether the stroke stays in: so unless it was decided otherwise."""
-        return self.value("kept") is not False
-
-    @property
-    def sentences(self) -> dict[str, str]:
-        """Return for each thing decided who decided it, and why."""
-        return {name: decision.sentence for name, decision in self.by_name.items()}
-
 
 @dataclass(frozen=True, slots=True)
 class Decisions:
@@ -241,7 +229,7 @@ def parse(content: bytes) -> Decisions:
     return Decisions(tuple(lines), tuple(problems))
 
 
-def append(recording: "Recording", decision: Decision) -> Decision:
+def append(recording: Recording, decision: Decision) -> Decision:
     """Record a decision, or that one is undone; return it with its number and date, safe on the disk.
 
     Raises DecisionError where it cannot be, RecordingError where it cannot be written.

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,12 +11,10 @@ from drivers.arrays import Array, Mask
 from drivers.calibration_file import AXES
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
+from sessions.recording import Recording
 from sessions.strokes import invalid_readings as invalid
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.stroke import Flaw, FlawName, significant
-
-if TYPE_CHECKING:
-    from sessions.recording.reader import Recording
 
 
 class Gap(NamedTuple):
@@ -187,7 +185,7 @@ def _time_flaws(step: float, even: bool, stall_count: int) -> Iterator[Flaw]:
         yield Flaw(FlawName.IRREGULAR_TIME, sentence, "doubtful")
 
 
-def doubtful_readings(recording: "Recording") -> Iterator[str]:
+def doubtful_readings(recording: Recording) -> Iterator[str]:
     """Yield a sentence, the flaw's name first, for each cause that makes recorded readings doubtful."""
     if recording.info is None:
         return

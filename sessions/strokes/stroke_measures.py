@@ -84,8 +84,8 @@ def measure_stroke(
         reasons=dict(findings.reasons),
         area_exponent=track.settings.area.exponent,
         number=number,
-        kept=decisions.is_kept,
-        decided=decisions.sentences,
+        kept=decisions.value("kept") is not False,
+        decided={name: decision.sentence for name, decision in decisions.by_name.items()},
         curve=curve_of(span, contact, zero, crest_gap),
         **numbers,
     )
