@@ -23,7 +23,7 @@ from closed_form import (
     wrench,
 )
 
-from sessions.strokes.invalid_readings import constant_runs, spikes
+from sessions.strokes.signal_quality import constant_runs, spikes
 
 T = times(10.0)
 BEGINS = (1.0, 4.0, 7.0)
