@@ -13,7 +13,8 @@ from solver.body.validation import check_loads
 from solver.constitutive import Law
 from solver.contact import ForceLoad, LoadState
 from solver.continuation import LARGEST_MU, Continuation, folds_at, jumped_branch
-from solver.continuation.existence import BEYOND_LIMIT, Reach, all_at_the_bound, of_depth, stands, steady, steep
+from solver.continuation.existence import BEYOND_LIMIT, all_at_the_bound, stands, steady, steep
+from solver.continuation.limit_point import Reach, of_depth
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, Termination, load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
@@ -188,7 +189,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
 def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
     """Return the settled slide under `force` [N/mm] deeper than `state`, beyond which force control failed.
 
-    `existence` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
+    `limit_point` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
     continues there. Raises as `settled_state`.
     """
     proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))

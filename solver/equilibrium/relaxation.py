@@ -22,7 +22,7 @@ from typing import Protocol
 
 import numpy as np
 
-from solver._kernels import overstress as overstress_loops
+from solver._kernels import elements as element_loops
 from solver.arrays import Array, Indices
 from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
@@ -177,7 +177,7 @@ class CondensedRelaxing(CondensedFinite):
 
     def _add(self, u: Array) -> None:
         more = self.system.overstress_force, self.system.overstress_tangent
-        overstress_loops.overstress(u, self.tensor, self.body.elements, *more, np.empty((4, 9)))
+        element_loops.overstress(u, self.tensor, self.body.elements, *more, np.empty((4, 9)))
 
     def excess(self, u: Array) -> Array:
         """Return the nodal forces (e, 18) of the overstress at displacements `u` (nodes, 2)."""

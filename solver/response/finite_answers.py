@@ -10,8 +10,9 @@ from solver.accuracy.adaptivity import choose_steps, steps_of_press, with_shares
 from solver.accuracy.convergence_order import order_of
 from solver.accuracy.error_estimate import NO_NESTED_STATE, NestedState, Steps, edge_changes, nested_state
 from solver.arrays import Array
-from solver.continuation.existence import doubts, is_folded, refuse_far_beyond, sound
+from solver.continuation.existence import doubts, refuse_far_beyond
 from solver.continuation.finite_states import nearby, roughly, settled_state
+from solver.continuation.limit_point import is_folded, sound
 from solver.continuation.small_states import within_reach
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import FiniteFinger

@@ -15,8 +15,8 @@ from solver.body import Patches
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic, LinearPatches
 from solver.body.receptor import endings
-from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
+from solver.continuation.limit_point import sound
 from solver.continuation.small_states import WIDE, direct, expected_depth, nearest
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli

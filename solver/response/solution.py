@@ -15,7 +15,7 @@ from solver.accuracy.residual_overstress import with_viscosity
 from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
-from solver.failures import CutFolds, NoSteadyState, NotConverged, SolveFailure
+from solver.failures import CutFolds, NotConverged, SolveFailure
 from solver.mesh import Lines
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction
@@ -359,10 +359,10 @@ def _errors(
 def _error_by_tolerance(answer: Answer, *, limits_known: bool) -> float:
     """Return an answer's error estimate by the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
 
-    A refusal counts as unknown unless `limits_known`: unless its mesh gives limits to 3 %. Where the free cut folds,
+    A failure counts as unknown unless `limits_known`: unless its mesh gives limits to 3 %. Where the free cut folds,
     the error is unknown on finer meshes too, and counts as 0.
     """
-    if isinstance(answer, NoSteadyState) and not limits_known:
+    if isinstance(answer, SolveFailure) and not limits_known:
         return ASSUMED_ERROR
     if not isinstance(answer, Prediction) or isinstance(answer.unknown, CutFolds):
         return 0.0

@@ -29,7 +29,7 @@ COST_PARTS = {
     "body.state": "receptor", "body.skin": "proof of existence", "equilibrium.finger": "carrying states",
     "continuation.small_states": "iteration", "continuation.finite_states": "iteration",
     "response.finite_answers": "iteration",
-    "_kernels.elements": "assembly", "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
+    "_kernels.elements": "assembly", "_kernels.multifrontal": "factorisation",
     "_kernels.active_set": "contact", "_kernels.contact_system": "contact",
 }  # fmt: skip
 ENTIRE = {"nested_numbers_of_all": "error estimate", "solve_nested": "error estimate", "with_viscosity": "evidence"}

@@ -9,6 +9,7 @@
 | bounds | a traction bound of 1 to 10 kPa |
 | forces | a prescribed normal force, in half of them also a drag |
 | courses | a slide that reverses, a press with friction, or a history of relaxing tissues |
+| deep | a press by 50 to 80 % of the tissue between skin and bone |
 | stiff | skin 8 to 100 times as stiff as fat, or at finite strain Ogden's law with an exponent of 3 to 14 |
 """
 
@@ -158,8 +159,18 @@ def _stiff(draw: Draw, number: int, kinematics: Kinematics) -> Scene:
     return replace(scene, friction=Friction(scene.friction.mu))
 
 
+def _deep(draw: Draw, _: int, __: Kinematics) -> Scene:
+    scene = _common(draw)
+    depth = draw.uniform(0.5, 0.8) * scene.finger.pulp_thickness()
+    return replace(
+        scene,
+        friction=replace(scene.friction, mu=_by_logarithm(draw, 0.01, 0.3)),
+        loading=replace(scene.loading, indentation=depth),
+    )
+
+
 FAMILIES: Mapping[str, Callable[[Draw, int, Kinematics], Scene]] = {
-    draw.__name__[1:]: draw for draw in (_axis, _fingers, _extreme, _edge, _bounds, _forces, _courses, _stiff)
+    draw.__name__[1:]: draw for draw in (_axis, _fingers, _extreme, _edge, _bounds, _forces, _courses, _deep, _stiff)
 }
 
 

@@ -1,12 +1,16 @@
 """A settled sliding state is given only where there is one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
 from solver.contact import LoadState
 from solver.continuation.existence import steady
-from solver.equilibrium.load_stepping import solve_full_slip
+from solver.equilibrium.finger import FiniteFinger
+from solver.equilibrium.load_stepping import march, solve_full_slip
+from solver.mesh.mesher import Sizing
 from solver.response.finite_answers import Meshes, coarse_solution, refine
 from tests.solver.finite_examples import published
 
@@ -31,6 +35,31 @@ def test_a_press_deep_into_the_tissue_is_refused_with_the_same_depth_as_one_a_li
         deepest.append(refusal.value.limit_indentation)
     assert deepest == pytest.approx([deepest[0]] * 3, rel=0.03)
     assert deepest[0] < 2.8
+
+
+def test_a_deep_press_without_friction_has_an_error_estimate_that_holds_for_a_finer_mesh_pressed_step_by_step():
+    scene = Scene(friction=Friction(0.0), loading=Loading(3.3), solve=Solve("finite", tolerance=0.1, evidence="quick"))
+    answer = solve(scene)
+    fine = FiniteFinger.of(scene, Sizing(8.0, 3.3, margin=3.0))
+    *_, pressed = march(fine.newton, [LoadState(depth, 0.0) for depth in np.linspace(0.1, 3.3, 33).tolist()])
+    assert answer.error_estimate < 0.1
+    assert answer.sed_ending == pytest.approx(fine.sed_ending(pressed.u), rel=answer.error_estimate)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mu", [0.0, 0.02])
+def test_a_press_whose_skin_folds_without_friction_is_refused_with_the_depth_up_to_which_it_slides(mu):
+    scene = Scene(friction=Friction(mu), loading=Loading(4.1), solve=Solve("finite", tolerance=0.1, evidence="quick"))
+    with pytest.raises(NoSteadyState, match="the skin folds") as refusal:
+        solve(scene)
+    deepest = refusal.value.limit_indentation
+    finger = FiniteFinger.of(scene, Sizing(8.0, 4.1, margin=3.0))
+    depths = np.linspace(0.1, 0.95 * deepest, 40).tolist()
+    *_, pressed = march(finger.newton, [LoadState(depth, mu, sense=TOWARDS_TIP) for depth in depths])
+    assert finger.skin_compression(pressed).lowest == pytest.approx(0.60, abs=0.03)  # near 0.54, where surfaces fold
+    with pytest.raises(NoSteadyState) as again:
+        solve(replace(scene, loading=Loading(1.06 * deepest)))
+    assert again.value.limit_indentation == pytest.approx(deepest, rel=0.02)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,221 @@
+"""Limits of friction and depth of settled slides at finite strain.
+
+They are found on meshes made for them. The branch is followed on a coarse mesh to near its end, which shows where the
+skin is compressed most. Skin folds within some tenths of a millimetre, so the branch is continued on a mesh with small
+elements there. `daq-app accuracy` measures the accuracy of these limits.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from solver.arrays import Array
+from solver.contact import LoadState
+from solver.continuation import BRANCH, LARGEST_MU, Branch, Continuation, folds_at
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState
+from solver.equilibrium.finger import FiniteFinger, finite_laws
+from solver.equilibrium.load_stepping import solve_full_slip
+from solver.failures import NotConverged
+from solver.mesh.mesher import EPIDERMIS, Sizing
+from solver.scene import Scene
+from solver.scene.tables import SHALLOW
+
+FINENESS = 7.0  # elements to a tip radius of both meshes, except at a fold
+_MARGIN = 6.0  # by the indentation: height of the undeformed skin up to which contact is considered
+
+
+@dataclass(frozen=True, slots=True)
+class LimitControl:
+    """Which states may begin or end a branch; least stretches of the skin, and fractions."""
+
+    smooth: float = 0.66  # stretch above which states of the coarse mesh agree with those of the fine one
+    sound: float = 0.65  # stretch of a state from which others may start: neo-Hookean surfaces fold at 0.54
+    plain: float = 0.71  # stretch above which a state needs no proof: meshes just below a limit have up to 0.70
+    astray: float = 0.5  # distance of the fold from its expected place for which the mesh is made anew [mm]
+    starts: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # fractions of the depth at which its branch may begin
+    nearly: float = 0.02  # stretch above the folding one that counts as near a limit: some 2 % of the friction
+
+
+LIMIT = LimitControl()
+
+
+def sound(finger: FiniteFinger, state: EquilibriumState, least: float = LIMIT.sound) -> bool:
+    """Return whether the skin is stretched to more than `least` everywhere, without a crease or self-contact."""
+    compression = finger.skin_compression(state)
+    return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(state)
+
+
+def is_folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
+    """Return whether the skin has a crease or crosses itself."""
+    return finger.skin_compression(state).kink > BRANCH.crease or finger.crosses(state)
+
+
+@dataclass(frozen=True, slots=True)
+class BranchSearch:
+    """A branch of settled slides to be followed on meshes made for it."""
+
+    scene: Scene  # unloaded
+    load: LoadState  # at the beginning of the branch by friction, at the end of one by depth
+    parameter: int  # the parameter: BY_FRICTION or BY_DEPTH
+    target: float  # its last value
+
+    @property
+    def folds(self) -> float:
+        """The stretch at which the skin folds [-]."""
+        return folds_at(finite_laws(self.scene.materials)[EPIDERMIS])
+
+    def finger(self, fold: float | None = None) -> FiniteFinger:
+        """Return the finger on a coarse mesh, or on one that is fine at the arc position of a `fold` [mm]."""
+        return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=_MARGIN, fold=fold))
+
+    @property
+    def last(self) -> float:
+        """The largest value to which the branch is followed; beyond LARGEST_MU the bound governs."""
+        return self.target if self.parameter == BY_DEPTH else min(self.target, LARGEST_MU)
+
+    def to(self, target: float) -> "BranchSearch":
+        """Return the search with another target."""
+        return replace(self, target=target)
+
+    def trace(self, finger: FiniteFinger, start: EquilibriumState, length: float | None = None) -> Branch:
+        """Return the branch from `start` until it passes the target; its first step has the `length`."""
+        return self._on(finger).trace(start, self.last, length)
+
+    def _on(self, finger: FiniteFinger) -> Continuation:
+        return Continuation(finger, self.parameter, self.folds)
+
+    def stop(self, finger: FiniteFinger, branch: Branch) -> Branch:
+        """Return a branch up to the target, which one step from LARGEST_MU reaches."""
+        branch = self._on(finger).stop_at(branch, self.last)
+        if branch.limited or self.last == self.target:
+            return branch
+        load = branch.last.load._replace(mu=self.target)
+        last = solve_full_slip(finger.newton, load, branch.last, BRANCH.tolerance)
+        return Branch((*branch.states, last), self.target, limited=False)
+
+    def trace_on_fine_mesh(
+        self, finger: FiniteFinger, states: tuple[EquilibriumState, ...]
+    ) -> tuple[FiniteFinger, Branch, float]:
+        """Return a finger that is fine where the last of `states` is compressed most, its branch, and that place."""
+        place = _place_of_least_stretch(finger, states[-1])
+        fine = self.finger(place)
+        branch = self.trace(fine, self._start_on_fine_mesh(fine, finger, states))
+        return fine, self.stop(fine, branch), place
+
+    def start(self, finger: FiniteFinger) -> EquilibriumState:
+        """Return the state at which the branch begins. Raises NotConverged."""
+        if self.parameter == BY_FRICTION:
+            return solve_full_slip(finger.newton, self.load, None, BRANCH.tolerance)
+        for part in LIMIT.starts:
+            with suppress(NotConverged):
+                load = self.load._replace(depth=part * self.target)
+                start = solve_full_slip(finger.newton, load, None, BRANCH.tolerance)
+                if sound(finger, start):
+                    return start
+        raise NotConverged(
+            f"no sliding state was found at mu = {self.load.mu:.3g} even at {LIMIT.starts[-1] * self.target:.3g} "
+            "mm: ask for less friction"
+        )
+
+    def _start_on_fine_mesh(
+        self, fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...]
+    ) -> EquilibriumState:
+        """Return the state on the `fine` mesh of the last of `states` that the `rough` mesh resolves."""
+        for state in reversed(states):
+            if rough.skin_compression(state).lowest < LIMIT.smooth:
+                continue
+            with suppress(NotConverged):
+                start = solve_full_slip(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance)
+                if sound(fine, start) or state is states[0]:
+                    return start
+        return self.start(fine)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """The range of a branch of settled slides, from zero friction or from a small depth."""
+
+    search: BranchSearch
+    value: float  # friction coefficient or depth [mm] at its end: the target, or the largest
+    limited: bool  # whether the branch ends there
+    lost: bool  # whether only the corrector failed there, so that the branch may continue
+    least: float  # least stretch of the skin at its last state [-]
+    numbers: Array  # (3,) SED of the ending, normal and tangential force at its last state
+
+    @property
+    def ends(self) -> bool:
+        """Whether the branch is known to end there."""
+        return self.limited and not self.lost
+
+    @property
+    def near(self) -> bool:
+        """Whether the last state lies near a limit."""
+        return self.least < self.search.folds + LIMIT.nearly
+
+    @property
+    def by_depth(self) -> bool:
+        """Whether it is followed in depth."""
+        return self.search.parameter == BY_DEPTH
+
+
+def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
+    """Return the range of slides at the depth and bound of `load`, from mu = 0 to `target`.
+
+    Raises NotConverged where not even the frictionless state is found, Cancelled.
+    """
+    return _reach(
+        BranchSearch(scene.frictionless_press(SHALLOW), load._replace(mu=0.0, travel=0.0), BY_FRICTION, target)
+    )
+
+
+def of_depth(scene: Scene, load: LoadState) -> Reach:
+    """Return the range of slides at the friction of `load`, from a small depth to that of `load`.
+
+    Raises NotConverged where no slide is found even at a hundredth of that depth, Cancelled.
+    """
+    return _reach(BranchSearch(scene.frictionless_press(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth))
+
+
+PIECES = (LARGEST_MU / 8.0, LARGEST_MU / 4.0, LARGEST_MU / 2.0, LARGEST_MU)  # ends of pieces of branches in friction
+
+
+@lru_cache(maxsize=32)
+def _coarse_branch(search: BranchSearch) -> Branch:
+    """Return the branch of a search on its coarse mesh; in friction its target is one of PIECES.
+
+    It is cached, because all friction coefficients of a scene share it.
+    """
+    finger = search.finger()
+    if search.parameter == BY_DEPTH or search.target == PIECES[0]:
+        return search.trace(finger, search.start(finger))
+    before = _coarse_branch(search.to(search.target / 2.0))
+    if before.limited:
+        return before
+    after = search.trace(finger, before.last, before.length)
+    return replace(after, states=(*before.states, *after.states[1:]))
+
+
+@lru_cache(maxsize=32)
+def _reach(search: BranchSearch) -> Reach:
+    """Return the range of a branch, cached because all meshes of a scene need the same."""
+    by_depth = search.parameter == BY_DEPTH
+    coarse = _coarse_branch(search if by_depth else search.to(min(end for end in PIECES if end >= search.last)))
+    if coarse.value < search.last < LARGEST_MU and not by_depth:
+        end = _reach(search.to(LARGEST_MU))
+        if end.limited and end.value < search.target:
+            return end
+    finger = search.finger()
+    branch = search.stop(finger, coarse)
+    if branch.limited or not sound(finger, branch.last, LIMIT.plain):
+        finger, branch, place = search.trace_on_fine_mesh(finger, branch.states)
+        if abs(_place_of_least_stretch(finger, branch.last) - place) > LIMIT.astray:
+            finger, branch, _ = search.trace_on_fine_mesh(finger, branch.states)
+    least = finger.skin_compression(branch.last).least
+    numbers = finger.numbers([branch.last])[0]
+    return Reach(search, float(branch.value), branch.limited, branch.lost, least, numbers)
+
+
+def _place_of_least_stretch(finger: FiniteFinger, state: EquilibriumState) -> float:
+    """Return the arc position of the least stretch of the skin [mm]."""
+    place = finger.skin_compression(state).place
+    return float(finger.geometry.arcs[place : place + 2].mean())
