@@ -110,7 +110,6 @@ class StreamingTransducer(ThreadedTransducer):
         self._conversation = conversation
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
         self._gather = _GATHER if self._period < _GATHER else 0.0
-        self._pending: deque[tuple[Records | None, int]] = deque()  # and arrival [ns]; None: the stream restarted
         self.reset()
 
     @property
@@ -137,7 +136,7 @@ class StreamingTransducer(ThreadedTransducer):
 
     def reset(self) -> None:
         super().reset()
-        self._pending.clear()
+        self._pending: deque[tuple[Records | None, int]] = deque()  # and arrival [ns]; None: the stream restarted
         self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
         self._held_back: list[tuple[Records, int]] = []  # that the numbering keeps back
         self._restarted = 0

@@ -20,7 +20,7 @@ class ThreadedTransducer(ABC):
     longest_wait = 0.05  # longest wait, and so for a stop [real s]
 
     def __init__(self, info: TransducerInfo, clock: Clock, opening: Deadline | None = None) -> None:
-        """Take an identified device. What its opening took is taken off the time for its first start."""
+        """Take an identified device, to be reset. What its opening took is taken off the time for its first start."""
         self._spent = 0.0 if opening is None else opening.spent
         self.info = info  # as found at opening
         self.clock = clock
@@ -29,11 +29,6 @@ class ThreadedTransducer(ABC):
         self.stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._last_thread: threading.Thread | None = None  # the thread that was stopped last, which a device may hold
-        self.ended: Exception | None = None  # why the stream ended, where nobody stopped it
-        self._ready: list[ReadingBlock] = []
-        self._received = 0
-        self._statuses = StatusCount(info.status)
-        self._lag_ms = 0.0
 
     def totals(self, **counts: Any) -> Health:  # noqa: ANN401 - fields of Health
         """Return totals: those that all drivers count, and `counts`. The lock is held."""
@@ -105,8 +100,8 @@ class ThreadedTransducer(ABC):
             raise SetupError(f"{self.info.uri} still holds up the stream before; open it anew, or pull its plug")
         self.news.clear()
         self.stopping.clear()
-        self.ended = None
-        self._ready = []
+        self.ended: Exception | None = None  # why the stream ended, where nobody stopped it
+        self._ready: list[ReadingBlock] = []
         self._received = 0
         self._statuses = StatusCount(self.info.status)
         self._lag_ms = 0.0

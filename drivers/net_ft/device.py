@@ -129,7 +129,6 @@ class NetFtTransducer(ThreadedTransducer):
         self._identify = identify
         self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
         self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
-        self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
         self.reset()
 
     @property
@@ -168,7 +167,7 @@ class NetFtTransducer(ThreadedTransducer):
 
     def reset(self) -> None:
         super().reset()
-        self._pending.clear()
+        self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
         self._account = SequenceAccount(self._step, self.info.counter_rate)
         self._watch = RateWatch(self.info.counter_rate, self.clock.factor, _SILENT_TICKS * self.clock.factor)
         self._breaks = self._changes = 0  # in the device's counter, and of it or the rate, so far
