@@ -20,7 +20,7 @@ from drivers.arrays import Array, Indices
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
-from simulators.simulator import RunningSimulator, Simulator, unplug
+from simulators.simulator import RunningSimulator, Simulator, stopwatch, unplug
 
 _ROOM = 984  # readings the converter keeps for a computer that is late
 _NAP = 0.0005  # [real s]
@@ -37,16 +37,11 @@ class LabJackU6Box:
     def __init__(self, bench: Bench, clock: Clock, *, serial: int = 360_000_001, faults: Faults | None = None) -> None:
         self.bench = bench
         self.serial = serial
-        self._clock = clock
+        self.now = stopwatch(clock)  # the box's and the bench's time [s]
         self._faults = faults or Faults()
         self._gauges = np.linalg.inv(FT32831)  # V for one N or N mm
         self._lock = threading.Lock()
-        self._origin_ns = clock.now_ns()
         self._switch_on()
-
-    def now(self) -> float:
-        """Return the box's and the bench's time [s]: 0 when it was made."""
-        return (self._clock.now_ns() - self._origin_ns) * 1e-9
 
     @property
     def is_plugged(self) -> bool:

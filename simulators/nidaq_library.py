@@ -13,7 +13,7 @@ import numpy as np
 from drivers.clock import Clock
 from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
-from simulators.simulator import RunningSimulator, Simulator, unplug
+from simulators.simulator import RunningSimulator, Simulator, stopwatch, unplug
 
 ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]
 OVERFLOW = "The application is not able to keep up with the hardware acquisition.\n\nTask Name: _unnamedTask<0>"
@@ -47,13 +47,8 @@ class SimulatedNidaqmx(ModuleType):
         self.starts: list[float] = []  # when acquisitions began [s]
         self.range = (-10.0, 10.0)  # that the device takes, whatever is asked [V]
         self.requests: list[tuple[Any, ...]] = []  # channels, terminals and limits
-        self._clock = clock
-        self._origin_ns = clock.now_ns()
+        self.now = stopwatch(clock)  # the device's and the bench's time [s]
         self._previous_modules: dict[str, ModuleType | None] = {}
-
-    def now(self) -> float:
-        """Return the device's and the bench's time [s]."""
-        return (self._clock.now_ns() - self._origin_ns) * 1e-9
 
     def install(self) -> None:
         """Let it be what `import nidaqmx` gives."""

@@ -115,23 +115,26 @@ class PseudoTerminal:
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
+def stopwatch(clock: Clock) -> Callable[[], float]:
+    """Return what tells the time [s] of a clock since now."""
+    origin_ns = clock.now_ns()
+    return lambda: (clock.now_ns() - origin_ns) * 1e-9
+
+
 class ServedBox:
     """One box. Its time, and the bench's, begins when it is started."""
+
+    now: Callable[[], float]  # [s]; from `serve` on
 
     def __init__(self, clock: Clock, faults: Faults | None) -> None:
         self.clock = clock
         self.faults = faults or Faults()
         self.closing = threading.Event()
         self._thread: threading.Thread | None = None
-        self._origin_ns = 0
-
-    def now(self) -> float:
-        """Return the box's and the bench's time [s]: 0 when it was started."""
-        return (self.clock.now_ns() - self._origin_ns) * 1e-9
 
     def serve(self, work: Callable[[], None], name: str) -> None:
         """Let time begin, and a thread work until `closing` is set."""
-        self._origin_ns = self.clock.now_ns()
+        self.now = stopwatch(self.clock)
         self._thread = threading.Thread(target=work, name=f"simulated {name}", daemon=True)
         self._thread.start()
 

@@ -48,7 +48,7 @@ class SimulatedDevice:
 
     def last_arrival(self, block):
         """When the last reading arrived, on the bench's clock."""
-        return (block.received_ns[-1] - self.box._origin_ns) * 1e-9 if len(block) else 0.0
+        return self.box.now() + (block.received_ns[-1] - self.clock.now_ns()) * 1e-9 if len(block) else 0.0
 
     def identify(self):
         return self.identify_function(parse_address(self.uri), Deadline(1.0))
