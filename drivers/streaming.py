@@ -39,11 +39,13 @@ class Conversation(Protocol):
     def end(self, link: Link) -> None:
         """Bring the stream to an end within 0.1 s. Raises LinkLost when the device is gone, and streams no more."""
 
-    def decoder(self) -> RecordDecoder:
-        """Return a decoder for a stream about to begin."""
+    @property
+    def decoder(self) -> Callable[[], RecordDecoder]:
+        """What makes a decoder for a stream about to begin."""
 
-    def numbering(self, rate: float, factor: float) -> ClockRecovery | ScanCount:
-        """Return what numbers a stream of `rate` [Hz] by a session clock that runs `factor` times real time."""
+    @property
+    def numbering(self) -> Callable[[float, float], ClockRecovery | ScanCount]:
+        """What makes the numbering of a stream, of its rate [Hz] and how many times as fast as real its clock runs."""
 
 
 def measured_rate(

@@ -123,9 +123,7 @@ class _DigitalConversation:
     number: int  # of the calibration, 1 to 16
     stored: wire.StoredCalibration  # as it was read
     word: int = 0  # the status word, which can only be read while nothing streams
-
-    def numbering(self, rate: float, factor: float) -> ClockRecovery:
-        return ClockRecovery(rate, factor)
+    numbering = ClockRecovery
 
     def decoder(self) -> RecordDecoder:
         return wire.StreamDecoder(self.word)

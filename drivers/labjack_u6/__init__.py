@@ -2,6 +2,7 @@
 
 import contextlib
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -136,12 +137,10 @@ class _GaugeConversation:
     serial: int
     constants: wire.Constants
     scan_clock: wire.ScanClock
+    numbering = partial(ScanCount, wrap=_WRAP)
 
     def decoder(self) -> RecordDecoder:
         return wire.StreamDecoder(self.constants)
-
-    def numbering(self, rate: float, factor: float) -> ScanCount:
-        return ScanCount(rate, factor, wrap=_WRAP)
 
     def begin(self, link: Link) -> bytes:
         """End whatever streams, set the scans and let them come. Raises LinkLost or DeviceFault with the reason."""

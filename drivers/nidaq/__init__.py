@@ -177,11 +177,8 @@ class _VoltsDecoder:
 
 
 class _TaskConversation:
-    def decoder(self) -> "_VoltsDecoder":
-        return _VoltsDecoder()
-
-    def numbering(self, rate: float, factor: float) -> ScanCount:
-        return ScanCount(rate, factor)
+    decoder = _VoltsDecoder
+    numbering = ScanCount
 
     def begin(self, link: Link) -> bytes:
         link.send(b"start")

@@ -133,9 +133,7 @@ def _target_of(address: Address) -> _Target:
 @dataclass(eq=False)
 class _ControllerConversation:
     binary: bool
-
-    def numbering(self, rate: float, factor: float) -> ClockRecovery:
-        return ClockRecovery(rate, factor)
+    numbering = ClockRecovery
 
     def decoder(self) -> RecordDecoder:
         return wire.BinaryDecoder() if self.binary else wire.AsciiDecoder()
