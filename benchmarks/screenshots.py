@@ -37,12 +37,11 @@ FOLDER = "recordings/P07_sensotact-friction_20260301T143005"
 
 
 class PlayedRecorder:
-    """What the window sends is noted and answered by nobody."""
+    """What the window sends is answered by nobody."""
 
     pid = 0
 
     def __init__(self) -> None:
-        self.sent: list[object] = []
         self._queue: list[m.Report] = []
         self._bench = Bench(3)
         self._last = 0
@@ -76,8 +75,7 @@ class PlayedRecorder:
             self._last = int(number[-1]) + 1
 
     def send(self, request: object) -> None:
-        """Note it."""
-        self.sent.append(request)
+        """Do nothing."""
 
     def poll(self, timeout: float = 0.0) -> tuple[m.Report, ...]:  # noqa: ARG002  nothing is waited for
         """Return what is to be said."""

@@ -60,27 +60,13 @@ class UdpLink:
         self._socket.close()
 
 
-@contextlib.contextmanager
-def _name_failures(location: str, absence: str, advice: str, deadline: Deadline) -> Generator[None]:
-    """Raise LinkLost for a failure of the network inside, which says where, what is missing and what to do."""
-    try:
-        yield
-    except TimeoutError:
-        raise LinkLost(f"{location} gave {absence} within {deadline.spent:.2g} s; {advice}") from None
-    except OSError as error:
-        raise LinkLost(f"nothing answers at {location}: {_reason(error)}; {advice}") from None
-
-
 def tcp_answer(address: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
     """Return the `size` bytes that answer a request, or as many as came before the connection ended.
 
     Raises LinkLost when nothing answers at the IP address, or not all by the deadline.
     """
-    location = f"{address}, TCP port {port}"
-    with (
-        _name_failures(location, "no whole answer", "check the address and the tcp port", deadline),
-        _Call(address, port, deadline) as call,
-    ):
+    absence, advice = "no whole answer", "check the address and the tcp port"
+    with _call(address, port, deadline, f"{address}, TCP port {port}", absence, advice) as call:
         return call.ask(request).read(size)
 
 
@@ -121,6 +107,18 @@ class _Call(io.RawIOBase):
         return remaining_s
 
 
+@contextlib.contextmanager
+def _call(address: str, port: int, deadline: Deadline, location: str, absence: str, advice: str) -> Generator[_Call]:
+    """Call a port. Raises LinkLost for a failure of the network: it says where, what is missing and what to do."""
+    try:
+        with _Call(address, port, deadline) as call:
+            yield call
+    except TimeoutError:
+        raise LinkLost(f"{location} gave {absence} within {deadline.spent:.2g} s; {advice}") from None
+    except OSError as error:
+        raise LinkLost(f"nothing answers at {location}: {_reason(error)}; {advice}") from None
+
+
 @dataclass(frozen=True, slots=True)
 class HttpAnswer:
     """What a web page answered."""
@@ -135,10 +133,7 @@ def http_get(address: str, port: int, path: str, deadline: Deadline) -> HttpAnsw
     Redirects are not followed. Raises LinkLost where no HTTP of at most MOST_BODY answers at the address in time.
     """
     location = f"http://{address}:{port}{path}"
-    with (
-        _name_failures(location, "no answer", "check power, cable and address", deadline),
-        _Call(address, port, deadline) as call,
-    ):
+    with _call(address, port, deadline, location, "no answer", "check power, cable and address") as call:
         request = f"GET {path} HTTP/1.0\r\nHost: {address}\r\nConnection: close\r\n\r\n"
         return _answer(call.ask(request.encode()), location)
 

@@ -134,15 +134,13 @@ class Recorder(AbstractContextManager["Recorder"]):
     def _read(self) -> None:
         assert self._process.stdout is not None
         detail = ""
-        with self._process.stdout as pipe:
+        with suppress(OSError), self._process.stdout as pipe:
             try:
                 for report in self._reports.read(pipe):
                     self._last_report_time = time.monotonic()
                     self._arrive(report)
             except BrokenMessage as error:
                 detail = f"; it said {error}"
-            except OSError:
-                pass
         self._arrive(self._end_message(detail))
 
     def _arrive(self, report: Report) -> None:

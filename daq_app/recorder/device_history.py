@@ -6,6 +6,7 @@ One text file a serial number on this computer, a JSON object a line, only ever 
 import json
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -67,12 +68,10 @@ def _add(info: TransducerInfo, kind: Kind, data: dict[str, Any]) -> None:
         return
     path = _file(info.serial)
     line = json.dumps({"time": datetime.now(UTC).isoformat(timespec="seconds"), "kind": kind, **data})
-    try:
+    with suppress(OSError):  # a full disk must not end a session over this
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a", encoding="utf-8") as file:
             file.write(f"\n{line}\n")  # a line before that a full disk cut short is ended first
-    except OSError:
-        return  # a full disk must not end a session over this
 
 
 def _lines(serial: str) -> list[dict[str, Any]]:
