@@ -2,7 +2,7 @@
 
 import errno
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import usb.core
 import usb.util
@@ -18,21 +18,13 @@ _LARGEST = 64  # bytes in a packet of a full-speed bulk endpoint
 _WRITE_MS = 300
 
 
-class Endpoints(NamedTuple):
-    """Addresses of a device's bulk endpoints."""
-
-    requests: int
-    answers: int
-    stream: int
-
-
 class UsbLink:
     """One device, which nobody else can open meanwhile. What is received after a request is its answer."""
 
-    def __init__(self, device: Any, endpoints: Endpoints, location: str) -> None:  # noqa: ANN401 - pyusb has no types
-        """Take a device that was found. Raises SetupError when another program has it or it is not permitted."""
+    def __init__(self, device: Any, endpoints: tuple[int, int, int], location: str) -> None:  # noqa: ANN401 - no types
+        """Take a device with `endpoints` for requests, answers and stream. Raises SetupError when it cannot be had."""
         self._device = device
-        self._endpoints = endpoints
+        self._requests, self._answers, self._stream = endpoints
         self._location = location
         self._awaits_answer = False
         try:
@@ -47,7 +39,7 @@ class UsbLink:
 
     def send(self, data: bytes) -> None:
         try:
-            self._device.write(self._endpoints.requests, data, _WRITE_MS)
+            self._device.write(self._requests, data, _WRITE_MS)
         except _core.USBError as error:
             raise LinkLost(f"{self._location} takes no bytes any more: {_reason(error)}") from None
         self._awaits_answer = True
@@ -55,7 +47,7 @@ class UsbLink:
     def receive(self, timeout: float) -> bytes | None:
         """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
         awaits = self._awaits_answer
-        endpoint = self._endpoints.answers if awaits else self._endpoints.stream
+        endpoint = self._answers if awaits else self._stream
         packets: list[bytes] = []
         wait_ms = max(round(timeout * 1000), 1)
         while len(packets) < (1 if awaits else _PACKETS):

@@ -1,7 +1,5 @@
 """The pictures of the accuracy page, each with the numbers it shows."""
 
-# matplotlib does not type the keyword arguments it passes on.
-
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
 from typing import Literal, TypeVar

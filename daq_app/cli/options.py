@@ -31,10 +31,9 @@ def number_in_range(
     def parse(text: str) -> float:
         try:
             value = number_type(text)
+            label = str(value) if number_type is int else f"{value:g}"
         except ValueError:
             value, label = math.nan, repr(text)
-        else:
-            label = str(value) if number_type is int else f"{value:g}"
         if not least <= value <= greatest:
             raise WrongValue(f"{name} {label} is not allowed: {allowed or usual}{point_advice(text)}")
         return value if per == 1 else value / per

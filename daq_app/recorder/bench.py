@@ -171,11 +171,8 @@ class Bench:
         self.connected.transducer.start()
 
     def _open(self, uri: str) -> None:
-        with ExitStack() as stack:
-            connection = stack.enter_context(connect(uri, self._clock))
-            self._stack = stack.pop_all()
-        self.connected, self.uri = connection, uri
-        self._display.device(connection.transducer.info)
+        self.connected, self.uri = self._stack.enter_context(connect(uri, self._clock)), uri
+        self._display.device(self.connected.transducer.info)
 
     def _close(self) -> None:
         self.end_tare("the transducer is no longer connected")

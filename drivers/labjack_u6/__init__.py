@@ -15,12 +15,12 @@ from drivers.labjack_u6 import wire
 from drivers.readings import RecordDecoder
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
-from drivers.usb_link import Endpoints, UsbLink, devices
+from drivers.usb_link import UsbLink, devices
 
 _ANSWER = 1.0  # for an answer [real s], as in the maker's own driver
 _WRAP = 256 * wire.SCANS  # scans after which the packet counter restarts
 _VENDOR, _PRODUCT = 0x0CD5, 0x0006
-_ENDPOINTS = Endpoints(0x01, 0x82, 0x83)
+_ENDPOINTS = 0x01, 0x82, 0x83
 _OPTIONS = frozenset({"serial", "cal", "rate"})
 
 

@@ -68,12 +68,11 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
     if language == source.language:
         raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
     earlier = {text.block: text for text in source.translations if text.language == language}
-    texts: list[Translation] = []
+    before = source.pre_evaluation
+    texts = [] if before is None else [Translation(language, PRE_EVALUATION, before.instruction)]
     for block in source.blocks:
         question = block.question or usual_question(block.descriptor)
         texts.append(Translation(language, block.name, block.instruction, block.scale_ends, question))
-    if source.pre_evaluation is not None:
-        texts.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))
     lines: list[str] = []
     for text in texts:
         mark = "" if text.block in earlier else f"# to be translated from {source.language}\n"
