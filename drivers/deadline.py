@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -70,6 +71,9 @@ class Deadline:
     def bound(self, link: Link) -> "_BoundLink":
         """Return the link, whose use ends by this deadline."""
         return _BoundLink(link, self)
+
+
+Connect = Callable[[Deadline], Link]  # opens a link within a limit
 
 
 @dataclass(eq=False)

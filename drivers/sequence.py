@@ -18,6 +18,7 @@ from drivers.arrays import Indices
 WRAP = 2**32
 _NEAR = 10_000  # farthest number behind at which a rejected record was late; beyond, it was garbage
 
+Words = NDArray[np.uint32]  # as sent
 Relation = Literal["same", "next", "frozen", "behind", "off"]
 
 
@@ -66,14 +67,7 @@ class SequenceAccount:
         self._sequence = 0  # unwrapped number and counter of the last record kept
         self._counter = 0
 
-    def take(
-        self,
-        numbers: NDArray[np.uint32],
-        counters: NDArray[np.uint32],
-        received_ns: Sequence[int],
-        *,
-        end: bool = False,
-    ) -> Accounting:
+    def take(self, numbers: Words, counters: Words, received_ns: Sequence[int], *, end: bool = False) -> Accounting:
         """Judge a batch of n records: their numbers (n,), counters (n,) and when they arrived (n) [ns].
 
         With `end` no further batch will come, and nothing is held back.
@@ -84,9 +78,7 @@ class SequenceAccount:
             [_Record(*record) for record in zip(numbers.tolist(), counters.tolist(), received_ns, strict=True)], end
         )
 
-    def _on_the_line(
-        self, numbers: NDArray[np.uint32], counters: NDArray[np.uint32], received_ns: Sequence[int]
-    ) -> Accounting | None:
+    def _on_the_line(self, numbers: Words, counters: Words, received_ns: Sequence[int]) -> Accounting | None:
         """Return the verdict when every record lies ahead on the line, gaps or not, and None otherwise."""
         last = self._last
         if last is None or self.step is None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from drivers.clock import Clock
 from drivers.clock_recovery import ClockRecovery, Placement, ScanCount, rate_of_least_late, rate_words
-from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link
+from drivers.deadline import CONNECTING, ENDING, TICK, Connect, Deadline, Link
 from drivers.readings import ReadingBlock, RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
 from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
@@ -98,13 +98,7 @@ class StreamingTransducer(ThreadedTransducer):
     longest_wait = TICK
 
     def __init__(
-        self,
-        info: TransducerInfo,
-        connect: Callable[[Deadline], Link],
-        conversation: Conversation,
-        clock: Clock,
-        *,
-        opening: Deadline | None = None,
+        self, info: TransducerInfo, connect: Connect, conversation: Conversation, clock: Clock, *, opening: Deadline
     ) -> None:
         """Take an identified device whose `info.rate` [Hz] is known within a few per cent, opened by `opening`."""
         super().__init__(info, clock, opening)

@@ -56,7 +56,7 @@ AXIA = Product("SIMULATED Ethernet Axia80", 7812.5, 1 << 31 | 1 << 30, "7812")
 class Pages:
     """The box's settings, kept over a reboot as the real one keeps them."""
 
-    def __init__(self, serial: str, rated: Array, rate: int, product: Product = NET_FT) -> None:
+    def __init__(self, serial: str, rated: Array, rate: int, product: Product) -> None:
         self.product = product
         self._serial = serial
         self._rated = rated  # (6,) [N, N mm]
@@ -184,14 +184,7 @@ class Electronics:
     """The box without its ports. Times are the bench's [s]; a reading after its number is 32 bytes."""
 
     def __init__(
-        self,
-        bench: Bench,
-        faults: Faults,
-        *,
-        rate: int,
-        first_tick: int,
-        rate_error: float = 0.0,
-        product: Product = NET_FT,
+        self, bench: Bench, faults: Faults, *, rate: int, first_tick: int, rate_error: float = 0.0, product: Product
     ) -> None:
         """Switch on at time 0 with the counter at `first_tick`, running wrong by `rate_error` [-]."""
         self._bench = bench

@@ -1,7 +1,7 @@
 """Numbers made from a session: made, kept in its folder, and made once more to verify them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -60,16 +60,13 @@ def analyse_session(
     if gain_error is None:
         gain_error = gain_error_set(recording.folder)
     else:
-        try:
-            set_gain_error(recording.folder, gain_error)
-        except RecordingError as error:
-            console.lose(error)
+        _keep(console, set_gain_error, recording.folder, gain_error)
     settings = settings_of(previous)
     bootstrap_seed = settings.bootstrap_seed if seed is None else seed
     analysis = analyse(
         recording, AnalysisSettings(area=area or settings.area, gain_error=gain_error, bootstrap_seed=bootstrap_seed)
     )
-    _store(recording, ANALYSIS, analysis_document(analysis), console)
+    _keep(console, store_derived, recording.folder, ANALYSIS, analysis_document(analysis))
     return analysis
 
 
@@ -156,7 +153,7 @@ def predict_session(
     previous = _read_or_empty(recording, PREDICTION)
     document = _with_firing(prediction, afferent or _afferent_of(previous))
     lost = _dropped_parts(previous, prediction.options)
-    if _store(recording, PREDICTION, document, console) and lost:
+    if _keep(console, store_derived, recording.folder, PREDICTION, document) and lost:
         console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
     return prediction
 
@@ -283,10 +280,10 @@ def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
     return OpenVisit(recording)
 
 
-def _store(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> bool:
-    """Store a document in the session's folder; name a folder that cannot be written, and return whether it could."""
+def _keep(console: Console, store: Callable[..., object], *facts: object) -> bool:
+    """Keep facts in a session's folder; name a folder that cannot be written, and return whether it could."""
     try:
-        store_derived(recording.folder, name, document)
+        store(*facts)
     except RecordingError as error:
         console.lose(error)
         return False

@@ -34,7 +34,6 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Self
 
 from daq_app.child_process import interpreter, use_one_thread
@@ -80,9 +79,7 @@ class Recorder(AbstractContextManager["Recorder"]):
         )
         return cls(process, wake)
 
-    def __exit__(
-        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
         """Close it; where somebody pressed Ctrl-C without waiting."""
         self.close(0.0 if error_type is not None and issubclass(error_type, KeyboardInterrupt) else _PATIENCE)
 

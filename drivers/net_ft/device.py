@@ -11,7 +11,7 @@ import numpy as np
 from drivers.arrays import Indices
 from drivers.clock import Clock
 from drivers.clock_recovery import RateWatch, rate_words
-from drivers.deadline import ENDING, Deadline, Link
+from drivers.deadline import ENDING, Connect, Deadline, Link
 from drivers.net_ft.wire import START, STOP, decode
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
@@ -112,7 +112,7 @@ class NetFtTransducer(ThreadedTransducer):
     def __init__(
         self,
         info: TransducerInfo,
-        connect: Callable[[Deadline], Link],
+        connect: Connect,
         identify: Callable[[], TransducerInfo | None],
         clock: Clock,
         request: bytes = START,

@@ -75,7 +75,7 @@ class Line:
 def transducer_on(line):
     calibration = Calibration("FT1", "counts", np.eye(6), np.full(6, np.nan), "a test")
     info = TransducerInfo("test://line", "test", "Test", "FT1", False, RATE, np.nan, calibration)
-    return StreamingTransducer(info, lambda _: line, PlainConversation(), RealClock())
+    return StreamingTransducer(info, lambda _: line, PlainConversation(), RealClock(), opening=Deadline.for_opening())
 
 
 def test_a_device_is_not_taken_to_be_silent_while_this_computer_was_busy():

@@ -19,7 +19,7 @@ from drivers.transducer import SetupError
 from simulators.bench import Bench, BenchSettings
 from simulators.faults import Fault, Faults
 from simulators.net_ft_box import NetFtBox
-from simulators.net_ft_electronics import Electronics
+from simulators.net_ft_electronics import NET_FT, Electronics
 
 QUIET = BenchSettings(
     noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_torque=0.0, offset=(1, -2, 5, 125, 0, 0)
@@ -216,7 +216,8 @@ def test_both_counters_wrap(start_box):
 
 def test_an_oscillator_that_is_wrong_counts_more_ticks_in_the_same_time():
     exact, fast = (
-        Electronics(Bench(1, QUIET), Faults(), rate=200, rate_error=error, first_tick=50) for error in (0.0, 0.005)
+        Electronics(Bench(1, QUIET), Faults(), rate=200, rate_error=error, first_tick=50, product=NET_FT)
+        for error in (0.0, 0.005)
     )
     assert exact.tick(4.0) - exact.tick(0.0) == 4 * 7000
     assert fast.tick(4.0) - fast.tick(0.0) == pytest.approx(4 * 7000 * 1.005, abs=1)

@@ -21,6 +21,7 @@ from drivers.net_ft.wire import NET_FT
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 from simulators.bench import Bench
 from simulators.faults import Fault
+from simulators.net_ft_electronics import NET_FT as BOX
 from simulators.net_ft_electronics import Electronics
 
 START = bytes.fromhex("1234 0002 00000000")
@@ -151,7 +152,7 @@ FAULTS = st.lists(
 @given(timetable=FAULTS, seed=st.integers(0, 1000))
 def test_every_reading_is_received_or_named_as_lost_whatever_befalls_it(timetable, seed):
     faults = Ledger(timetable, seed=seed)
-    box = Electronics(Bench(seed), faults, rate=200, first_tick=0)
+    box = Electronics(Bench(seed), faults, rate=200, first_tick=0, product=BOX)
     for k in range(200):
         faults.route(k / 200, [(k / 200, struct.pack(">I", k + 1) + box.readings([35 * k])[0])])
     faults.route(2.0, [])
