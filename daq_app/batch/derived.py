@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from daq_app.console import Console, WrongValue
 from sessions.file_access import as_type
@@ -253,16 +253,13 @@ def decisions_of(document: Mapping[str, Any]) -> Decisions:
         raise SettingsError(f"the decisions stored with it are damaged: {error}") from error
 
 
-class OpenVisit(NamedTuple):
-    """A session with all that is known of its stimuli, and of its study where that was named."""
+def open_visit(
+    path: Path, subject: str | None, console: Console
+) -> tuple[Recording, tuple[Recording, ...], tuple[str, ...]]:
+    """Return a session, or a visit to a study with its other sessions, and a sentence for each that cannot be read.
 
-    recording: Recording
-    other_sessions: tuple[Recording, ...] = ()  # every other session of the study
-    unreadable: tuple[str, ...] = ()  # a sentence for each session of the study that cannot be read
-
-
-def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
-    """Return a session, or a visit to a study; names unreadable ones. Raises RecordingError, StudyError, WrongValue."""
+    Raises RecordingError, StudyError, WrongValue.
+    """
     if is_study(path):
         if subject is None:
             raise WrongValue(f"{path} is a study: say whose visit with --subject")
@@ -273,11 +270,11 @@ def open_visit(path: Path, subject: str | None, console: Console) -> OpenVisit:
             raise StudyError(
                 f"{subject} has no visit with forces in {path}: run one with --device, or give another code"
             )
-        return OpenVisit(visit, tuple(session for session in sessions if session is not visit), unreadable)
+        return visit, tuple(session for session in sessions if session is not visit), unreadable
     recording = reveal(Recording.open(path))
     if subject not in (None, recording.plan.subject):
         raise WrongValue(f"--subject {subject} is not allowed: {path} is a session of {recording.plan.subject}")
-    return OpenVisit(recording)
+    return recording, (), ()
 
 
 def _keep(console: Console, store: Callable[..., object], *facts: object) -> bool:
