@@ -47,7 +47,6 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
         timings = [(error, 1e3 * span, row) for error, span, row in spans if error is not None and span is not None]
         if not timings:
             continue
-        colour = _COLOURS[kinematics]
         points = [
             (error, span, error < 3.0 * doubt[kinematics], f"{kinematics} strain: {row.dofs} unknowns, ", "")
             for error, span, row in timings
@@ -55,9 +54,8 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
         _curve(sheet, kinematics, points)
         table += [(kinematics, row.dofs, error, 1e-3 * span) for error, span, row in timings]
         error, span, _ = timings[-1]
-        axes.annotate(
-            f"{kinematics} strain", (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour
-        )
+        colour, position = _COLOURS[kinematics], (100 * error, span)
+        axes.annotate(f"{kinematics} strain", position, xytext=(4, 5), textcoords="offset points", color=colour)
     if not table:
         return None
     _logarithmic(axes)

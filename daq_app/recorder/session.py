@@ -253,10 +253,8 @@ class _Operator:
         """Send what became safe, and remember whether a finger touches."""
         for event in events:
             self._send(event)
-            if event.kind in ("contact_onset", "finger_lifted"):
+            if event.kind in ("contact_onset", "finger_lifted", "take_discarded"):
                 self._touching = event.kind == "contact_onset"
-            elif event.kind == "take_discarded":
-                self._touching = False
             elif event.kind == "zeroed":
                 self._display.set_zero(tuple(event.data["mean"]))
                 if self._info is not None:
