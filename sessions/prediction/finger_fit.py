@@ -112,7 +112,7 @@ class Likelihood:
     """What presses say of a finger, by a model of them."""
 
     def __init__(self, model: PressModel, presses: Sequence[LoadingCurve]) -> None:
-        """Take presses. Raises FitError where they are too few."""
+        """Raise FitError where presses are too few."""
         self.model = model
         self.force, self.displacement, width = (
             np.concatenate([getattr(press, name) for press in presses]) for name in ("force", "displacement", "width")
@@ -222,8 +222,8 @@ def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 
     `gain_error` is the force's standard uncertainty [-], `seed` that of draws. Raises FitError for too few points.
     """
     likelihood = Likelihood(model, presses)
-    start = np.array([press.touch for press in presses])
-    coarse = likelihood.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
+    touches = np.array([press.touch for press in presses])
+    coarse = likelihood.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), touches)
     fine = _closer(likelihood, coarse, "weight")
     grids = [coarse, fine, _closer(likelihood, coarse, "likelihood")]
     contrast, touch, mean = likelihood.maximum(fine)

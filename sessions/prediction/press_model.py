@@ -106,8 +106,7 @@ def press_model(
         errors += [press.normal_force_error or 0.0 for press in presses]
         width_error += np.array([press.contact_width_error or 0.0 for press in presses]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
-    targets = np.vstack([force, slope[:, 0], slope[:, 1]])
-    coefficients = _fit(basis, targets)
+    coefficients = _fit(basis, np.vstack([force, slope[:, 0], slope[:, 1]]))
     residual = basis[: len(contrast)] @ coefficients - force
     if mu:
         shape = np.empty((len(sticking), DEPTHS))

@@ -196,13 +196,12 @@ def seds_at(
 ) -> tuple[float | None, ...]:
     """Return the settled SED [MPa] by mu, tau_max [MPa], depth [mm], direction and speed; None where none settles."""
     base = template(options)
-    course = Solve(options.kinematics, "steady", base.solve.tolerance)
     scenes = [
         replace(
             base,
             friction=Friction(mu, bound(tau_max, options)),
             loading=Loading(depth, SLIDES[direction], speed),
-            solve=course,
+            solve=Solve(options.kinematics, "steady", base.solve.tolerance),
         )
         for mu, tau_max, depth, direction, speed in strokes
     ]

@@ -276,11 +276,10 @@ def _with_former_names(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a prediction with each of its options called as it is now, and by that name alone."""
-    tables = {name: document.get(name) for name in ("options", "options_origin")}
     names = {
         name: {_PRESENT_NAMES.get(key, key): value for key, value in cast("dict[str, Any]", table).items()}
-        for name, table in tables.items()
-        if isinstance(table, dict)
+        for name in ("options", "options_origin")
+        if isinstance(table := document.get(name), dict)
     }
     return {**document, **names}
 

@@ -61,12 +61,11 @@ def with_intervals(
     if not prediction.options.intervals:
         return prediction
     rows = prediction.trials
-    draws = draws_of(analysis, prediction)
     answers: list[Prediction | str] = [row.prediction or _reason(row, "sed") for row in rows]
     if both_ways:
         answers += [row.opposite or _reason(row, "opposite_sed") for row in rows]
-    columns = [*draws, *draws][: len(answers)]
-    intervals = iter(intervals_of(answers, columns, tau_scale(prediction.options), progress))
+    draws = (draws_of(analysis, prediction) * 2)[: len(answers)]
+    intervals = iter(intervals_of(answers, draws, tau_scale(prediction.options), progress))
     with_own = [replace(row, interval=next(intervals)) for row in rows]
     trials = tuple(replace(row, opposite_interval=next(intervals, None)) for row in with_own)
     return replace(prediction, trials=trials)

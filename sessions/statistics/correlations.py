@@ -185,8 +185,7 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
 
     Correlations as for `steiger_z`, which says when there is none; a negative one is turned round with its variable.
     """
-    sign = math.copysign(1.0, first) * math.copysign(1.0, second)
-    first, second, mutual = abs(first), abs(second), sign * mutual
+    first, second, mutual = abs(first), abs(second), math.copysign(1.0, first * second) * mutual
     z = steiger_z(first, second, mutual, n)
     if z is None:
         return None

@@ -277,10 +277,9 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
         return None
     no_logarithm = {subject for subject, _, value in rows if value <= 0.0}
     logs = [(subject, row, math.log(value)) for subject, row, value in rows if subject not in no_logarithm]
-    by_subject = by_key((subject, (row.index, log)) for subject, row, log in logs)
     table = {
         subject: {index: float(np.mean(values)) for index, values in by_key(pairs).items()}
-        for subject, pairs in sorted(by_subject.items())
+        for subject, pairs in sorted(by_key((subject, (row.index, log)) for subject, row, log in logs).items())
     }
     points = [(subject, row.index, x, log) for subject, row, log in logs if (x := row.response(quantity)) is not None]
     left_out = tuple(sorted(no_logarithm))

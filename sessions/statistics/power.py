@@ -84,8 +84,7 @@ def _study(
     effects: AssumedEffects, people: int, count: int, rng: np.random.Generator
 ) -> tuple[list[str], Array, Array]:
     """Return subject, µ as measured and score of each trial."""
-    mu = np.linspace(*MU_RANGE, count)
-    stroke_mu = mu * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
+    stroke_mu = np.linspace(*MU_RANGE, count) * np.exp(rng.normal(0.0, effects.friction_sd, (people, count)))
     slope = effects.effect * (1.0 + effects.slope_sd * rng.standard_normal((people, 1))) / (MU_RANGE[1] - MU_RANGE[0])
     level = _MIDDLE + effects.level_sd * rng.standard_normal((people, 1))
     scores = level + slope * (stroke_mu - np.mean(MU_RANGE)) + effects.noise * rng.standard_normal((people, count))

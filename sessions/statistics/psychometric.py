@@ -74,8 +74,7 @@ def psychometric(levels: Sequence[Level]) -> Psychometric:
     """Return the function fitted to answers."""
     levels = [level for level in levels if level.presented]
     none = Psychometric(sum(level.presented for level in levels))
-    ratios = {level.log_ratio for level in levels}
-    if len(ratios) < LEAST_LEVELS:
+    if len({level.log_ratio for level in levels}) < LEAST_LEVELS:
         return replace(none, reason=f"it takes {LEAST_LEVELS} comparisons of different friction")
     fit = _ProfileLikelihood(levels)
     if fit.flat:

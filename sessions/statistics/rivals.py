@@ -153,12 +153,11 @@ def _compare(rival: Rival, model: Sequence[float], values: Sequence[float], scor
     rho = spearman(model, values)
     if first is None or second is None or mutual is None or rho is None:
         return _because(rival, contrast="too few surfaces have both, or one of them does not vary")
-    sign = math.copysign(1.0, first * second)
     rival = replace(
         rival,
         contrast=contrast(first, second, mutual, len(score)),
         same_order=abs(rho) > 1 - 1e-12,
-        needed=required_cases(abs(first), abs(second), sign * mutual),
+        needed=required_cases(abs(first), abs(second), math.copysign(1.0, first * second) * mutual),
     )
     return _because(rival, contrast=None if rival.contrast else "no test from these few surfaces, or of a perfect r")
 

@@ -214,8 +214,7 @@ def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
     meetings, wins = counts
     eta = fitted[:-1, None] - fitted[None, :-1] + fitted[-1]
     pairs = meetings > 0
-    chance = _chances(eta, model)[0][pairs]
-    deviance = binomial_deviance(wins[pairs], meetings[pairs], chance)
+    deviance = binomial_deviance(wins[pairs], meetings[pairs], _chances(eta, model)[0][pairs])
     return deviance, int(pairs.sum()) - len(fitted) + 1
 
 

@@ -37,7 +37,6 @@ class Exclusion:
     descriptor: str = ""  # "" for all
 
     def __post_init__(self) -> None:
-        """Refuse a decision without a subject, a reason or an author."""
         for key, content in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
             if not getattr(self, key).strip():
                 raise NotAllowed(key, getattr(self, key), f"{content}, not empty")

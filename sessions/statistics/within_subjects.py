@@ -159,8 +159,7 @@ def differences(table: Table) -> tuple[Difference, ...]:
     indices = sorted({index for row in table.values() for index in row})
     rows: list[Difference] = []
     for lower, higher in itertools.combinations(indices, 2):
-        steps = [round(row[higher] - row[lower], 9) for row in table.values() if lower in row and higher in row]
-        step = average(steps)
+        step = average([round(row[higher] - row[lower], 9) for row in table.values() if {lower, higher} <= row.keys()])
         if step is not None and step.n > 2 and step.sd and (ends := bounds(step.low, step.high)) is not None:
             p = 2.0 * float(special.stdtr(step.n - 1, -abs(step.mean) * math.sqrt(step.n) / step.sd))
             rows.append(Difference(lower, higher, step.n, step.mean, *ends, p, p))

@@ -107,8 +107,7 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
     agrees = None
     if stroke.direction is not None and "heading" in repeats:  # where it lies within 60 degrees of that reported
         agrees = float(np.mean(stroke.direction * np.cos(np.radians(repeats["heading"])) >= 0.5))
-    intervals = {name: interval(name) for name in NUMBERS}
-    return StrokeIntervals(number, stroke.trial, **intervals, direction_agrees=agrees)
+    return StrokeIntervals(number, stroke.trial, **{name: interval(name) for name in NUMBERS}, direction_agrees=agrees)
 
 
 def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:

@@ -379,6 +379,5 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
 def _reversal(wrench: Array, run: _DragRun, following: _DragRun) -> int:
     """Return the reading of a wrench (n, 6) from which on the drag points the `following` way."""
     change = following.push / np.hypot(*following.push) - run.push / np.hypot(*run.push)
-    components = wrench[run.first : following.last + 1, :2] @ change
-    before_next = components[: following.first - run.first + 1]
+    before_next = wrench[run.first : following.first + 1, :2] @ change
     return run.first + int(np.flatnonzero(before_next < 0.0)[-1]) + 1

@@ -145,9 +145,8 @@ def span_of(
 
 def _least_step(torques: Array) -> float:
     """Return the least step between different readings of a torque, if steps are few enough to be seen."""
-    columns = (np.unique(column) for column in torques.T)
     # Where most values come more than once the steps are the sensor's own.
-    levels = (column for column in columns if 1 < len(column) < len(torques) / 2)
+    levels = (column for column in map(np.unique, torques.T) if 1 < len(column) < len(torques) / 2)
     return max((float(np.median(np.diff(column))) for column in levels), default=0.0)
 
 

@@ -63,7 +63,6 @@ class StrokeCurve:
     crest_gap: float = 0.0  # how far readings may miss its greatest value [N]
 
     def __post_init__(self) -> None:
-        """Make the columns read-only views."""
         for column in fields(self)[:8]:
             view = getattr(self, column.name).view()
             view.flags.writeable = False

@@ -144,8 +144,7 @@ def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[C
     normal, smooth = zero.level[2] - span.wrench[:, 2], zero.level[2] - span.smooth[:, 2]
     noise = float(zero.noise[2])
     if zero.flaw is FlawName.NO_UNLOADED_STRETCH:
-        threshold = settings.contact.light_share * float(np.percentile(normal, 99.9))
-        noise = threshold / settings.detector.onset_noise
+        noise = settings.contact.light_share * float(np.percentile(normal, 99.9)) / settings.detector.onset_noise
     idle = np.ones(len(span.time), np.bool_)
     pieces: list[Contact] = []
     for contact in find_contacts(span.time, normal, Baseline(0.0, noise), settings):
@@ -266,8 +265,7 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
     start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
     if stop - start < limits.press_shortest or not displacement(track.position[hold]) <= limits.press_moves:
         return None
-    values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
-    blocks = block_means(values, track.rate, settings)
+    blocks = block_means(np.column_stack([track.wrench[hold, :2], track.normal[hold]]), track.rate, settings)
     if len(blocks) < limits.press_fewest:
         return None
     ratio = -blocks[:, :2] / blocks[:, 2:]
