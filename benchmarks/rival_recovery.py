@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sessions.prediction.surface_series import AREA, StudyDesign, simulated_strokes
-from sessions.statistics.power import AssumedEffects, preferred_rivals, study_weights, twins
+from sessions.statistics.power import AssumedEffects, study_weights, twins
 from solver.quantities import NAMES
 from solver.scene.published import STICKINESS
 
@@ -42,7 +42,7 @@ STUDIES = (("10 × 5", 10, PAPER), ("20 × 12", 20, WIDE), ("24 × 8 × 3", 24, 
 
 def row(study: str, quantity: str, alike: set[str], weights: Sequence[Mapping[str, float]]) -> str:
     """Return a row of the table: how often the quantity, a twin of it, and a wrong one is preferred or decided."""
-    first = preferred_rivals(weights)
+    first = [max(weight, key=weight.__getitem__) for weight in weights]
     sure = [name for name, study_weight in zip(first, weights, strict=True) if study_weight[name] >= DECISIVE_WEIGHT]
     wrong = [name for name in first if name not in alike]
     most = f"`{max(sorted(set(wrong)), key=wrong.count)}`" if wrong else "–"

@@ -54,9 +54,7 @@ def model_inputs(analysis: Analysis, plan: SessionPlan, options: PredictionOptio
     if not plan.forces:
         return
     by_trial = {friction.trial: friction for friction in analysis.friction}
-    first_stroke: dict[int | None, int] = {}
-    for number, stroke in enumerate(analysis.strokes):
-        first_stroke.setdefault(stroke.trial, number)
+    first_stroke = {stroke.trial: number for number, stroke in reversed([*enumerate(analysis.strokes)])}
     for block in plan.blocks:
         for trial in block.trials if block.phase == "main" else ():
             friction = by_trial.get(trial.number)

@@ -248,11 +248,9 @@ def _correlation_within(points: Points) -> RepeatedCorrelation | None:
 
 def _without_subject(points: Points) -> tuple[tuple[str, float], ...]:
     """Return the correlation within subjects when each subject in turn is left out."""
-    rows: list[tuple[str, float]] = []
-    for subject in dict.fromkeys(point[0] for point in points):
-        repeated = _correlation_within([point for point in points if point[0] != subject])
-        rows += [] if repeated is None else [(subject, repeated.r)]
-    return tuple(rows)
+    subjects = dict.fromkeys(point[0] for point in points)
+    rows = ((subject, _correlation_within([point for point in points if point[0] != subject])) for subject in subjects)
+    return tuple((subject, repeated.r) for subject, repeated in rows if repeated is not None)
 
 
 def _normalise(table: Table, points: Points) -> NormalisedScores:

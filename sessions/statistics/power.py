@@ -128,7 +128,7 @@ def recovery(
     """Return how often studies of so many of the people in `strokes` prefer the quantity that scores follow."""
     surfaces = strokes[quantity].shape[1] // len(depths)
     weights = [study_weights(strokes, people, surfaces, quantity, effects, draw) for _ in range(studies)]
-    twin_names, preferred = twins(strokes, quantity), preferred_rivals(weights)
+    twin_names, preferred = twins(strokes, quantity), [max(study, key=study.__getitem__) for study in weights]
     shares = preferred.count(quantity) / studies, sum(name in twin_names for name in preferred) / studies
     return Recovery(people, surfaces, depths, quantity, tuple(sorted(twin_names - {quantity})), *shares, studies)
 
@@ -164,11 +164,6 @@ def study_weights(
     }
     known_deviances = {name: value for name, value in deviances.items() if value is not None}
     return dict(zip(known_deviances, akaike_weights(list(known_deviances.values())), strict=True))
-
-
-def preferred_rivals(weights: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return the rival of the greatest weight in each study."""
-    return [max(study, key=study.__getitem__) for study in weights]
 
 
 def twins(strokes: Mapping[str, Array], quantity: str) -> set[str]:

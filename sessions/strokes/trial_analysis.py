@@ -203,9 +203,8 @@ def _measure(
     strokes: list[Stroke] = []
     presses: list[Press] = []
     for index, (piece, decisions) in enumerate(zip(pieces, by_stroke, strict=True)):
-        stroke_zero = zero
-        if not context.zero_is_stated:
-            stroke_zero = zero_for(span, piece, idle) or recorded_zero(span, is_stated=False)
+        own_zero = zero if context.zero_is_stated else zero_for(span, piece, idle)
+        stroke_zero = own_zero or recorded_zero(span, is_stated=False)
         stroke, stroke_flaws = measure_stroke(span, piece, stroke_zero, context.plan, trial, index + 1, decisions)
         flaws += [replace(flaw, stroke=index) for flaw in stroke_flaws]
         strokes.append(stroke)
