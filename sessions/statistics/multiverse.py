@@ -106,13 +106,12 @@ def trial_paths(
     choice. Raises as `predict` does.
     """
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
-    steady = replace(prediction.options, course="steady")
     analyses = _analyses(recording)
     usual_friction = {friction.trial: friction for friction in next(iter(analyses.values())).friction}
     scenes: dict[Path, Mapping[int, Scene]] = {}  # for either receptor
     for path in paths:
         if path.receptor == RECEPTORS[0]:
-            options = replace(steady, kinematics=path.kinematics)
+            options = replace(prediction.options, course="steady", kinematics=path.kinematics)
             scenes[path] = scenes_of(_path_analysis(analyses, path, usual_friction), recording.plan, options)
     targets = dict.fromkeys(scene for by_trial in scenes.values() for scene in by_trial.values())
     predictions = [row.prediction for row in prediction.trials if row.prediction is not None]
@@ -301,9 +300,8 @@ def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, FiveNumb
     values = correlations(findings)
     rows: list[tuple[str, str, FiveNumberSummary | None, bool]] = []
     for choice in CHOICES:
-        names = dict.fromkeys(getattr(finding.path, choice) for finding in findings)
         usual = {getattr(finding.path, choice) for finding in findings if finding.usual}
-        for name in names:
+        for name in dict.fromkeys(getattr(finding.path, choice) for finding in findings):
             subset = [r for finding, r in zip(findings, values, strict=True) if getattr(finding.path, choice) == name]
             rows.append((choice, name, five_number_summary(subset), name in usual))
     return tuple(rows)

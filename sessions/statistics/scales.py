@@ -166,9 +166,8 @@ def _chances(eta: Array, model: Model) -> tuple[Array, Array]:
 def _fit(counts: Array, model: Model, start: Array | None = None) -> Array | None:
     """Return the values about their mean and then the first's advantage (n + 1,); None without a finite maximum."""
     meetings, wins = counts
-    design = _design(len(meetings))
     pairs = meetings > 0
-    x, n, y = design[pairs], meetings[pairs], wins[pairs]
+    x, n, y = _design(len(meetings))[pairs], meetings[pairs], wins[pairs]
     beta = np.zeros(x.shape[1])
     if start is not None:
         beta = np.append(start[:-2] - start[-2], start[-1])

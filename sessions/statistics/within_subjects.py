@@ -117,9 +117,8 @@ def _jackknife(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], fl
 
     None of two subjects, of subjects who are all alike, or where r is ±1 without one of them.
     """
-    count = len(xy)
     others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
-    if count < LEAST_CASES or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
+    if len(xy) < LEAST_CASES or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     low, high, p = map(float, jackknife(z, np.arctanh(others_xy / size)))
@@ -156,9 +155,8 @@ class Difference:
 
 def differences(table: Table) -> tuple[Difference, ...]:
     """Return the difference of each pair of stimuli, of the subjects who scored both; at least three of them."""
-    indices = sorted({index for row in table.values() for index in row})
     rows: list[Difference] = []
-    for lower, higher in itertools.combinations(indices, 2):
+    for lower, higher in itertools.combinations(sorted({index for row in table.values() for index in row}), 2):
         step = average([round(row[higher] - row[lower], 9) for row in table.values() if {lower, higher} <= row.keys()])
         if step is not None and step.n > 2 and step.sd and (ends := bounds(step.low, step.high)) is not None:
             p = 2.0 * float(special.stdtr(step.n - 1, -abs(step.mean) * math.sqrt(step.n) / step.sd))

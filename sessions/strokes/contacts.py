@@ -320,7 +320,6 @@ def split_at_reversals(
     reversals = [contact.start + _reversal(stretch, run, following) for run, following in pairwise(runs)]
     if not reversals:
         return (contact,)
-    bounds = [contact.start, *reversals, contact.stop]
     return tuple(
         replace(
             contact,
@@ -331,7 +330,7 @@ def split_at_reversals(
             reversals=tuple(reversal for reversal in reversals if reversal in (start, stop)),
             uncut=contact,
         )
-        for start, stop in pairwise(bounds)
+        for start, stop in pairwise([contact.start, *reversals, contact.stop])
     )
 
 

@@ -271,10 +271,9 @@ def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) 
     if np.hypot(*ratio.mean(axis=0)) > limits.press_ratio:
         return None
     scatter = ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))
-    error = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean())))
+    error_x, error_y = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean()))).tolist()
     # What was levelled before counts too: the lean is that against the transducer.
     x, y = (np.degrees(np.arctan(ratio.mean(axis=0))) + settings.tilt).tolist()
-    error_x, error_y = error.tolist()
     return Press(trial, start, stop, (x, y), (error_x, error_y))
 
 
