@@ -14,7 +14,6 @@ from solver import Friction, Loading, Scene, SceneError, Solve
 from solver.quantities import NAMES
 from solver.response.receptor_row import rough_responses
 from solver.scene.published import SLIPPERINESS, STICKINESS, Surface, scene
-from solver.scene.published import scene as published
 
 SERIES: Mapping[str, tuple[Surface, ...]] = {"stickiness": STICKINESS, "slipperiness": SLIPPERINESS}
 _SED = NAMES.index("sed")
@@ -80,7 +79,7 @@ def other_signs(finger: Scene) -> list[str]:
 
 
 def _scene(finger: Scene, surface: Surface, press: Press) -> Scene:
-    reference = published(surface)
+    reference = scene(surface)
     depth = press.depth * reference.loading.depth if press.force is None else None
     loading = replace(reference.loading, indentation=depth, normal_force=press.force)
     steady = replace(finger.solve, course="steady")

@@ -29,7 +29,7 @@ from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_models, missing_scores
 from sessions.statistics.findings import StudyFindings
-from sessions.statistics.multiverse import CHOICES
+from sessions.statistics.multiverse import CHOICE_LABELS
 from sessions.statistics.rivals import Rival
 from sessions.statistics.visit import TrialRow, exclusion_of
 from sessions.strokes.stroke import meanings
@@ -209,11 +209,11 @@ def columns_csv(study: StudyFindings) -> str:
 def paths_csv(study: StudyFindings) -> str:
     """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
     columns = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
-    rows: list[list[object]] = [["descriptor", *CHOICES, *columns]]
+    rows: list[list[object]] = [["descriptor", *CHOICE_LABELS, *columns]]
     for descriptor in study.descriptors:
         for path in descriptor.paths:
             numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
-            choices = (getattr(path.path, choice) for choice in CHOICES)
+            choices = (getattr(path.path, choice) for choice in CHOICE_LABELS)
             rows.append([descriptor.descriptor, *choices, "yes" if path.usual else "no", *numbers])
     return _csv(rows, simulated=bool(study.simulated))
 

@@ -21,9 +21,8 @@ from sessions.statistics.scores import indicator_columns, sd_interval
 
 _STARTS = (0.3, 3.0)  # spreads relative to what is left: the search starts from each pair, and the best end is kept
 _WIDEST = 1e3  # such a spread: scores have three figures, and a step of the search may not go beyond
-_NEARBY = (
-    1e-5  # gradient of the deviance at which Newton's method takes over: a tenth or tenfold moves no number by 1e-10
-)
+# Gradient of the deviance at which Newton's method takes over: a tenth or tenfold moves no number by 1e-10.
+_NEARBY = 1e-5
 _SINGULAR = 1e-4  # of the factor's diagonal, as lme4 has it
 _NOTHING = 1e-9  # of the factor: it enters by its square, which is then below round-off
 _STEPS = 6  # of Newton's method, after which nothing moves

@@ -82,7 +82,6 @@ CHOICE_LABELS: Mapping[str, str] = {  # of the fields of a path
     "receptor": "response at the receptor",
     "kinematics": "strain of the model",
 }
-CHOICES = tuple(CHOICE_LABELS)
 
 _FIRST = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(_AREAS)))
 _SMALL = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, _AREAS, RECEPTORS))
@@ -299,7 +298,7 @@ def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, FiveNumb
     """
     values = correlations(findings)
     rows: list[tuple[str, str, FiveNumberSummary | None, bool]] = []
-    for choice in CHOICES:
+    for choice in CHOICE_LABELS:
         usual = {getattr(finding.path, choice) for finding in findings if finding.usual}
         for name in dict.fromkeys(getattr(finding.path, choice) for finding in findings):
             subset = [r for finding, r in zip(findings, values, strict=True) if getattr(finding.path, choice) == name]

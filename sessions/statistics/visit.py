@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from sessions.plan.plan import Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
 from sessions.prediction.sealed_predictions import SEAL_NUMBERS, sealed_sentence
-from sessions.prediction.stored import model_facts
+from sessions.prediction.stored import Number, model_facts
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.derived import gain_error_set, reveal
@@ -61,7 +61,6 @@ def exclusion_of(exclusions: tuple[Exclusion, ...], subject: str, descriptor: st
     return next((exclusion for exclusion in of_subject if exclusion.descriptor in ("", descriptor)), None)
 
 
-Number = float | None
 FORM = 12  # raised when a row holds something else: what was stored before is then computed anew
 NO_INTERVAL = "intervals of the SED were not asked for"
 

@@ -236,10 +236,8 @@ class AnalysisSettings:
     def to_dict(self) -> dict[str, Any]:
         """Return every setting by its group, and for one release each also under its name alone, as it was before."""
         groups = asdict(self)
-        return {name: value for group in _GROUPS for name, value in groups[group].items()} | groups
-
-
-_GROUPS = ("signal", "filter", "zero", "contact", "steady", "slide", "ratio", "press")
+        alone = ("signal", "filter", "zero", "contact", "steady", "slide", "ratio", "press")
+        return {name: value for group in alone for name, value in groups[group].items()} | groups
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from sessions.report.tables.study_models import study_model
 from sessions.report.wording import ShownResponse, caption, correlation, plural, shown_response, spread_share
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
-from sessions.statistics.multiverse import CHOICE_LABELS, CHOICES, PathFinding, by_choice, correlations
+from sessions.statistics.multiverse import CHOICE_LABELS, PathFinding, by_choice, correlations
 from sessions.statistics.scores import MeanScore, by_key
 
 _TICKS = [0, 20, 40, 60, 80, 100]  # of a scale of scores
@@ -257,7 +257,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], label: str) ->
         axes.set_xlim(low - 0.04 * (high - low), high)
         if usual is not None:
             axes.axvline(usual, color=INK, linewidth=0.9, linestyle=(0, (3, 2)), zorder=0)
-    header = (*CHOICES, "usual", "surfaces", "trials", "r of means", "r within subjects", "low", "high")
+    header = (*CHOICE_LABELS, "usual", "surfaces", "trials", "r of means", "r within subjects", "low", "high")
     numbers_of = attrgetter("surfaces", "trials", "r", "within", "low", "high")
     rows = ((*map(str, astuple(finding.path)), int(finding.usual), *numbers_of(finding)) for finding in findings)
     title = f"Correlation of {descriptor} along many paths of the analysis"
