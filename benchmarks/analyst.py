@@ -86,7 +86,7 @@ def _painting(film) -> None:  # noqa: ANN001
     for near in (False, True):
         times: list[float] = []
         for frame in film.frames[::4]:
-            canvas.show_frame(frame, film.mesh, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
+            canvas.show_frame(frame, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
             start = time.process_time()
             canvas.grab()
             times.append(time.process_time() - start)

@@ -4,7 +4,7 @@ from collections import defaultdict
 from statistics import fmean
 
 from daq_app.analyst import state as m
-from daq_app.analyst.frame import FieldChoice, Finger, Frame, Range, automatic_range
+from daq_app.analyst.frame import FieldChoice, Frame, Range, automatic_range
 from daq_app.analyst.session_words import greatest_errors, sed_text
 from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.wording import errors_text, tr, tr_noop
@@ -51,7 +51,7 @@ def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
     finger_maps = [] if state is None else [state.fingers]
     if state is not None and state.comparison is not None:
         finger_maps.append(state.comparison.fingers)
-    return automatic_range(field, (finger.frame for fingers in finger_maps for finger in fingers.values()))
+    return automatic_range(field, (frame for fingers in finger_maps for frame in fingers.values()))
 
 
 def visible_film(state: AnalystState) -> m.FingerHistory | None:
@@ -79,12 +79,12 @@ def finger_text(state: AnalystState | None) -> str:
     if prediction.sed is None:
         return tr("No settled finger. {why}", why=prediction.reasons.get("sed", tr("no reason is known")))
     sentences = [tr("Finger of {name}, settled", name=name), sed_text(state.report, prediction)]
-    if (finger := state.fingers.get(row.key)) is not None:
-        sentences.append(_contact_text(finger.frame))
+    if (frame := state.fingers.get(row.key)) is not None:
+        sentences.append(_contact_text(frame))
     return " · ".join(sentences)
 
 
-def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
+def other_finger(state: AnalystState | None) -> tuple[Frame | None, str]:
     """Return the compared session's settled finger for the chosen stimulus, and the text about it.
 
     Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
@@ -100,7 +100,7 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
     if theirs_row is None or theirs_row.sed is None or finger is None:
         return None, tr("{session} has no answer to this stimulus.", session=comparison.report.session)
     sentence = sed_text(comparison.report, theirs_row)
-    return finger, " · ".join((comparison.report.session, sentence, _contact_text(finger.frame)))
+    return finger, " · ".join((comparison.report.session, sentence, _contact_text(finger)))
 
 
 def _of_stimulus(report: Report, reference: PredictionFinding) -> list[PredictionFinding]:

@@ -29,18 +29,6 @@ OUTSIDE = -1e-9  # least share of a corner: what lies on a side is in both trian
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
-    """A finger in the world: the surface is y = 0, the finger above it, lengths true [mm]."""
-
-    nodes: Array  # (n, 2) deformed
-    values: Mapping[str, Array]  # (n,) each field by its name in `solver.quantities` [MPa or -]; displacement [mm]
-    outlines: Mapping[str, Array]  # deformed borders of layers by name, each (m, 2)
-    patch: Array  # (m, 2) outline of the ending
-    contact: Skin
-    row: Array  # (r,) SED of the receptors along the skin [MPa]; nan where there is none
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class FrameMesh:
     """What the nodes of a frame are put together to."""
 
@@ -51,12 +39,16 @@ class FrameMesh:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Finger:
-    """A finger's settled state, or the last good one where there is none."""
+class Frame:
+    """A finger in the world: the surface is y = 0, the finger above it, lengths true [mm]."""
 
     mesh: FrameMesh
-    frame: Frame
-    arcs: Array  # (r,) where the receptors of the row lie along the skin [mm]
+    nodes: Array  # (n, 2) deformed
+    values: Mapping[str, Array]  # (n,) each field by its name in `solver.quantities` [MPa or -]; displacement [mm]
+    outlines: Mapping[str, Array]  # deformed borders of layers by name, each (m, 2)
+    patch: Array  # (m, 2) outline of the ending
+    contact: Skin
+    row: Array  # (r,) SED of the receptors at `solver.prediction.ROW` [MPa]; nan where there is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +80,8 @@ class Instant:
 class Film:
     """A finger from first touch to its last state; where there is no settled one, as far as it was found."""
 
-    mesh: FrameMesh
     frames: tuple[Frame, ...]
     instants: tuple[Instant, ...]
-    arcs: Array
     lost: tuple[float, float] | None = None  # the most squeezed place of the last good state [mm], where none settled
 
 
@@ -205,13 +195,13 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
     return (-high if field.signed else 0.0), high
 
 
-def corners_at(frame: Frame, mesh: FrameMesh, points: Array) -> tuple[Indices, Array]:
+def corners_at(frame: Frame, points: Array) -> tuple[Indices, Array]:
     """Return the triangle that holds each of `points` (p, 2) [mm] and the share of each of its corners (p, 3).
 
     The triangle is -1, and the shares are nan, outside of the tissue.
     """
     triangle, corner_shares = np.full(len(points), -1), np.full((len(points), 3), np.nan)
-    corners = frame.nodes[mesh.triangles]  # (t, 3, 2)
+    corners = frame.nodes[frame.mesh.triangles]  # (t, 3, 2)
     low, high = corners.min(axis=1), corners.max(axis=1)
     some = np.flatnonzero(((low <= points.max(axis=0)) & (high >= points.min(axis=0))).all(axis=1))
     boxed = (low[some] <= points[:, None]) & (points[:, None] <= high[some])
@@ -227,36 +217,36 @@ def corners_at(frame: Frame, mesh: FrameMesh, points: Array) -> tuple[Indices, A
     return triangle, corner_shares
 
 
-def value_at(frame: Frame, mesh: FrameMesh, field: FieldChoice, points: Array) -> tuple[Array, Indices]:
+def value_at(frame: Frame, field: FieldChoice, points: Array) -> tuple[Array, Indices]:
     """Return a field at `points` (p, 2) [mm], nan outside of the tissue, and the triangles that hold them (p,)."""
-    triangle, shares = corners_at(frame, mesh, points)
-    if not len(mesh.triangles):
+    triangle, shares = corners_at(frame, points)
+    if not len(frame.mesh.triangles):
         return np.full(len(points), np.nan), triangle
-    return np.sum(field.values_of(frame)[mesh.triangles[triangle]] * shares, axis=1), triangle
+    return np.sum(field.values_of(frame)[frame.mesh.triangles[triangle]] * shares, axis=1), triangle
 
 
-def probe_text(frame: Frame, mesh: FrameMesh, field: FieldChoice, x: float, y: float) -> str:
+def probe_text(frame: Frame, field: FieldChoice, x: float, y: float) -> str:
     """Return what is at a place [mm]: the field with its unit, where it is, and the tissue."""
     position_text = f"x {x:.3f} mm, y {y:.3f} mm".replace("-", "−")
-    (value,), (triangle,) = value_at(frame, mesh, field, np.array([[x, y]]))
+    (value,), (triangle,) = value_at(frame, field, np.array([[x, y]]))
     if triangle < 0:
         return tr("{where} · no tissue", where=position_text)
-    return f"{field.text(value)} · {position_text} · {tr(_TISSUES[mesh.region[triangle]])}"
+    return f"{field.text(value)} · {position_text} · {tr(_TISSUES[frame.mesh.region[triangle]])}"
 
 
-def along_skin(frame: Frame, mesh: FrameMesh, field: FieldChoice) -> tuple[Array, Array]:
+def along_skin(frame: Frame, field: FieldChoice) -> tuple[Array, Array]:
     """Return the place on the skin at rest (m,) [mm], 0 over the receptor, and the field on the skin there (m,)."""
-    skin = mesh.skin
+    skin = frame.mesh.skin
     if skin is None:
         return np.empty(0), np.empty(0)
     return skin.arc, np.sum(skin.shape * field.values_of(frame)[skin.nodes], axis=1)
 
 
-def along_line(frame: Frame, mesh: FrameMesh, field: FieldChoice, line: Line) -> tuple[Array, Array]:
+def along_line(frame: Frame, field: FieldChoice, line: Line) -> tuple[Array, Array]:
     """Return the distance from the first end (m,) [mm] and the field there (m,); nan where there is no tissue."""
     endpoints = np.array(line)
     fraction = np.linspace(0.0, 1.0, _POINTS)
-    values, _ = value_at(frame, mesh, field, endpoints[0] + fraction[:, None] * (endpoints[1] - endpoints[0]))
+    values, _ = value_at(frame, field, endpoints[0] + fraction[:, None] * (endpoints[1] - endpoints[0]))
     return fraction * float(np.hypot(*(endpoints[1] - endpoints[0]))), values
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from daq_app.analyst.frame import Film, Finger
+from daq_app.analyst.frame import Film, Frame
 from daq_app.analyst.stroke import Edge, History, RawReadings
 from daq_app.wording import tr, tr_noop
 from sessions.prediction import SED
@@ -41,7 +41,7 @@ class TrialAnswer(Struct, frozen=True, eq=False):
     """The model's answer to one trial."""
 
     finding: PredictionFinding
-    finger: Finger | None  # None where there is no answer
+    finger: Frame | None  # settled; None where there is no answer
 
 
 class SessionPicture(Struct, frozen=True):
@@ -72,7 +72,7 @@ class OtherSession(Struct, frozen=True, eq=False):
 
     folder: str
     report: Report
-    fingers: Mapping[Key, Finger] = msgspec.field(default_factory=dict[Key, Finger])  # the settled ones
+    fingers: Mapping[Key, Frame] = msgspec.field(default_factory=dict[Key, Frame])  # the settled ones
 
 
 class Done(Struct, frozen=True):
@@ -186,7 +186,7 @@ class AnalystState:
     report: Report | None = None
     history: History = field(default_factory=History)
     version: int = 0  # of the report; pictures drawn of an earlier one are out of date
-    fingers: Mapping[Key, Finger] = field(default_factory=dict[Key, Finger])
+    fingers: Mapping[Key, Frame] = field(default_factory=dict[Key, Frame])  # settled ones
     pictures: Mapping[str, SessionPicture] = field(default_factory=dict[str, SessionPicture])  # of this version
     film: FingerHistory | None = None  # the last that was asked for
     excerpt: Excerpt | None = None  # likewise

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import MEAN_PANELS, compare_reports, film_text, name_and_errors
-from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, FrameMesh, Instant
+from daq_app.analyst.frame import FIELD_ERRORS, Film, Frame, FrameMesh, Instant
 from daq_app.analyst.session_words import picture_errors, sed_text
 from daq_app.analyst.stroke import RawFile, decision_of, effective_decision, history, reversal
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
@@ -32,7 +32,7 @@ from sessions.strokes.decisions import append, read
 from solver import Cancelled, Prediction, Scene
 from solver.equilibrium.load_path import Instant as Step
 from solver.mesh import Mesh
-from solver.prediction import ROW, Skin
+from solver.prediction import Skin
 from solver.response.fields import Fields, Sketch, Still, fields_of, path_until_failure, place_of_least_stretch, stills
 
 if TYPE_CHECKING:
@@ -152,12 +152,11 @@ class Work:
         self._load_paths[finding.trial, finding.stroke] = row, load_path
         self._send(m.TrialAnswer(finding, self._finger(row.prediction)))
 
-    def _finger(self, prediction: Prediction | None) -> Finger | None:
+    def _finger(self, prediction: Prediction | None) -> Frame | None:
         if prediction is None:
             return None
         sketch = self._sketch(prediction.mesh, prediction.scene)
-        frame = _frame(fields_of(prediction, sketch), prediction.skin, prediction.row.sed)
-        return Finger(_frame_mesh(sketch), frame, prediction.row.arc)
+        return _frame(_frame_mesh(sketch), fields_of(prediction, sketch), prediction.skin, prediction.row.sed)
 
     def _sketch(self, mesh: Mesh, scene: Scene) -> Sketch:
         if id(mesh) not in self._sketches:
@@ -259,7 +258,7 @@ class Work:
         recording = _open_recording(folder)
         analysis = analyse(recording, stored_settings(recording))
         progress = self.progress_listener(tr("predicting {name}", name=folder.name))
-        fingers: dict[m.Key, Finger] = {}
+        fingers: dict[m.Key, Frame] = {}
 
         def take_answer(_number: int, row: TrialPrediction, _load_path: SolutionPath | None) -> None:
             if (finger := self._finger(row.prediction)) is not None:
@@ -349,8 +348,9 @@ def film_of(load_path: SolutionPath, instants: Sequence[Step], sketch: Sketch, p
         pictures += stills(load_path.finger, instants[begin : begin + AT_ONCE], sketch)
         if not progress(min(1.0, (begin + AT_ONCE) / len(instants))):
             raise Cancelled
-    frames = tuple(_frame(still.fields, still.skin, still.row) for still in pictures)
-    return Film(_frame_mesh(sketch), frames, tuple(_instant(still) for still in pictures), ROW)
+    mesh = _frame_mesh(sketch)
+    frames = tuple(_frame(mesh, still.fields, still.skin, still.row) for still in pictures)
+    return Film(frames, tuple(_instant(still) for still in pictures))
 
 
 def lost_film(load_path: SolutionPath, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
@@ -367,12 +367,12 @@ def lost_film(load_path: SolutionPath, sketch: Sketch, progress: Progress) -> tu
 def field_at(experiment: str, index: int, film: Film, step: int) -> Field:
     """Return one state of a film as the figures of a report draw it."""
     frame = film.frames[step]
-    fields = Fields(frame.nodes, film.mesh.triangles, frame.values, frame.outlines, frame.patch)
+    fields = Fields(frame.nodes, frame.mesh.triangles, frame.values, frame.outlines, frame.patch)
     return Field(experiment, index, fields, frame.contact)
 
 
-def _frame(fields: Fields, skin: Skin, row: Array) -> Frame:
-    return Frame(fields.nodes, dict(fields.values), dict(fields.outlines), fields.patch, skin, row)
+def _frame(mesh: FrameMesh, fields: Fields, skin: Skin, row: Array) -> Frame:
+    return Frame(mesh, fields.nodes, fields.values, fields.outlines, fields.patch, skin, row)
 
 
 def _instant(still: Still) -> Instant:

@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
-from daq_app.analyst.frame import FIELD_CHOICES, Frame, FrameMesh, Line, View, probe_text
+from daq_app.analyst.frame import FIELD_CHOICES, Frame, Line, View, probe_text
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.plots import name_axis, pg, style_axis
 from daq_app.qt.tokens import SMALL, Tokens, font, px
@@ -18,7 +18,6 @@ _HELP = tr_noop(
     "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
     "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
 )
-NO_MESH = FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
 SHADES = 64
 ZOOM = 1.25  # of a key [-]: three of them double the picture
 _STEP = 0.1  # of the picture's width that an arrow key moves it
@@ -72,7 +71,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.sight = sight or Sight()
         self._tokens, self._font = tokens, font(SMALL)
         self.frame: Frame | None = None
-        self._mesh = NO_MESH
         self.look = Look(FIELD_CHOICES[0], (0.0, 1.0))
         self._caption = ""
         self._fits: tuple[Frame, ...] = ()  # all of them are seen before anybody moves or zooms
@@ -92,16 +90,14 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.sight.changed.connect(self._fit_region)
         self._fit_region()
 
-    def show_frame(
-        self, frame: Frame | None, mesh: FrameMesh, caption: str, look: Look, linked: tuple[Frame, ...] = ()
-    ) -> None:
+    def show_frame(self, frame: Frame | None, caption: str, look: Look, linked: tuple[Frame, ...] = ()) -> None:
         """Show a state, and how; what was moved or zoomed stays so. Frames that are `linked` with it fit in too."""
         fits = linked or (() if frame is None else (frame,))
         if frame is self.frame and fits == self._fits and (caption, look) == (self._caption, self.look):
             return
         if look.near != self.look.near:
             self.sight.region = None
-        self.frame, self._mesh, self._caption, self.look, self._fits = frame, mesh, caption, look, fits
+        self.frame, self._caption, self.look, self._fits = frame, caption, look, fits
         self.setAccessibleName(caption or tr("finger of the model: none"))
         low, high = look.range
         self._bar.rounding = (high - low) / 100.0
@@ -119,7 +115,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def readout_at(self, position: tuple[float, float]) -> str:
         """Return what is at a place [mm]; "" without a finger."""
-        return "" if self.frame is None else probe_text(self.frame, self._mesh, self.look.field, *position)
+        return "" if self.frame is None else probe_text(self.frame, self.look.field, *position)
 
     def draw(self, painter: QPainter, heading: str) -> None:
         """Draw what is shown on paper of the window's colour, with a `heading` such as SIMULATED over it, and end."""
@@ -138,7 +134,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         painter.setFont(self._font)
         if self.frame is not None:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame, self._mesh)
+            picture = FingerPainter(painter, self._tokens, self.view(), self._plot_rect(), self.frame)
             picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
         painter.setPen(QColor(self._tokens.quiet))
         caption_box = QRectF(4.0, 0.0, self.width() - 8.0, self._above())

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
-from daq_app.analyst.frame import Box, FieldChoice, Frame, FrameMesh, Line, Range, View, halve_triangles, visible
+from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Range, View, halve_triangles, visible
 from daq_app.qt.painting import faces, paint_failed_solve, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
@@ -53,7 +53,6 @@ class FingerPainter:
     view: View
     box: QRectF
     frame: Frame
-    mesh: FrameMesh
 
     def paint(self, look: Look, shades: list[QColor], line: Line | None) -> None:
         painter, ink, box = self.painter, QColor(self.tokens.text), self.box
@@ -83,7 +82,7 @@ class FingerPainter:
         frame, box = self.frame, self.box
         region = self.view.visible(box.left(), box.top(), box.width(), box.height())
         nodes, values = frame.nodes, look.field.values_of(frame)
-        triangles = visible(nodes, self.mesh.triangles, region)
+        triangles = visible(nodes, frame.mesh.triangles, region)
         if len(triangles) and box.width() * box.height() / len(triangles) > _COARSE:
             nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
@@ -100,7 +99,7 @@ class FingerPainter:
     def _paint_mesh(self) -> None:
         self.painter.setPen(QPen(sheer("black", 110), 0.6))
         points = self._to_screen(self.frame.nodes)
-        around: list[list[int]] = self.mesh.elements.tolist()
+        around: list[list[int]] = self.frame.mesh.elements.tolist()
         for element in around:
             if any(self.box.contains(points[node]) for node in element):
                 self.painter.drawPolygon([points[node] for node in element])

@@ -17,10 +17,10 @@ from daq_app.analyst.finger_words import (
     visible_film,
     was_tried,
 )
-from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
+from daq_app.analyst.frame import FIELD_ERRORS, automatic_range
 from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, Row, selected_row
-from daq_app.qt.finger_canvas import NO_MESH, FingerCanvas
+from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
 from daq_app.qt.pictures import (
@@ -164,14 +164,14 @@ class ModelColumn(QWidget):
         row = None if state is None else selected_row(state)
         film, index = self._film, self._index
         if film is not None and index is not None:
-            finger, text = Finger(film.film.mesh, film.film.frames[index], film.film.arcs), film_text(film, index)
+            finger, text = film.film.frames[index], film_text(film, index)
         else:
             finger = None if state is None or row is None else state.fingers.get(row.key)
             text = finger_text(state)
         second, second_text = other_finger(state) if self.together.isChecked() else (None, "")
         lost = film.film.lost if film is not None and index == len(film.film.frames) - 1 else None
         field = self.fields.field
-        present = tuple(item.frame for item in (finger, second) if item is not None)
+        present = tuple(frame for frame in (finger, second) if frame is not None)
         frames = tuple(film.film.frames) if film is not None and self._filming else present
         own_range = automatic_range(field, frames)  # of a film that is written: the same for all of it
         common = common_range(state, field)
@@ -180,11 +180,8 @@ class ModelColumn(QWidget):
         pair = ((self.finger, finger, f"A  {text}"), (self.compared_finger, second, f"B  {second_text}"))
         panels = pair if second_text else ((self.finger, finger, text),)
         self.finger.sight.captions = tuple(caption for _, _, caption in panels)
-        for canvas, item, caption in panels:
-            frame, parts = (None, NO_MESH) if item is None else (item.frame, item.mesh)
-            canvas.show_frame(
-                frame, parts, caption, look if canvas is self.finger else replace(look, lost=None), present
-            )
+        for canvas, frame, caption in panels:
+            canvas.show_frame(frame, caption, look if canvas is self.finger else replace(look, lost=None), present)
         self.compared_finger.setVisible(bool(second_text))
         self.plot.show_field((finger, second) if second_text else (finger,), field, self.finger.sight.line)
         view_name = "contact" if self.near.isChecked() else "finger"

@@ -10,12 +10,13 @@ from PySide6.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent, QValidator
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 
-from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Finger, Line, Range, along_line, along_skin, read_out
+from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Frame, Line, Range, along_line, along_skin, read_out
 from daq_app.qt.parts import button, choice, hbox, label, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MODEL, SMALL, TARGET, Tokens, font
 from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
+from solver.prediction import ROW
 
 pg: Any = pyqtgraph  # it has no types: who draws by it imports it from here
 Curve = tuple[Array, Array]
@@ -184,11 +185,11 @@ class FieldPlot(QWidget):
         vbox(hbox((self.source, 1), self.draw, spacing=GRID // 2), (self.plot, 1), on=self, spacing=GRID // 2)
         self.source.currentIndexChanged.connect(lambda: self.changed.emit())
 
-    def show_field(self, fingers: Sequence[Finger | None], field: FieldChoice, line: Line | None) -> None:
+    def show_field(self, frames: Sequence[Frame | None], field: FieldChoice, line: Line | None) -> None:
         """Plot a field of at most two fingers, the second dashed."""
         source = self.source.currentIndex()
         axis = "SED [kPa]" if source == _RECEPTORS else field.axis
-        self.values = [_curve(finger, source, field, line) for finger in fingers]
+        self.values = [_curve(frame, source, field, line) for frame in frames]
         positions, _ = self.values[0]
         text = tr(_PLACES[source])
         if source == LINE and line is None:
@@ -196,8 +197,8 @@ class FieldPlot(QWidget):
         for index, curve in enumerate(self._curves):
             points = self.values[index] if index < len(self.values) else _NOTHING
             curve.setData(*points, symbol="o" if source == _RECEPTORS else None, symbolBrush=MODEL)
-        if (len(fingers) > 1) != self._named:
-            self._named = len(fingers) > 1
+        if (len(frames) > 1) != self._named:
+            self._named = len(frames) > 1
             self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
         self._zero_line.setVisible(source != LINE)
         self.plot.name_across(f"{axis}<br>{text}" if len(positions) else text)
@@ -214,15 +215,15 @@ class FieldPlot(QWidget):
         return "   ".join(filter(None, readouts))
 
 
-def _curve(finger: Finger | None, source: int, field: FieldChoice, line: Line | None) -> Curve:
+def _curve(frame: Frame | None, source: int, field: FieldChoice, line: Line | None) -> Curve:
     """Return places (m,) [mm] and values (m,) of what is plotted; none where the finger has none."""
-    if finger is None:
+    if frame is None:
         return _NOTHING
     if source == _RECEPTORS:
-        return (finger.arcs, 1000.0 * finger.frame.row) if len(finger.arcs) == len(finger.frame.row) else _NOTHING
+        return ROW, 1000.0 * frame.row
     if source == SKIN:
-        return along_skin(finger.frame, finger.mesh, field)
-    return _NOTHING if line is None else along_line(finger.frame, finger.mesh, field, line)
+        return along_skin(frame, field)
+    return _NOTHING if line is None else along_line(frame, field, line)
 
 
 class FieldBar(QWidget):

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import compare_reports, finger_text
-from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, FrameMesh
+from daq_app.analyst.frame import FIELD_ERRORS, Frame, FrameMesh
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_text, row_text, session_pictures
 from daq_app.analyst.state import AnalystState, fold, rows, selected_row
@@ -35,11 +35,9 @@ undo, redo = partial(reversal, redo=False), partial(reversal, redo=True)
 
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
 NOTHING = np.empty(0)
-FINGER = Finger(
-    FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64)),
-    Frame(np.zeros((1, 2)), {"sed": np.zeros(1)}, {}, np.zeros((1, 2)), Skin(*[NOTHING] * 4, ()), NOTHING),
-    NOTHING,
-)
+BARE = FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
+PLACE = np.zeros((1, 2))
+FINGER = Frame(BARE, PLACE, {"sed": np.zeros(1)}, {}, PLACE, Skin(*[NOTHING] * 4, ()), NOTHING)
 
 
 @pytest.fixture(scope="module")
@@ -318,7 +316,7 @@ def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
     predictions = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
     assert set(other.fingers) == set(predictions) != set()
     for key, finger in other.fingers.items():
-        np.testing.assert_allclose(finger.frame.row, list(predictions[key].row.values()))
+        np.testing.assert_allclose(finger.row, list(predictions[key].row.values()))
 
 
 def test_a_file_that_cannot_be_written_is_told_with_its_name_and_what_to_do(at_work, tmp_path):

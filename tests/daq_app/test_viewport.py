@@ -28,8 +28,8 @@ SIDE = SkinLine(np.array([-1.0, 1.0]), np.array([[0] * 9, [1] * 9]), np.full((2,
 PARTS = FrameMesh(TRIANGLES, np.empty((0, 8), np.int64), np.array([0, 1, 2, 2]), SIDE)
 
 
-def frame(**values):
-    return Frame(NODES, {"sed": PLANE, **values}, {}, NODES, Skin(NONE, NONE, NONE, NONE, ()), NONE)
+def frame(mesh=PARTS, **values):
+    return Frame(mesh, NODES, {"sed": PLANE, **values}, {}, NODES, Skin(NONE, NONE, NONE, NONE, ()), NONE)
 
 
 def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back_to_its_place():
@@ -44,35 +44,35 @@ def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back
 def test_a_linear_field_is_read_exactly_at_every_place_and_along_every_line():
     field = BY_NAME["sed"]
     points = np.random.default_rng(3).uniform(0.0, 4.0, (20, 2))
-    values, _ = value_at(frame(), PARTS, field, points)
+    values, _ = value_at(frame(), field, points)
     np.testing.assert_allclose(values, 2.0 * points[:, 0] - points[:, 1], atol=1e-9)
-    away, values = along_line(frame(), PARTS, field, ((1.0, 1.0), (4.0, 5.0)))
+    away, values = along_line(frame(), field, ((1.0, 1.0), (4.0, 5.0)))
     inside = away <= 3.75  # of its 5 mm: there it leaves the square, at y = 4
     np.testing.assert_allclose(values[inside], 1.0 + (2.0 * 0.6 - 0.8) * away[inside], atol=1e-9)
     assert np.isnan(values[~inside]).all()
 
 
 def test_the_probe_names_field_unit_place_and_tissue():
-    words = probe_text(frame(), PARTS, BY_NAME["sed"], 3.5, 2.0)
+    words = probe_text(frame(), BY_NAME["sed"], 3.5, 2.0)
     assert words == "SED 5 kPa · x 3.500 mm, y 2.000 mm · dermis"
-    assert probe_text(frame(), PARTS, BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
+    assert probe_text(frame(), BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
 
 
 def test_a_finger_without_triangles_has_no_field_anywhere():
     bare = FrameMesh(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
-    assert probe_text(frame(), bare, BY_NAME["sed"], 1.0, 1.0).endswith("no tissue")
-    assert np.isnan(along_line(frame(), bare, BY_NAME["sed"], ((0.0, 0.0), (1.0, 1.0)))[1]).all()
-    assert along_skin(frame(), bare, BY_NAME["sed"])[0].size == 0
+    assert probe_text(frame(bare), BY_NAME["sed"], 1.0, 1.0).endswith("no tissue")
+    assert np.isnan(along_line(frame(bare), BY_NAME["sed"], ((0.0, 0.0), (1.0, 1.0)))[1]).all()
+    assert along_skin(frame(bare), BY_NAME["sed"])[0].size == 0
 
 
 def test_a_strain_has_no_unit_and_a_negative_number_a_minus():
     strained_frame = frame(principal_strain_least=np.full(5, -0.125))
-    words = probe_text(strained_frame, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
+    words = probe_text(strained_frame, BY_NAME["principal_strain_least"], 2.0, 0.5)
     assert words == "least principal strain −0.125 · x 2.000 mm, y 0.500 mm · epidermis"
 
 
 def test_the_field_along_the_skin_is_that_of_the_skin_s_own_nodes():
-    place, values = along_skin(frame(), PARTS, BY_NAME["sed"])
+    place, values = along_skin(frame(), BY_NAME["sed"])
     assert place.tolist() == [-1.0, 1.0]
     np.testing.assert_allclose(values, 1000.0 * PLANE[:2], atol=1e-12)
 

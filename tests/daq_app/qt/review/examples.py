@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from daq_app.analyst.frame import Film, Frame, FrameMesh, Instant
 from daq_app.analyst.stroke import RawReadings
 from drivers.readings import ReadingBlock
-from solver.prediction import Skin
+from solver.prediction import ROW, Skin
 
 SESSION = Path(__file__).parents[3] / "data" / "sessions" / "version-1" / "sealed"
 
@@ -42,16 +42,15 @@ def until(application, condition):
 def frame(sed):
     square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     contact = Skin(np.array([0.0, 1.0]), np.zeros(2), np.ones(2), np.ones(2), ("stick", "slip"))
-    return Frame(square, {"sed": np.full(3, sed)}, {"skin": square}, square, contact, np.array([sed, sed]))
+    return Frame(PARTS, square, {"sed": np.full(3, sed)}, {"skin": square}, square, contact, np.full(len(ROW), sed))
 
 
 PARTS = FrameMesh(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]), np.array([1]))
-ARCS = np.array([0.0, 1.0])
 
 
 def film(**more):
     instants = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 3, i) for i in range(4)]
-    return Film(PARTS, tuple(frame(0.001 * i) for i in range(4)), tuple(instants), ARCS, **more)
+    return Film(tuple(frame(0.001 * i) for i in range(4)), tuple(instants), **more)
 
 
 def raw(stroke, n=50):

@@ -15,10 +15,10 @@ from PySide6.QtWidgets import QProgressDialog
 from qt_events import wheel
 
 from daq_app.analyst import state as m
-from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
+from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS
 from daq_app.analyst.state import rows, selected_row
 from daq_app.qt.plots import ALL_TRIALS, FIXED_RANGE, OWN, FieldBar
-from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame
+from tests.daq_app.qt.review.examples import drag, film, frame
 from tests.sessions.report_example import example
 
 
@@ -293,8 +293,8 @@ def test_a_film_that_fails_unexpectedly_leaves_the_state_and_the_colours_that_we
 def two_fingers(application, window, factor=1.5):
     """Show the settled finger of the chosen trial beside one of another session with `factor` times its SED."""
     row = selected_row(window.state)
-    window.take(m.TrialAnswer(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
-    other = Finger(PARTS, frame(0.002 * factor), ARCS)
+    window.take(m.TrialAnswer(row.prediction, frame(0.002)))
+    other = frame(0.002 * factor)
     window.take(m.OtherSession("other", replace(example(), session="later"), {row.key: other}))
     window.model.tabs.setCurrentIndex(0)
     application.processEvents()
@@ -339,7 +339,7 @@ def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
 
 def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
     row = selected_row(window.state)
-    window.take(m.TrialAnswer(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    window.take(m.TrialAnswer(row.prediction, frame(0.002)))
     stimulus = row.prediction.experiment, row.prediction.index
     remaining = tuple(p for p in example().predictions if (p.experiment, p.index) != stimulus)
     window.take(m.OtherSession("other", replace(example(), session="later", predictions=remaining)))
