@@ -13,8 +13,7 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
 from daq_app.window.live_feed import LiveFeed, merge_live
-from daq_app.window.live_model import Settle
-from daq_app.window.live_model_process import LiveModel
+from daq_app.window.live_model import LiveModel, Settle
 from daq_app.window.state import (
     AppState,
     DevicesFound,
