@@ -46,12 +46,10 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
     return {key: {name: fmean(sample) for name, sample in values.items()} for key, values in samples.items()}
 
 
-def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
+def common_range(state: AnalystState, field: FieldChoice) -> Range:
     """Return where the colours of all trials of a session, and of one compared with it, begin and end."""
-    finger_maps = [] if state is None else [state.fingers]
-    if state is not None and state.comparison is not None:
-        finger_maps.append(state.comparison.fingers)
-    return automatic_range(field, (frame for fingers in finger_maps for frame in fingers.values()))
+    compared_fingers = () if state.comparison is None else state.comparison.fingers.values()
+    return automatic_range(field, (*state.fingers.values(), *compared_fingers))
 
 
 def visible_film(state: AnalystState) -> m.FingerHistory | None:
@@ -60,15 +58,9 @@ def visible_film(state: AnalystState) -> m.FingerHistory | None:
     return state.film if row is not None and state.film is not None and state.film.key == row.key else None
 
 
-def was_tried(prediction: PredictionFinding) -> bool:
-    """Say whether a trial was given to the solver: all that it needs is known."""
-    return None not in (prediction.mu, prediction.tau_max, prediction.indentation, prediction.direction)
-
-
-def finger_text(state: AnalystState | None) -> str:
+def finger_text(state: AnalystState) -> str:
     """Return the text about the settled finger, or the reason why there is none."""
-    row = None if state is None else selected_row(state)
-    if state is None or row is None:
+    if (row := selected_row(state)) is None:
         return ""
     prediction = row.prediction
     name = tr("stroke") if row.trial is None else tr("trial {trial}", trial=row.trial)
@@ -84,13 +76,13 @@ def finger_text(state: AnalystState | None) -> str:
     return " · ".join(sentences)
 
 
-def other_finger(state: AnalystState | None) -> tuple[Frame | None, str]:
+def other_finger(state: AnalystState) -> tuple[Frame | None, str]:
     """Return the compared session's settled finger for the chosen stimulus, and the text about it.
 
     Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
     """
-    comparison, row = (None, None) if state is None else (state.comparison, selected_row(state))
-    if state is None or comparison is None or state.report is None or row is None or row.prediction is None:
+    comparison, row = state.comparison, selected_row(state)
+    if comparison is None or state.report is None or row is None or row.prediction is None:
         return None, ""
     reports = (state.report, comparison.report)
     predictions, other_predictions = (_of_stimulus(report, row.prediction) for report in reports)

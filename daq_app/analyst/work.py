@@ -94,8 +94,6 @@ class Work:
                 self._compare(Path(folder))
             case m.Write():
                 self._send(m.Done(tr("Written: {path}", path=self._write(request))))
-            case _:
-                pass
 
     def progress_listener(self, activity: str, load_steps: int = 0) -> Callable[[float], bool]:
         """Return a listener to progress that reports the part done and the time left, and stops for urgent requests."""

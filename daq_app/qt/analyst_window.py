@@ -25,7 +25,6 @@ from daq_app.qt.parts import (
     row_list,
     scroll_area,
     set_horizontal,
-    set_text,
     vbox,
 )
 from daq_app.qt.plots import ZoomedPlot, pg
@@ -94,7 +93,7 @@ class AnalystWindow(QMainWindow):
         self.tokens = tokens
         self._work = work or Analyst(folder)
         self.keys = KeysPage(self, ANALYST_KEYS)
-        self._simulation_label = label("", "simulated")
+        self._simulation_label = label(tr("SIMULATED"), "simulated")
         self.lineage = LineageLabel()
         self.lineage.followed.connect(self._follow)
         self._progress_label = WrappedLabel("quiet", keeps_room=True)
@@ -130,7 +129,6 @@ class AnalystWindow(QMainWindow):
         return QSize(1440, 860)
 
     def take(self, message: m.Message) -> None:
-        """Fold a message, and show what is known then."""
         self.state = fold(self.state, message)
         self._show()
 
@@ -167,7 +165,6 @@ class AnalystWindow(QMainWindow):
         return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Put the columns beside each other, or on pages where there is little room."""
         super().resizeEvent(event)
         set_horizontal(self._foot, self.width() >= px(_ONE_ROW))
         self._place_columns()
@@ -246,7 +243,6 @@ class AnalystWindow(QMainWindow):
             widget.setEnabled(not busy and state.report is not None)
         note = "" if state.report is None else state.report.head
         self._simulation_label.setVisible(bool(note))
-        self._simulation_label.setText(tr("SIMULATED"))
         self._simulation_label.setToolTip(note)
         self.lineage.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
@@ -343,7 +339,7 @@ class TrialsColumn(QWidget):
         if state.stage != "predicted" and state.step is not None:
             text = tr("The model has not answered yet.")
         no_stroke = tr("This session has no stroke. Its answers are kept: Export… writes them.")
-        set_text(self.none, no_stroke if empty else text)
+        self.none.setText(no_stroke if empty else text)
 
     def _choose(self, row: int) -> None:
         if row >= 0:

@@ -222,6 +222,13 @@ class _Field(QWidget):
     def answer_event(self, hand: Hand | None) -> Event:
         return self.answer.judgement(hand)
 
+    def begin(self) -> None:
+        self._take(Choice())
+
+    def _take(self, answer: Choice) -> None:
+        self.answer = answer
+        self.changed.emit()
+
 
 class NumberField(_Field):
     """Takes a number above 0; a comma is a point, but where it may group thousands."""
@@ -240,9 +247,8 @@ class NumberField(_Field):
         self.setFocusProxy(self.field)
 
     def begin(self) -> None:
-        self.answer = Choice()
         self.field.clear()
-        self.changed.emit()
+        super().begin()
 
     @property
     def two_meanings(self) -> tuple[str, str] | None:
@@ -250,8 +256,7 @@ class NumberField(_Field):
         return two_meanings(self.field.text(), self.point)
 
     def _type(self, text: str) -> None:
-        self.answer = self.answer.type_number(self.now(), typed_number(text, self.point))
-        self.changed.emit()
+        self._take(self.answer.type_number(self.now(), typed_number(text, self.point)))
 
 
 class ChoiceOfTwo(_Field):
@@ -267,9 +272,6 @@ class ChoiceOfTwo(_Field):
         layout = QHBoxLayout(self)
         layout.setSpacing(4 * GRID)
         fill(layout, 1, self.first, self.second, 1)
-
-    def begin(self) -> None:
-        self._take(Choice())
 
     def set_texts(self, first: str, second: str) -> None:
         for choice, text in ((self.first, first), (self.second, second)):
@@ -304,10 +306,9 @@ class ChoiceOfTwo(_Field):
         return choice
 
     def _take(self, answer: Choice) -> None:
-        self.answer = answer
         self.first.setChecked(answer.value == "first")
         self.second.setChecked(answer.value == "second")
-        self.changed.emit()
+        super()._take(answer)
 
 
 def newest_force(trace: LiveTrace) -> float:

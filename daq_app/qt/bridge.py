@@ -12,19 +12,10 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
+from daq_app.window.course_state import Judged
 from daq_app.window.live_feed import LiveFeed, merge_live
 from daq_app.window.live_model import LiveModel, Settle
-from daq_app.window.state import (
-    AppState,
-    DevicesFound,
-    DrawingFailed,
-    Judged,
-    LifeKnown,
-    Message,
-    Searching,
-    Tick,
-    fold,
-)
+from daq_app.window.state import AppState, DevicesFound, DrawingFailed, LifeKnown, Message, Searching, Tick, fold
 from daq_app.window.stroke_quality import Judge
 from daq_app.window.subject import translator
 from daq_app.window.view import View, derive_view
@@ -40,15 +31,9 @@ _TICK = 0.1  # between two looks at the clock, for texts with an age [s]
 class Client(Protocol):
     """The recorder as the window sees it."""
 
-    def send(self, request: Request) -> None:
-        """Ask for something."""
-
-    def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
-        """Return what has come since the last call."""
-        ...
-
-    def close(self) -> None:
-        """End it, and what it does."""
+    def send(self, request: Request) -> None: ...
+    def poll(self) -> tuple[Report, ...]: ...
+    def close(self) -> None: ...
 
     def leave(self) -> None:
         """Let go of it: a session in hand gets an end from which it can be resumed."""
@@ -86,7 +71,6 @@ class Bridge(QObject):
         self._fold(m.Connect(uri))
 
     def begin(self) -> None:
-        """Look at the recorder from now on."""
         self._timer.start()
         QTimer.singleShot(AFTER_OPENING, self._judge.prepare)
         QTimer.singleShot(AFTER_OPENING, self.model.prepare)
@@ -121,7 +105,6 @@ class Bridge(QObject):
         self._look_up(lambda: DevicesFound(reachable()))
 
     def poll(self) -> None:
-        """Take what has come, and let it be drawn."""
         now = time.monotonic()
         if now - self._ticked >= _TICK:
             self._ticked = now
@@ -159,8 +142,6 @@ class Bridge(QObject):
             case m.SessionBegun(plan=plan, clock_offset_ns=offset):
                 self.session_offset = offset * 1e-9
                 self.model.follow(plan)
-            case _:
-                pass
         overloads = self.state.bench.peak.overloads
         self._fold(report)
         self._judge.follow(report, self.feed)
@@ -194,6 +175,4 @@ class Bridge(QObject):
     def _frame(self) -> Frame:
         """Return how the transducer lies to the face: as the session states it, or the bench knows it."""
         session = self.state.session
-        if session is not None and not session.is_over:
-            return session.plan.frame
-        return self.state.bench.frame or Frame()
+        return self.state.bench.frame or Frame() if session is None or session.is_over else session.plan.frame

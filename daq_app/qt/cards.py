@@ -111,7 +111,6 @@ class TransducerRow(QWidget):
         vbox(hbox((self.connect_button, 1), (self.zero, 1)), self.summary, on=self, spacing=GRID // 2)
 
     def show_view(self, view: BenchView) -> None:
-        """Show which transducer it is, its zero, noise and life, and what can be done with it."""
         set_text(self.summary, bench_summary(view))
         show_connecting(self.connect_button, view)
         self.zero.setEnabled(view.can_tare)

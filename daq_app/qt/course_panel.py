@@ -5,7 +5,7 @@ from functools import partial
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
+from PySide6.QtWidgets import QGridLayout, QListWidget, QWidget
 
 from daq_app.qt.keys import KEYS
 from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, row_list, set_text, stack_pages, vbox
@@ -44,10 +44,13 @@ class CoursePanel(Panel):
         for index, widget in enumerate(self.buttons.values()):
             grid.addWidget(widget, index // columns, index % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
-        self._bottom = stack_pages(acts, self._entry_row())
+        entry, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)
+        entry.setMinimumHeight(px(88))
+        row = hbox(keep, button(tr("Leave  Esc"), tr("leave it"), self.leave))
+        vbox(1, self._question, self.line, row, on=entry, spacing=GRID)
+        self._bottom = stack_pages(acts, entry)
         self._timer = label("", "quiet")
         self.mirror = Mirror()
-        self._roomy = px(_ROOMY, most=1.4)
         header = hbox((label(tr("Plan"), "section"), 1), self._timer)
         margins = (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         vbox(header, (self.plan, 1), self.mirror, self._bottom, on=self, margins=margins, spacing=GRID)
@@ -86,7 +89,6 @@ class CoursePanel(Panel):
         self.line.setFocus()
 
     def leave(self) -> None:
-        """Ask for nothing any more."""
         if self.asking:
             self.window().setFocus()
             self._bottom.setCurrentIndex(0)
@@ -104,21 +106,12 @@ class CoursePanel(Panel):
         self.leave()
         self._send(MESSAGES[self._act](text))
 
-    def _entry_row(self) -> QWidget:
-        page, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)
-        acts = hbox(keep, button(tr("Leave  Esc"), tr("leave it"), self.leave))
-        vbox(1, self._question, self.line, acts, on=page, spacing=GRID)
-        page.setMinimumHeight(px(88))
-        return page
-
     def _show_rows(self, rows: tuple[PlanRow, ...]) -> None:
-        while self.plan.count() > len(rows):
-            self.plan.takeItem(self.plan.count() - 1)
+        if self.plan.count() != len(rows):  # another session
+            self.plan.clear()
+            self.plan.addItems([""] * len(rows))
         for index, row in enumerate(rows):
             item = self.plan.item(index)
-            if item is None:  # Qt returns None beyond the last
-                item = QListWidgetItem()
-                self.plan.addItem(item)
             text = f"{row.name} {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"
             item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.outcome}")
@@ -129,6 +122,5 @@ class CoursePanel(Panel):
                 self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Fold the picture of the subject's page where the plan needs the room."""
         super().resizeEvent(event)
-        self.mirror.open.set_room(self.height() >= self._roomy)
+        self.mirror.open.set_room(self.height() >= px(_ROOMY, most=1.4))

@@ -114,7 +114,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         return View(middle.x(), middle.y(), plot_box.center().x(), plot_box.center().y(), per_mm)
 
     def readout_at(self, position: tuple[float, float]) -> str:
-        """Return what is at a place [mm]; "" without a finger."""
         return "" if self.frame is None else probe_text(self.frame, self.look.field, *position)
 
     def draw(self, painter: QPainter, heading: str) -> None:
@@ -141,7 +140,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         painter.drawText(caption_box, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._caption)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw a ring around all of it while it has the keyboard."""
         pg.GraphicsLayoutWidget.paintEvent(self, event)
         if self.hasFocus():
             painter = QPainter(self.viewport())
@@ -167,7 +165,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         pg.GraphicsLayoutWidget.leaveEvent(self, event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Zoom with + and −, move with arrows, show all with Home, draw a line; leave other keys to the window."""
         key = Qt.Key(event.key())
         if key in (Qt.Key.Key_Plus, Qt.Key.Key_Equal):
             self._box.zoom(ZOOM)

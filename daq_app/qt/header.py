@@ -44,7 +44,6 @@ class Header(QWidget):
         self._age.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         subject = hbox((self._heading, 3), (self._device, 2), self._language, spacing=GRID)
         lamp = hbox(1, self._simulated, self._lamp, self._recording_label, self._age, spacing=GRID)
-        self._one_row = px(_ONE_ROW)
         self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
         longest = tr("saved {age:.1f} s ago", age=99.9)
         self._age.setFixedWidth(QFontMetrics(font(SMALL)).horizontalAdvance(f"{longest} "))
@@ -63,9 +62,8 @@ class Header(QWidget):
         set_text(self._age, view.lamp.age)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Put the lamp below the subject where the strip is too narrow for one row."""
         super().resizeEvent(event)
-        set_horizontal(self._rows, self.width() >= self._one_row)
+        set_horizontal(self._rows, self.width() >= px(_ONE_ROW))
 
 
 class Notice(Panel):

@@ -56,7 +56,7 @@ class LiveBar(QWidget):
     def __init__(self, length: Callable[[int], None], hold: Callable[[], None], finite: Callable[[bool], None]) -> None:
         """Show no numbers; `length` takes what is chosen [s], `hold` is called at a press, `finite` takes a choice."""
         super().__init__()
-        self._forces_shown = True
+        self.forces_shown = True
         self._short = False  # the buttons show their keys alone
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self.values: dict[str, QLabel] = {}
@@ -77,8 +77,7 @@ class LiveBar(QWidget):
         self.setMinimumSize(1, QFontMetrics(font(TITLE)).height())
 
     def show_forces(self, visible: bool) -> None:
-        """Show the numbers, or keep them from the experimenter where the protocol does."""
-        self._forces_shown = visible
+        self.forces_shown = visible
         self._fit()
 
     def show_numbers(self, values: Array) -> None:
@@ -110,7 +109,7 @@ class LiveBar(QWidget):
             regrade(value, role, "role")
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
             for widget in (caption, value):
-                widget.setVisible(self._forces_shown and room >= 0)
+                widget.setVisible(self.forces_shown and room >= 0)
 
     def height_with_acts(self, width: int) -> int:
         """Return the height that numbers and acts take at a width [px]."""
@@ -118,10 +117,9 @@ class LiveBar(QWidget):
         return max(numbers, acts) if self._in_a_row(width) else numbers + self._rows.spacing() + acts
 
     def _in_a_row(self, width: int) -> bool:
-        return not self._forces_shown or self._needed_width(TITLE) + self._acts <= width
+        return not self.forces_shown or self._needed_width(TITLE) + self._acts <= width
 
     def show_words(self) -> None:
-        """Say on the buttons what they do, or their keys alone where there is no room."""
         self.finite.setText("M" if self._short else tr("Finite  M"))
         self.hold.setText("H" if self._short else tr("Held  H") if self.hold.isChecked() else tr("Hold  H"))
 
@@ -172,8 +170,6 @@ class LivePanel(Panel):
         self._hold_time: float | None = None  # device time the picture is held at; readings go on behind it
         self._read_at = 0.0
         self._content: object = None  # what the picture was drawn of
-        self._forces_shown = True
-        self._least_for_acts = px(LEAST_FOR_ACTS)
         self.plots = [LivePlot(*plot) for plot in (*PLOTS, *AXIS_PLOTS)]
         self._model_plot = LivePlot(*_SED, MODEL_CHANNELS)
         self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
@@ -198,8 +194,7 @@ class LivePanel(Panel):
         self._show_tab()
 
     def toggle_drawer(self) -> None:
-        """Open or close the drawer, where readings are shown."""
-        if self._forces_shown:
+        if self.bar.forces_shown:
             self.drawer.open.toggle()
             self._show_tab()
 
@@ -213,8 +208,7 @@ class LivePanel(Panel):
 
     def show_forces(self, visible: bool) -> None:
         """Show readings, or nothing of them where the protocol keeps them from the experimenter."""
-        if visible != self._forces_shown:
-            self._forces_shown = visible
+        if visible != self.bar.forces_shown:
             self._pictures.setVisible(visible)
             self.bar.show_forces(visible)
             self._show_acts()
@@ -237,7 +231,7 @@ class LivePanel(Panel):
 
     def draw(self, marks: tuple[Mark, ...], clock: float, *, silent: bool = False) -> None:
         """Draw a frame; `clock` [s] is the machine's. Where the transducer is `silent`, nothing is measured now."""
-        if not self._forces_shown:
+        if not self.bar.forces_shown:
             return
         trace = self._feed.trace
         newest = trace.newest
@@ -279,7 +273,6 @@ class LivePanel(Panel):
                 plot.show_columns(columns, end_time, marks, clock)
 
     def model_says(self) -> None:
-        """Take what the model said since the last call."""
         for prediction in self._model.poll():
             self._model_trace.add_prediction(prediction)
 
@@ -306,7 +299,7 @@ class LivePanel(Panel):
         """Show the acts where there are pictures that keep their least height beneath them; their keys always serve."""
         inside = self.contentsRect().marginsRemoved(self._rows.contentsMargins())
         least = self.bar.height_with_acts(inside.width()) + self._rows.spacing() + self.drawer.least_height()
-        visible = self._forces_shown and self.height() >= self._least_for_acts and inside.height() >= least
+        visible = self.bar.forces_shown and self.height() >= px(LEAST_FOR_ACTS) and inside.height() >= least
         for act in (self.bar.finite, self.bar.length, self.bar.hold):
             act.setVisible(visible)
 

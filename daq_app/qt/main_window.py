@@ -227,7 +227,6 @@ class MainWindow(QMainWindow):
             self.notice.warn(refusal)
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
-        """Ask the recorder for the session of a form; what prevents it is shown."""
         session = check_form(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
         if isinstance(session, Refusal):
             self.notice.warn(" ".join(session.values()))
@@ -237,7 +236,6 @@ class MainWindow(QMainWindow):
         self.bridge.send(session)
 
     def _form_changed(self) -> None:
-        """Say what is to be done on the page of a new session."""
         bench = bench_of(self.bridge.state.bench)
         self.page.show_bench(bench)
         cards = self.page.check(bench)

@@ -71,7 +71,6 @@ class TrialStrip(QScrollArea):
         self._keep_in_sight()
 
     def show_inspected_trial(self, number: int | None) -> None:
-        """Mark the tile of the inspected trial; None marks none."""
         for tile_button, tile in zip(self.tiles, self._view, strict=True):
             tile_button.setChecked(tile.number == number)
 
@@ -156,7 +155,6 @@ class Middle(QWidget):
         vbox(self.strip, (self._pages, 1), hbox((self.stroke, 1), self.undo, self.redo), on=self, spacing=GRID)
 
     def show_view(self, course: CourseView | None) -> None:
-        """Show the session in hand, or that there is none."""
         self.strip.setVisible(course is not None)
         self.live.show_forces(course is None or not course.no_forces)
         stroke = StrokeView("none", tr("No stroke yet.")) if course is None else course.stroke

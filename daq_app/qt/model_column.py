@@ -15,7 +15,6 @@ from daq_app.analyst.finger_words import (
     name_and_errors,
     other_finger,
     visible_film,
-    was_tried,
 )
 from daq_app.analyst.frame import FIELD_ERRORS, automatic_range
 from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
@@ -23,15 +22,7 @@ from daq_app.analyst.state import AnalystState, Row, selected_row
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.parts import WrappedLabel, button, choice, hbox, vbox
-from daq_app.qt.pictures import (
-    COMPARISON_NAME,
-    FILM_SUFFIXES,
-    ComparedView,
-    PictureView,
-    SaveButtons,
-    write_film,
-    write_picture,
-)
+from daq_app.qt.pictures import FILM_SUFFIXES, ComparedView, PictureView, SaveButtons, write_film, write_picture
 from daq_app.qt.plots import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import Tokens
@@ -40,6 +31,7 @@ from daq_app.wording import tr
 from solver.quantities import SED
 
 FINGER, SESSION, _COMPARISON = range(3)  # tabs
+COMPARISON_NAME = "compared"  # of the picture of two sessions, to the work
 STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing takes long and sliding little time
 
 
@@ -52,7 +44,7 @@ class ModelColumn(QWidget):
         """Show nothing; `ask` orders work, `compare` chooses another session, `show` takes what became of a file."""
         super().__init__()
         self._ask, self._show_message = ask, show
-        self._state: AnalystState | None = None
+        self._state = AnalystState(Path())
         self._film: m.FingerHistory | None = None
         self._name = ""  # of the finger's pictures, after their kind
         self._picture_request = ("", -1)  # picture that was asked for, and version of the report
@@ -122,7 +114,7 @@ class ModelColumn(QWidget):
         self.together.setVisible(state.comparison is not None)
         self._paint()
         self.scene.show_lines(scene_table(state))
-        if previous is None or previous.version != state.version or previous.report is None:
+        if previous.version != state.version:
             names = [title for _, title in session_pictures(state.report)]
             if names != [self.picture_choice.itemText(i) for i in range(self.picture_choice.count())]:
                 self.picture_choice.clear()
@@ -130,7 +122,7 @@ class ModelColumn(QWidget):
         if (comparison := state.comparison) is not None and state.report is not None:
             names = (name_and_errors(state.report), name_and_errors(comparison.report))
             self.comparison.show_rows(compare_reports(state.report, comparison.report), names)
-            if previous is None or previous.comparison is not comparison:
+            if previous.comparison is not comparison:
                 self._picture_request = ("", -1)
                 self.together.setChecked(True)
                 self._paint()
@@ -140,8 +132,6 @@ class ModelColumn(QWidget):
     def _show_picture(self, *_: object) -> None:
         """Show the picture of the tab; what is not drawn is asked for only when it is looked at."""
         state, tab, index = self._state, self.tabs.currentIndex(), self.picture_choice.currentIndex()
-        if state is None:
-            return
         if tab == _COMPARISON and state.comparison is not None:
             view, name, caption = self.comparison.picture, COMPARISON_NAME, tr("both sessions")
         elif tab == SESSION and 0 <= index < len(names := session_pictures(state.report)):
@@ -160,14 +150,12 @@ class ModelColumn(QWidget):
             self._ask(m.Draw(name))
 
     def _paint(self) -> None:
-        state = self._state
-        row = None if state is None else selected_row(state)
-        film, index = self._film, self._index
+        state, film, index = self._state, self._film, self._index
         if film is not None and index is not None:
             finger, text = film.film.frames[index], film_text(film, index)
         else:
-            finger = None if state is None or row is None else state.fingers.get(row.key)
-            text = finger_text(state)
+            row, text = selected_row(state), finger_text(state)
+            finger = None if row is None else state.fingers.get(row.key)
         second, second_text = other_finger(state) if self.together.isChecked() else (None, "")
         lost = film.film.lost if film is not None and index == len(film.film.frames) - 1 else None
         field = self.fields.field
@@ -209,17 +197,17 @@ class ModelColumn(QWidget):
         self._paint()
 
     def _ask_history(self) -> None:
-        row = None if self._state is None else selected_row(self._state)
-        if row is not None:
+        if (row := selected_row(self._state)) is not None:
             self._ask(m.ShowHistory(row.key))
             self.player.slider.setFocus()
 
     def _ask_where(self, row: Row | None, version: int) -> None:
-        """Ask how far a solve without an answer came, once."""
+        """Ask how far a solve without an answer came, once, where the solver had all that it needs."""
         prediction = None if row is None else row.prediction
-        if row is None or prediction is None or prediction.sed is not None or not was_tried(prediction):
+        if row is None or prediction is None or prediction.sed is not None:
             return
-        if (row.key, version) != self._history_request:
+        friction_and_depth = prediction.mu, prediction.tau_max, prediction.indentation, prediction.direction
+        if None not in friction_and_depth and (row.key, version) != self._history_request:
             self._history_request = row.key, version
             self._ask(m.ShowHistory(row.key))
 
@@ -228,7 +216,7 @@ class ModelColumn(QWidget):
 
     def _heading(self) -> str:
         """Return what every picture of a field is marked with: whether simulated, the session, and its errors."""
-        report = None if self._state is None else self._state.report
+        report = self._state.report
         marks = () if report is None else (report.head, report.session)
         return "\n".join((" · ".join(filter(None, marks)), tr(FIELD_ERRORS)))
 
@@ -252,7 +240,6 @@ class ModelColumn(QWidget):
             self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 
     def write_film(self, path: Path) -> None:
-        """Write the displayed history as a film, and show the result."""
         assert self._film is not None
         previous, self._filming = self._index, True
         try:

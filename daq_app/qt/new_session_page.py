@@ -113,7 +113,6 @@ class NewSessionPage(Panel):
         return buttons
 
     def _follow(self) -> None:
-        """Let every field say that it has changed, and show what depends on it."""
         for line in self._lines.values():
             line.textChanged.connect(self.changed)
         for widget in (self.with_forces, self.scores_only, self.people_score, self.simulated):
@@ -188,7 +187,6 @@ class NewSessionPage(Panel):
             first.setFocus()
 
     def look_for_unfinished_sessions(self) -> None:
-        """Look for sessions that were cut short, without holding up the window."""
         self.cut_short.look_in(folder_of(self.form()))
 
     def _show_study(self) -> None:
@@ -290,13 +288,11 @@ class NewSessionPage(Panel):
         inside = QWidget()
         vbox(label(tr("New session"), "title"), self.cut_short, self._columns, 1, on=inside, margins=GRID, spacing=GRID)
         vbox(scroll_area(inside), on=self, margins=2)
-        self._two = px(TWO)
         self.setMinimumWidth(px(280, most=1.25))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Put the cards in two columns where there is room."""
         super().resizeEvent(event)
-        set_horizontal(self._columns, self.width() >= self._two)
+        set_horizontal(self._columns, self.width() >= px(TWO))
 
     def showEvent(self, event: QShowEvent) -> None:
         """Propose the code after that of a session that has just ended."""

@@ -74,7 +74,6 @@ class WrappedLabel(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_text(self, text: str) -> None:
-        """Show a text; none of it takes no room."""
         display = text.replace("/", "/\u200b")  # where a line may end
         if display != self.text():
             self.setText(display)
@@ -83,7 +82,6 @@ class WrappedLabel(QLabel):
         self.setVisible(self._keeps_room or bool(text))
 
     def hasHeightForWidth(self) -> bool:
-        """Say that its height is its own affair."""
         return False
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -260,12 +258,8 @@ def regrade(widget: QWidget, value: str, property_name: str = "grade") -> None:
 
 
 def set_text(widget: QLabel, text: str, name: str = "", grade: str | None = None) -> None:
-    """Show a text, only where it is another one: nothing is laid out again for nothing.
-
-    A screen reader says it after the `name` of what it tells; without a name the text alone.
-    """
-    if widget.text() != text:
-        widget.setText(text)
+    """Show a text. A screen reader says it after the `name` of what it tells; without a name the text alone."""
+    widget.setText(text)  # Qt itself does nothing where it is the same
     if name:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
     if grade is not None:

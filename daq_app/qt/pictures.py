@@ -26,7 +26,6 @@ from sessions.file_access import write_whole
 
 _FILE_FORMATS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
-COMPARISON_NAME = "compared"  # its name
 _DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
 _STEP_MS = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
 _LOOK = 0.02  # between two looks at a film that is being written [s]
@@ -115,7 +114,6 @@ class ComparedView(QWidget):
         self.show_rows((), ("", ""))
 
     def show_rows(self, rows: ComparisonRows, sessions: tuple[str, str]) -> None:
-        """Show the stimuli of two sessions, by their names."""
         visible = bool(sessions[1])
         names = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
         set_text(self.names_label, names if visible else tr("No second session is open."))

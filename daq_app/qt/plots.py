@@ -128,7 +128,6 @@ class ZoomedPlot(pg.PlotWidget):
             event.ignore()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Say what stands at the pointer, as far as the plot knows it."""
         pg.PlotWidget.mouseMoveEvent(self, event)
         box: Any = self.getPlotItem().getViewBox()
         scene, room = self.mapToScene(event.position().toPoint()), box.sceneBoundingRect()

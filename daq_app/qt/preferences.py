@@ -29,11 +29,6 @@ USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scalin
 _GEOMETRY, _RECENT = "window/geometry", "window/recent sessions"
 
 
-def choose(key: str, value: object) -> None:
-    """Remember what was chosen as `THEME`, `SCALE` or `LANGUAGE`; None follows the system again."""
-    settings().setValue(key, "" if value is None else str(value))
-
-
 def theme() -> str:
     """Return the theme that was chosen, one of THEMES."""
     name = str(settings().value(THEME))

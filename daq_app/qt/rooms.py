@@ -143,7 +143,7 @@ class Menus:
         """Return an entry for each value of a preference, by its name, that remembers it and does what follows."""
 
         def choose(value: object) -> None:
-            preferences.choose(preference, value)
+            preferences.settings().setValue(preference, str(value))
             self._act(preference)
 
         group = QActionGroup(menu)
@@ -203,7 +203,6 @@ class ReviewRoom(QWidget):
         self._row = hbox(self._side, (self._none, 1), on=self, spacing=GRID)
 
     def enter(self) -> None:
-        """Open the newest session where none is open."""
         self._list()
         if self.analyst is None and (recent := recent_sessions()):
             self.open(recent[0])

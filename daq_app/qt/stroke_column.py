@@ -172,7 +172,6 @@ class DecisionsBar(QWidget):
         return self.reason_field.text().strip() or DRAGGED
 
     def show_history(self, history: History) -> None:
-        """Say on each button what it would do next."""
         for widget, decisions, text in (
             (self.undo, history.undoable[-1:], tr_noop("undo {decision}, Ctrl+Z")),
             (self.redo, history.redoable[:1], tr_noop("redo {decision}, Ctrl+Shift+Z")),

@@ -161,7 +161,6 @@ class StrokeView(QWidget):
             self.show_all()
 
     def show_all(self) -> None:
-        """Show the whole stroke, whatever was zoomed or moved."""
         for plot in self._plots:
             plot.enableAutoRange()
             plot.autoRange()

@@ -80,7 +80,6 @@ class Thumbnail(SubjectPicture):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_form(self, form: SessionForm, size: QSize) -> None:
-        """Show the page of a form as it looks in a subject's window of a size."""
         source = form.protocol, form.study, form.folder, form.language, size
         if source == self._source:
             return

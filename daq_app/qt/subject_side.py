@@ -51,7 +51,6 @@ class TabletScreen(QObject):
 
     @property
     def status(self) -> str:
-        """Return what is worth knowing of the tablet, for the experimenter."""
         if not self.server.connected:
             return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
         state = tr("checked") if self._pixels else tr("not checked")
@@ -168,7 +167,6 @@ class SubjectSide(QObject):
             self._subject.press.show_force(trace)
 
     def line_settings(self) -> tuple[Setting, ...]:
-        """Return what a recording says of the subject's line."""
         tablet, screen = self._tablet, self._subject.screen()
         return line_settings(millimetres(screen)) if tablet is None else tablet.line_settings()
 
@@ -180,7 +178,6 @@ class SubjectSide(QObject):
         self._window.activateWindow()
 
     def _show_subject(self, *, activating: bool) -> None:
-        """Show the subject's window: on a second screen where there is one."""
         subject, own_screen = self._subject, self._window.screen()
         elsewhere = [screen for screen in QGuiApplication.screens() if screen is not own_screen]
         subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)

@@ -23,6 +23,9 @@ GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 TEXT_WIDTH = 900  # of a text that is still easily read, before the scale of the fonts
 
 
+NO_PAGE = SubjectView("read", "")  # before the first, and once an answer is given
+
+
 class SubjectWindow(QWidget):
     """A window of its own, for a second screen or a tablet."""
 
@@ -36,7 +39,7 @@ class SubjectWindow(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setWindowTitle("daq-app · subject")
         self.setAccessibleName("subject's window")
-        self._view: SubjectView | None = None
+        self._view = NO_PAGE
         self._answered: SubjectView | None = None  # until the recorder has the answer, views still ask for it
         self.answer_key: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
@@ -65,11 +68,11 @@ class SubjectWindow(QWidget):
 
     @property
     def scoring(self) -> bool:
-        return self._view is not None and self._view.asks
+        return self._view.asks
 
     @property
     def asks(self) -> Kind:
-        return "read" if self._view is None else self._view.kind
+        return self._view.kind
 
     @property
     def measuring(self) -> bool:
@@ -93,7 +96,7 @@ class SubjectWindow(QWidget):
         self._next_row.setDirection(directions.LeftToRight if view.hand == "right" else directions.RightToLeft)
         self.press.setVisible(view.force)
         if view.asks:
-            if previous is None or _question_of(previous) != _question_of(view):
+            if _question_of(previous) != _question_of(view):
                 self._begin(view)
             set_text(self._question, view.title)
             self._answer_changed()
@@ -145,7 +148,6 @@ class SubjectWindow(QWidget):
         self._answer_fields.setCurrentWidget(self._scale if answer_field is self.line else answer_field)
 
     def check_ruler(self) -> None:
-        """Show the page on which the line is held against a ruler."""
         self.ruler.begin(self.screen())
         self._pages.setCurrentWidget(self.ruler)
         self.raise_()
@@ -184,7 +186,6 @@ class SubjectWindow(QWidget):
         self.screen_changed.emit()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow a change of the screen's scaling."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.DevicePixelRatioChange:
             self.fit_screen()
@@ -231,7 +232,7 @@ class SubjectWindow(QWidget):
 
     def _answer_changed(self) -> None:
         self.next.setVisible(self._answer_field.answered)
-        hint, meanings = "" if self._view is None else self._view.text, self.number.two_meanings
+        hint, meanings = self._view.text, self.number.two_meanings
         if self.asks == "number" and meanings is not None:
             hint = translator(self._language)(Text.TWO_MEANINGS).format(whole=meanings[0], fraction=meanings[1])
         if self._hint.text() != hint:
@@ -244,7 +245,7 @@ class SubjectWindow(QWidget):
         self.answer_key = key
         answer_event = self._answer_field.answer_event(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
-        self._view, self._answered = None, self._view
+        self._view, self._answered = NO_PAGE, self._view
         set_text(self._title, translator(self._language)(Text.THANKS))
         set_text(self._text, "")
         self._fit_type()

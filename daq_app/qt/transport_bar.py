@@ -48,7 +48,8 @@ class TransportBar(QWidget):
         self._line.setEasingCurve(QEasingCurve.Type.Linear)
         self._line.setUpdateInterval(_TICK)
         self._line.valueChanged.connect(lambda: self._show(self._time))
-        self._line.finished.connect(self._finish)
+        self._line.finished.connect(self._enable)
+        self._line.finished.connect(self.ended)
         self._enable()
 
     @property
@@ -121,10 +122,6 @@ class TransportBar(QWidget):
             self._line.setCurrentTime(round(per_second * (time - first)))
             if playing:
                 self._line.resume()
-
-    def _finish(self) -> None:
-        self._enable()
-        self.ended.emit()
 
     def _show(self, time: float) -> None:
         index = max(bisect_right(self._times, time) - 1, 0)

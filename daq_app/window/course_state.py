@@ -11,6 +11,7 @@ from daq_app.recorder.messages import Kind
 from daq_app.wording import answer_text
 from sessions.plan.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
+from sessions.recording.log import ANSWERS
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
 from sessions.strokes import FrictionParameters
@@ -300,12 +301,9 @@ def _fold_event(session: SessionState, event: LoggedEvent) -> SessionState:
 
 def _of_trial(session: SessionState, number: int | None, kind: str, data: Mapping[str, Any]) -> SessionState:
     match kind:
-        case "scored":
-            return session.with_trial(number, answer=answer_text("scored", data["score"]))
-        case "number_given":
-            return session.with_trial(number, answer=answer_text("numbered", data["number"]))
-        case "chosen":
-            return session.with_trial(number, answer=answer_text("chosen", data["choice"]))
+        case "scored" | "number_given" | "chosen":
+            outcome = "numbered" if kind == "number_given" else kind
+            return session.with_trial(number, answer=answer_text(outcome, data[ANSWERS[kind]]))
         case "left_out":
             return session.with_trial(number, outcome="skipped")
         case "take_started":

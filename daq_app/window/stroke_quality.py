@@ -132,8 +132,6 @@ class Judge:
                 self._offset, self._due = 0.0, None
             case LoggedEvent(kind="contact_onset"):
                 self._due = None
-            case _:
-                pass
 
     def look(self, feed: LiveFeed, state: AppState) -> None:
         """Have the take looked at once enough came after the lift."""

@@ -14,7 +14,7 @@ from PySide6.QtCore import QEvent, QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from daq_app.qt.preferences import SCALE, choose, settings, type_scale
+from daq_app.qt.preferences import SCALE, settings, type_scale
 from daq_app.qt.start import open_window
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import LIGHT, style_sheet
@@ -122,7 +122,7 @@ def type_size():
     """Return what chooses a size of type; the usual one comes back."""
 
     def choose_scale(scale):
-        choose(SCALE, scale)
+        settings().setValue(SCALE, str(scale))
         type_scale.cache_clear()
 
     yield choose_scale

@@ -54,7 +54,7 @@ def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
         assert "next start" in window.notice._label.text()
     finally:
         actions["System"].trigger()
-        preferences.choose(preferences.SCALE, None)
+        preferences.settings().remove(preferences.SCALE)
 
 
 def test_the_rail_opens_the_rooms_that_can_be_entered_and_says_why_another_cannot(driver, rooms):
