@@ -307,11 +307,8 @@ def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
         predictions = tuple(prediction for prediction in previous.predictions if prediction.stroke in numbers)
         report = replace(report, predictions=predictions)
         fingers = {key: finger for key, finger in fingers.items() if key[1] in numbers}
-    version, history = state.version + 1, message.history
-    new_state = replace(
-        state, stage=message.stage, report=report, history=history, version=version, fingers=fingers, pictures={}
-    )
-    return _keep_row(state, new_state)
+    changes = {"stage": message.stage, "history": message.history, "version": state.version + 1, "pictures": {}}
+    return _keep_row(state, replace(state, report=report, fingers=fingers, **changes))
 
 
 def _keep_row(previous: AnalystState, state: AnalystState) -> AnalystState:
@@ -337,5 +334,6 @@ def _fold_answer(state: AnalystState, answer: TrialAnswer) -> AnalystState:
     fingers = {present: finger for present, finger in state.fingers.items() if present != key}
     if answer.finger is not None:
         fingers[key] = answer.finger
-    new_state = replace(state, report=replace(report, predictions=(*predictions, finding)), fingers=fingers)
-    return _keep_row(state, new_state)
+    return _keep_row(
+        state, replace(state, report=replace(report, predictions=(*predictions, finding)), fingers=fingers)
+    )

@@ -99,7 +99,7 @@ class AnalystWindow(QMainWindow):
         self._progress_label = WrappedLabel("quiet", keeps_room=True)
         self.trials = TrialsColumn(tokens, self.ask, self.take)
         self.stroke = StrokeColumn(tokens, self.ask, self._replay_next)
-        self.model = ModelColumn(tokens, self.ask, self._choose_comparison, self._progress_label.show_text)
+        self.model = ModelColumn(tokens, self.ask, self._progress_label.show_text)
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
@@ -165,7 +165,6 @@ class AnalystWindow(QMainWindow):
         return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         set_horizontal(self._foot, self.width() >= px(_ONE_ROW))
         self._place_columns()
         self.keys.fit()
@@ -204,11 +203,6 @@ class AnalystWindow(QMainWindow):
         name, _ = QFileDialog.getSaveFileName(self, tr("New folder"), f"{self.state.folder.name}-{export_format}")
         if name:
             self.ask(m.Write(export_format, name))
-
-    def _choose_comparison(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, tr("Session to compare with"), str(self.state.folder.parent))
-        if name:
-            self.ask(m.Compare(name))
 
     def _follow(self, target: str) -> None:
         self._pages.setCurrentIndex({"session": 2, "prediction": 2, "trial": 0}.get(target, 1))

@@ -34,9 +34,7 @@ _KEYS = {
     Qt.Key.Key_Left: -STEP, Qt.Key.Key_Down: -STEP, Qt.Key.Key_Right: STEP, Qt.Key.Key_Up: STEP,
     Qt.Key.Key_PageDown: -LEAP, Qt.Key.Key_PageUp: LEAP, Qt.Key.Key_Home: -100.0, Qt.Key.Key_End: 100.0,
 }  # fmt: skip
-_NUMBER = QRegularExpression(
-    rf"\d{{0,9}}([{POINTS}]\d{{0,9}})?", QRegularExpression.PatternOption.UseUnicodePropertiesOption
-)  # what can be typed of one
+_NUMBER = QRegularExpression(rf"\p{{Nd}}{{0,9}}([{POINTS}]\p{{Nd}}{{0,9}})?")  # what can be typed of one, in any script
 _LARGE = 36  # type of the number [device-independent pixels]
 _BUTTON_TYPE = 24  # type of the buttons
 _WIDE, HIGH = 220, 96  # a button, at least
@@ -223,9 +221,9 @@ class _Field(QWidget):
         return self.answer.judgement(hand)
 
     def begin(self) -> None:
-        self._take(Choice())
+        self.take(Choice())
 
-    def _take(self, answer: Choice) -> None:
+    def take(self, answer: Choice) -> None:
         self.answer = answer
         self.changed.emit()
 
@@ -256,7 +254,7 @@ class NumberField(_Field):
         return two_meanings(self.field.text(), self.point)
 
     def _type(self, text: str) -> None:
-        self._take(self.answer.type_number(self.now(), typed_number(text, self.point)))
+        self.take(self.answer.type_number(self.now(), typed_number(text, self.point)))
 
 
 class ChoiceOfTwo(_Field):
@@ -285,7 +283,7 @@ class ChoiceOfTwo(_Field):
             backward, forward = forward, backward
         keys: dict[int, Which] = {Qt.Key.Key_1: "first", backward: "first", Qt.Key.Key_2: "second", forward: "second"}
         if event.key() in keys:
-            self._take(self.answer.choose(self.now(), keys[event.key()], "keyboard"))
+            self.take(self.answer.choose(self.now(), keys[event.key()], "keyboard"))
         else:
             super().keyPressEvent(event)
 
@@ -296,7 +294,7 @@ class ChoiceOfTwo(_Field):
         return False
 
     def _button(self, text: str, value: Which) -> QPushButton:
-        choice = button(text, text, lambda: self._take(self.answer.choose(self.now(), value, self._pointer)), "choice")
+        choice = button(text, text, lambda: self.take(self.answer.choose(self.now(), value, self._pointer)), "choice")
         choice.installEventFilter(self)
         choice.setCheckable(True)
         choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -305,10 +303,10 @@ class ChoiceOfTwo(_Field):
         choice.setStyleSheet(f"font-size: {px(_BUTTON_TYPE)}px; {size}")
         return choice
 
-    def _take(self, answer: Choice) -> None:
+    def take(self, answer: Choice) -> None:
         self.first.setChecked(answer.value == "first")
         self.second.setChecked(answer.value == "second")
-        super()._take(answer)
+        super().take(answer)
 
 
 def newest_force(trace: LiveTrace) -> float:

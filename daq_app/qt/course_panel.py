@@ -122,5 +122,4 @@ class CoursePanel(Panel):
                 self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         self.mirror.open.set_room(self.height() >= px(_ROOMY, most=1.4))

@@ -62,7 +62,6 @@ class Header(QWidget):
         set_text(self._age, view.lamp.age)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         set_horizontal(self._rows, self.width() >= px(_ONE_ROW))
 
 
@@ -156,7 +155,6 @@ class ToDo(Panel):
             self.sentence.setMinimumHeight(tallest)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
             self.sentence.setMinimumHeight(_LEAST)
 

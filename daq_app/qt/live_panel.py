@@ -91,7 +91,6 @@ class LiveBar(QWidget):
                 self.values[channel].setAccessibleName(speech(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         self._fit()
 
     def _fit(self) -> None:
@@ -304,7 +303,6 @@ class LivePanel(Panel):
             act.setVisible(visible)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         speed, model = self.height() >= LEAST_FOR_SPEED, self.height() >= LEAST_FOR_MODEL
         visible = [True, True, speed, model]
         for plot, fits, below in zip(self._column, visible, [*visible[1:], False], strict=True):

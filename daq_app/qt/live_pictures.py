@@ -107,9 +107,8 @@ class ContactMap(PaintedWidget):
         painter.drawRoundedRect(box, 4, 4)
         painter.setFont(font(SMALL))
         painter.setPen(QColor(t.quiet))
-        margin_box = QRectF(
-            box.right() + 2 * _MARGIN, box.top(), self.width() - box.right() - 2 * _MARGIN, box.height()
-        )
+        left = box.right() + 2 * _MARGIN
+        margin_box = QRectF(left, box.top(), self.width() - left, box.height())
         alignments = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
         if box.height() >= len(alignments) * painter.fontMetrics().height():
             for alignment, text in zip(alignments, self._labels, strict=True):

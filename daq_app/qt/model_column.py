@@ -38,10 +38,8 @@ STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing 
 class ModelColumn(QWidget):
     """Four tabs: the finger, pictures of the session, another session, and the scene."""
 
-    def __init__(
-        self, tokens: Tokens, ask: Callable[[m.Ask], None], compare: Callable[[], None], show: Callable[[str], None]
-    ) -> None:
-        """Show nothing; `ask` orders work, `compare` chooses another session, `show` takes what became of a file."""
+    def __init__(self, tokens: Tokens, ask: Callable[[m.Ask], None], show: Callable[[str], None]) -> None:
+        """Show nothing; `ask` orders work, `show` takes what became of a file."""
         super().__init__()
         self._ask, self._show_message = ask, show
         self._state = AnalystState(Path())
@@ -82,7 +80,7 @@ class ModelColumn(QWidget):
         self.picture = PictureView(tr("the picture"), self._save)
         self.picture_choice.activated.connect(self._show_picture)
         self.session_errors = WrappedLabel("quiet")
-        self.comparison = ComparedView(compare, self._save)
+        self.comparison = ComparedView(self._compare, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         session = QWidget()
         vbox(self.picture_choice, self.session_errors, (self.picture, 1), on=session)
@@ -210,6 +208,11 @@ class ModelColumn(QWidget):
         if None not in friction_and_depth and (row.key, version) != self._history_request:
             self._history_request = row.key, version
             self._ask(m.ShowHistory(row.key))
+
+    def _compare(self) -> None:
+        folder = str(self._state.folder.parent)
+        if name := QFileDialog.getExistingDirectory(self, tr("Session to compare with"), folder):
+            self._ask(m.Compare(name))
 
     def _save(self, name: str, path: str) -> None:
         self._ask(m.Write(f"picture {name}", path))

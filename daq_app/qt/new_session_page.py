@@ -72,9 +72,8 @@ class NewSessionPage(Panel):
         self.seed = entry(tr("seed of the stimulus order; empty for a new one"), tr("a new one"))
         meaning = tr("height of the face above the transducer's origin in millimetres; may be empty")
         self.height_above = entry(meaning, tr("as stated"))
-        self.normal = choice(
-            tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *SIGNED_AXES)
-        )
+        meaning = tr("axis of the transducer along which pressing is positive")
+        self.normal = choice(meaning, (tr("as stated"), *SIGNED_AXES))
         meaning = tr("contact area of finger and surface in square millimetres; may be empty")
         self.area = entry(meaning, tr("as stated"))
         hands = [tr(meaning) for meaning in HAND_NAMES]
@@ -291,12 +290,10 @@ class NewSessionPage(Panel):
         self.setMinimumWidth(px(280, most=1.25))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         set_horizontal(self._columns, self.width() >= px(TWO))
 
     def showEvent(self, event: QShowEvent) -> None:
         """Propose the code after that of a session that has just ended."""
-        super().showEvent(event)
         self._place_changed()
 
     def changeEvent(self, event: QEvent) -> None:

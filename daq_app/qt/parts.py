@@ -85,7 +85,6 @@ class WrappedLabel(QLabel):
         return False
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
             self._least = self.fontMetrics().height() if self._keeps_room else 1
             self._fit()

@@ -65,10 +65,8 @@ class Rail(Panel):
         super().__init__(tr("rooms"), "strip")
         self.buttons: dict[Room, QPushButton] = {}
         for room in ROOMS:
-            name = tr(ROOM_NAMES[room])
-            self.buttons[room] = button(
-                f"{name}\n{KEY_OF[f'go to {room}']}", name, partial(go, room), "rail", checkable=True
-            )
+            name, key = tr(ROOM_NAMES[room]), KEY_OF[f"go to {room}"]
+            self.buttons[room] = button(f"{name}\n{key}", name, partial(go, room), "rail", checkable=True)
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
         self.setFixedWidth(px(_WIDTH, most=1.4))
 
@@ -326,7 +324,6 @@ class Rooms(QStackedWidget):
         self.show_state()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         self.review.fit(event.size().width())  # also while another room is shown, which it would hold open
 
     def show_state(self) -> None:

@@ -122,7 +122,6 @@ class SubjectWindow(QWidget):
                 return
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         self._fit_type()
 
     def _speak(self, language: str) -> None:
@@ -176,7 +175,6 @@ class SubjectWindow(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the window to screens of another size from now on."""
-        super().showEvent(event)
         # Not on a move: that event comes before the screen is the other one.
         self.windowHandle().screenChanged.connect(self._screen_changed, Qt.ConnectionType.UniqueConnection)
         self._screen_changed()
@@ -290,7 +288,6 @@ class _Scale(QWidget):
         self.setMinimumWidth(line.width())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
         self.fit()
 
 

@@ -151,7 +151,6 @@ class ReadingsTable(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         """Fit the columns to the type, which is known by now."""
-        super().showEvent(event)
         self._fit_columns()
 
     def go_to(self, row: int) -> None:

@@ -5,11 +5,12 @@ import re
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
+from itertools import chain
 from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.state import BenchState
-from daq_app.wording import sentence, tr, two_meanings, typed_number
+from daq_app.wording import sentence, tr, tr_noop, two_meanings, typed_number
 from sessions.file_access import failure_sentence
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, is_code, plan, protocol
@@ -24,6 +25,10 @@ from sessions.toml_file import SettingsError
 
 SIGNED_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
+_NUMBERS = {
+    "height": tr_noop("A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty."),
+    "area": tr_noop("An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty."),
+}
 _LONGEST_LIST = 20  # sessions that were cut short, at most
 
 
@@ -180,10 +185,8 @@ def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
         version = original.in_language(form.language) if form.language in original.languages else original
     except (StudyError, SettingsError, OSError):
         return (), ()
-    texts = [
-        text for block in version.blocks for text in (block.instruction, block.question, *(block.scale_ends or ()))
-    ]
-    return original.languages, tuple(texts)
+    texts = [(block.instruction, block.question, *(block.scale_ends or ())) for block in version.blocks]
+    return original.languages, tuple(chain.from_iterable(texts))
 
 
 def enrolment(form: SessionForm) -> Enrolment | None:
@@ -309,17 +312,10 @@ def _refusals(form: SessionForm, bench: Bench) -> Refusal:
         wrong["seed"] = tr(
             "A seed is a whole number from 0 to {largest}; leave it empty for a new one.", largest=LARGEST_SEED
         )
-    height = _number(form.height)
-    lowest, highest = HEIGHTS
-    if form.height.strip() and (height is None or not lowest <= height <= highest):
-        wrong["height"] = tr(
-            "A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty.", highest=highest
-        ) + _doubt(form.height)
-    area = _number(form.area)
-    if form.area.strip() and (area is None or not AREAS[0] <= area <= AREAS[1]):
-        wrong["area"] = tr(
-            "An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty.", least=AREAS[0], most=AREAS[1]
-        ) + _doubt(form.area)
+    for name, text, (least, most) in (("height", form.height, HEIGHTS), ("area", form.area, AREAS)):
+        value = _number(text)
+        if text.strip() and (value is None or not least <= value <= most):
+            wrong[name] = tr(_NUMBERS[name], highest=most, least=least, most=most) + _doubt(text)
     if unusable := _why_unusable(folder_of(form)):
         wrong["folder"] = unusable
     if form.forces and not bench.connected:
