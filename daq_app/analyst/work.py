@@ -214,7 +214,9 @@ class Work:
         finding = self._report.strokes[int(stroke) - 1]
         if finding.index is None:  # a picture for paper says which stimulus it is of
             return None
-        return field_at(finding.experiment, finding.index, film.film, int(step))
+        frame = film.film.frames[int(step)]
+        fields = Fields(frame.nodes, frame.mesh.triangles, frame.values, frame.outlines, frame.patch)
+        return Field(finding.experiment, finding.index, fields, frame.contact)
 
     def _comparison_panel(self) -> "Panel | None":
         from sessions.report.figures.relation import comparison_panel
@@ -360,13 +362,6 @@ def lost_film(load_path: SolutionPath, sketch: Sketch, progress: Progress) -> tu
         return film, ""
     lost = place_of_least_stretch(load_path.finger, instants[-1].state, instants[-1].depth)
     return replace(film, lost=lost), str(failure.in_a_sentence())
-
-
-def field_at(experiment: str, index: int, film: Film, step: int) -> Field:
-    """Return one state of a film as the figures of a report draw it."""
-    frame = film.frames[step]
-    fields = Fields(frame.nodes, frame.mesh.triangles, frame.values, frame.outlines, frame.patch)
-    return Field(experiment, index, fields, frame.contact)
 
 
 def _frame(mesh: FrameMesh, fields: Fields, skin: Skin, row: Array) -> Frame:

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
 from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Range, View, halve_triangles, visible
-from daq_app.qt.painting import faces, paint_failed_solve, sheer
+from daq_app.qt.painting import paint_faces, paint_failed_solve, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
@@ -87,14 +87,7 @@ class FingerPainter:
             nodes, values, triangles = halve_triangles(nodes, values, triangles)
         low, high = look.range
         fraction = (values[triangles].mean(axis=1) - low) / (high - low)
-        shade = (np.clip(np.nan_to_num(fraction), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
-        self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        for number, path in faces(self.view.to_screen(nodes)[triangles], shade):
-            self.painter.setPen(QPen(shades[number], 0))
-            self.painter.setBrush(shades[number])
-            self.painter.drawPath(path)
-        self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
-        self.painter.setBrush(Qt.BrushStyle.NoBrush)
+        paint_faces(self.painter, self.view.to_screen(nodes)[triangles], fraction, shades, edges=True)
 
     def _paint_mesh(self) -> None:
         self.painter.setPen(QPen(sheer("black", 110), 0.6))

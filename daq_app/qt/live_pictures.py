@@ -6,7 +6,16 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QP
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.analyst.frame import View
-from daq_app.qt.painting import PaintedWidget, blank, draw_line, faces, fine, lines, paint_arrow, paint_failed_solve
+from daq_app.qt.painting import (
+    PaintedWidget,
+    blank,
+    draw_line,
+    fine,
+    lines,
+    paint_arrow,
+    paint_faces,
+    paint_failed_solve,
+)
 from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
 from daq_app.window.live_model import ModelText, Picture
 from daq_app.window.live_trace import PlotScale
@@ -191,7 +200,8 @@ class FingerView(QWidget):
         painter.drawLine(QPointF(box.left(), ground), QPointF(box.right(), ground))
         picture = self._picture
         if picture is not None:
-            self._paint_faces(painter, picture, view.to_screen(picture.nodes))
+            corners = view.to_screen(picture.nodes)[picture.faces]
+            paint_faces(painter, corners, 1000.0 * picture.sed / self._colours.high, [*map(QColor, MAGMA)])
             style = Qt.PenStyle.SolidLine if self._text.state == "settled" else Qt.PenStyle.DashLine
             painter.setPen(fine(t.text, style))
             draw_line(painter, *view.to_screen(picture.outline).T)
@@ -200,17 +210,6 @@ class FingerView(QWidget):
         painter.restore()
         painter.setPen(QColor(t.quiet))
         painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, tr("0 to {high:g} kPa", high=self._colours.high))
-
-    def _paint_faces(self, painter: QPainter, picture: Picture, points: Array) -> None:
-        fraction = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
-        shade = (fraction * (len(MAGMA) - 1)).astype(np.int64)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        painter.setPen(Qt.PenStyle.NoPen)
-        for number, path in faces(points[picture.faces], shade):
-            painter.setBrush(QColor(MAGMA[number]))
-            painter.drawPath(path)
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
     def _paint_row(self, painter: QPainter, box: QRectF) -> None:
         line, t = painter.fontMetrics().height(), theme_of(self)

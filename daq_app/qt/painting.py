@@ -1,6 +1,6 @@
 """What is painted by hand: arrays as shapes, a widget whose ground is painted once, and small marks of a state."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import ceil
 from typing import Any, Literal
@@ -103,6 +103,20 @@ def faces(corners: Array, shades: Indices) -> Iterator[tuple[int, QPainterPath]]
         stream = QDataStream(QByteArray(polygons.size.to_bytes(4, "big") + polygons.tobytes() + _TAIL))
         stream >> path  # it reads into `path`
         yield int(sorted_shades[begin]), path
+
+
+def paint_faces(
+    painter: QPainter, corners: Array, fraction: Array, shades: Sequence[QColor], *, edges: bool = False
+) -> None:
+    """Fill polygons (f, k, 2), each in the shade at its fraction (f,) of them all; with `edges` their sides too."""
+    shade = (np.clip(np.nan_to_num(fraction), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    for number, path in faces(corners, shade):
+        painter.setPen(QPen(shades[number], 0) if edges else Qt.PenStyle.NoPen)
+        painter.setBrush(shades[number])
+        painter.drawPath(path)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
 
 class PaintedWidget(QWidget):

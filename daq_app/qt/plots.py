@@ -1,7 +1,6 @@
 """Plots that the wheel zooms and the mouse moves; a field of the finger as a curve, and which field it is."""
 
 from collections.abc import Callable, Sequence
-from math import floor, log10
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Frame, Line, Range
 from daq_app.qt.parts import button, choice, hbox, label, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MODEL, SMALL, TARGET, Tokens, font
+from daq_app.window.live_trace import scale_step
 from daq_app.wording import tr, tr_noop
 from drivers.arrays import Array
 from solver.prediction import ROW
@@ -47,8 +47,7 @@ class RoomyAxis(pg.AxisItem):
         spacing = QFontMetricsF(self.style["tickFont"]).height() * (greatest - least) / size
         if not spacings or spacings[0][0] >= spacing:
             return spacings
-        power = 10.0 ** floor(log10(spacing))
-        return [(next(step * power for step in (1, 2, 5, 10) if step * power >= spacing), 0.0)]
+        return [(scale_step(spacing), 0.0)]
 
 
 def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types

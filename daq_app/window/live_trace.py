@@ -183,16 +183,16 @@ class PlotScale:
             return self
         margin = SCALE_MARGIN * (self.high - self.low)
         if greatest > self.high + margin or least < self.low - margin:
-            low = self.low if least >= self.low - margin else -_step(-least)
-            high = self.high if greatest <= self.high + margin else _step(greatest)
+            low = self.low if least >= self.low - margin else -scale_step(-least)
+            high = self.high if greatest <= self.high + margin else scale_step(greatest)
             return PlotScale(low, high, self.least, now)
         wide = self.high - self.low > self.least
         if not wide or greatest > SHRINK * self.high or least < SHRINK * self.low:
             return PlotScale(self.low, self.high, self.least, now)
         if now - self.last_use < _PATIENCE:
             return self
-        low = 0.0 if self.low == 0.0 else -max(_step(-least), self.least / 2)
-        return PlotScale(low, max(_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
+        low = 0.0 if self.low == 0.0 else -max(scale_step(-least), self.least / 2)
+        return PlotScale(low, max(scale_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
 
 
 def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
@@ -220,10 +220,10 @@ def times(seconds: float, room: float) -> tuple[float, ...]:
     return tuple(-step * n + 0.0 for n in range(int(seconds / step + 1e-9), -1, -1))
 
 
-def _step(value: float) -> float:
-    """Return the smallest step that is not below a value; 0 for none.
+def scale_step(value: float) -> float:
+    """Return the smallest step, 1, 2 or 5 times a power of ten, that is not below a value; 0 for none.
 
-    >>> _step(0.3), _step(5.1), _step(-2.0)
+    >>> scale_step(0.3), scale_step(5.1), scale_step(-2.0)
     (0.5, 10.0, 0.0)
     """
     if value <= 0.0:

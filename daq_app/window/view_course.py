@@ -28,6 +28,7 @@ TILES: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state witho
     "coming": ("○", tr_noop("still to come")),
 }
 MEANS = ("normal_force", "tangential_force", "mu_dynamic", "speed")  # of a stroke, in the order of PICTURE
+BEFORE_STROKE = ("mounting", "taring", "ready")  # phases in which a redo can be undone
 NO_FORCES = tr_noop("Forces are not shown in this protocol.")
 
 
@@ -124,7 +125,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
-        buttons=_buttons(session, trial) | {"redo": _redo(targets, stroke.redo), "undo": _undo(session)},
+        buttons=_buttons(session, trial) | {"redo": _redo(targets, stroke.redo)},
         no_forces=_no_forces(session.plan),
     )
 
@@ -137,18 +138,19 @@ def _no_forces(plan: SessionPlan) -> str:
 
 def _buttons(session: SessionState, trial: TrialState | None) -> dict[str, Button]:
     phase = session.phase
-    by_digits = isinstance(session.command, steps.AskNumber | steps.AskChoice)  # a subject may press 0 by mistake
+    by_digits = isinstance(session.command, steps.AskNumber | steps.AskChoice)
+    key = "" if by_digits else "0"  # which a subject may press by mistake
     why_skip = "" if trial is None else tr("Why is {trial} left out?", trial=_name_trials((trial,)))
     pause = Button(tr("Pause"), "P", phase in IN_A_TRIAL, steps.Pause())
     end = Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?"))
+    undo = tr("Undo redo {numbers}", numbers="–".join(map(str, session.redone)))
     return {
         "skip": Button(tr("Skip"), "S", trial is not None and phase in IN_A_TRIAL, question=why_skip),
         "pause": Button(tr("Resume"), "P", sends=steps.Resume()) if phase == "paused" else pause,
         "note": Button(tr("Note"), "N", not session.is_over, question=tr("Note, kept with its time:")),
-        "no answer": Button(
-            tr("No answer"), "" if by_digits else "0", phase == "scoring", NO_ANSWER.get(type(session.command))
-        ),
+        "no answer": Button(tr("No answer"), key, phase == "scoring", NO_ANSWER.get(type(session.command))),
         "end": Button(tr("New"), "Ctrl+N", sends=NewSession()) if session.is_over else end,
+        "undo": Button(undo, "Ctrl+Z", bool(session.redone) and phase in BEFORE_STROKE, steps.UndoRedo()),
     }
 
 
@@ -159,13 +161,6 @@ def _redo(targets: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     numbers = "–".join(str(trial.trial.number) for trial in targets)
     question = tr("Why redo {trials}? What was recorded there no longer counts.", trials=_name_trials(targets))
     return Button(tr("Redo {numbers}", numbers=numbers), "R", sends=sends, question=question)
-
-
-def _undo(session: SessionState) -> Button:
-    """Return the button that undoes the last redo, until the next stroke."""
-    numbers = "–".join(map(str, session.redone))
-    label = tr("Undo redo {numbers}", numbers=numbers)
-    return Button(label, "Ctrl+Z", bool(numbers) and session.phase in ("mounting", "taring", "ready"), steps.UndoRedo())
 
 
 def _undo_text(session: SessionState) -> str:
