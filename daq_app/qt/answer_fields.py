@@ -16,9 +16,9 @@ from PySide6.QtGui import (
     QTouchEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QAbstractSlider, QHBoxLayout, QLineEdit, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from daq_app.qt.parts import button, fill
+from daq_app.qt.parts import button, entry, fill
 from daq_app.qt.tokens import GRID, px, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject import LEAP, LENGTH, STEP, Answer, Choice, Device, Translate, Which
@@ -234,8 +234,7 @@ class NumberField(_Field):
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(now)
         self.point = "."  # of the subject's language
-        self.field = QLineEdit()
-        self.field.setAccessibleName(Text.OWN_NUMBER)
+        self.field = entry(Text.OWN_NUMBER)
         self.field.setFixedWidth(px(260))
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.field.setStyleSheet(f"font-size: {px(_LARGE)}px;")

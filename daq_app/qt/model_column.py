@@ -100,7 +100,7 @@ class ModelColumn(QWidget):
             self._film = film
             self._index = None if film is None else len(film.film.instants) - 1
             count = 0 if film is None else len(film.film.instants)
-            self.player.set_times([number / STEPS_A_SECOND for number in range(count)], max(count - 1, 0))
+            self.player.set_times([number / STEPS_A_SECOND for number in range(count)])
         row = selected_row(state)
         prediction, stroke = (None, None) if row is None else (row.prediction, row.stroke)
         self.history.setEnabled(film is None and prediction is not None and prediction.mu is not None)

@@ -133,6 +133,7 @@ class ComparedView(QWidget):
 
 def write_picture(canvas: FingerCanvas, heading: str, path: Path) -> None:
     """Write what `canvas` shows as the suffix says: `.svg`, `.csv` or PNG. `heading` stands over it. Raises OSError."""
+    buffer = QBuffer()
     match path.suffix.lower():
         case ".csv":
             frame, field = canvas.frame, canvas.look.field
@@ -141,20 +142,17 @@ def write_picture(canvas: FingerCanvas, heading: str, path: Path) -> None:
                 table = np.column_stack([frame.nodes, field.values_of(frame)])
                 rows.writelines(f"# {line}\n" for line in (*heading.split("\n"), canvas.accessibleName()) if line)
                 np.savetxt(rows, table, "%.9g", ",", header=f"x [mm],y [mm],{field.axis}", comments="")
-            write_whole(path, rows.getvalue().encode())
+            buffer.setData(rows.getvalue().encode())
         case ".svg":
-            buffer, drawing = QBuffer(), QSvgGenerator()
+            drawing = QSvgGenerator()
             drawing.setOutputDevice(buffer)
             drawing.setSize(canvas.size_with(heading))
             drawing.setViewBox(QRect(QPoint(), canvas.size_with(heading)))
             drawing.setTitle(canvas.accessibleName())
             canvas.draw(QPainter(drawing), heading)
-            write_whole(path, bytes(buffer.data().data()))
         case _:
-            buffer = QBuffer()
-            image = _image(canvas, _DENSITY, heading)
-            image.save(buffer, "PNG")  # pyrefly: ignore[no-matching-overload]
-            write_whole(path, bytes(buffer.data().data()))
+            _image(canvas, _DENSITY, heading).save(buffer, "PNG")  # pyrefly: ignore[no-matching-overload]
+    write_whole(path, bytes(buffer.data().data()))
 
 
 def _image(canvas: FingerCanvas, density: float, heading: str) -> QImage:

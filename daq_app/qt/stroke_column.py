@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
+from PySide6.QtWidgets import QFormLayout, QTabWidget, QWidget
 
 from daq_app.analyst import state as m
 from daq_app.analyst.session_words import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, selected_row
 from daq_app.analyst.stroke import Edge, History
-from daq_app.qt.parts import WrappedLabel, button, hbox, label, scroll_area, vbox
+from daq_app.qt.parts import WrappedLabel, button, entry, hbox, label, scroll_area, vbox
 from daq_app.qt.pictures import SaveButtons
 from daq_app.qt.preferences import settings
 from daq_app.qt.stroke_view import StrokeView
@@ -125,7 +125,7 @@ class StrokeColumn(QWidget):
         self.readings.show_readings(readings, None if stroke is None else stroke.steady)
         times: list[float] = [] if readings is None else readings.block.time.tolist()
         with QSignalBlocker(self.player):
-            self.player.set_times(times, max(len(times) - 1, 0))
+            self.player.set_times(times)
         if times and self._play_next:
             self._play_next = False
             self.player.toggle()
@@ -147,15 +147,12 @@ class DecisionsBar(QWidget):
 
     def __init__(self, ask: Callable[[m.Ask], None]) -> None:
         super().__init__()
-        self.author_field = QLineEdit(str(settings().value(AUTHOR, "")))
-        self.author_field.setPlaceholderText(NOBODY)
-        self.author_field.setAccessibleName(tr("code of who decides; never a name"))
+        self.author_field = entry(tr("code of who decides; never a name"), NOBODY)
+        self.author_field.setText(str(settings().value(AUTHOR, "")))
         self.author_field.setMaximumWidth(px(110))
         self.author_field.editingFinished.connect(lambda: settings().setValue(AUTHOR, self.author_field.text()))
-        self.reason_field = QLineEdit()
-        self.reason_field.setPlaceholderText(DRAGGED)
+        self.reason_field = entry(tr("why an edge is moved"), DRAGGED)
         self.reason_field.setMinimumWidth(QFontMetrics(font(TEXT)).horizontalAdvance(DRAGGED) + 3 * GRID)
-        self.reason_field.setAccessibleName(tr("why an edge is moved"))
         self.undo = button(tr("Undo"), "", lambda: ask(m.Undo(self.author())), "small")
         self.redo = button(tr("Redo"), "", lambda: ask(m.Undo(self.author(), redo=True)), "small")
         self.show_history(History())

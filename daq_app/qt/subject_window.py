@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, QLocale, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEvent
-from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
-from daq_app.qt.parts import button, hbox, label, set_text, stack_pages, vbox
+from daq_app.qt.parts import button, entry, hbox, label, set_text, stack_pages, vbox
 from daq_app.qt.preferences import LEAST, MOST, millimetres, store_ruler_length
 from daq_app.qt.tokens import GRID, font, px
 from daq_app.window.subject import Kind, SubjectView, translator
@@ -303,8 +303,7 @@ class RulerCheck(QWidget):
         self._line.setEnabled(False)
         self._line.setAccessibleName(tr("line of 100 millimetres to be measured"))
         sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
-        self._length = QLineEdit()
-        self._length.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
+        self._length = entry(tr("length of the line in millimetres, as the ruler says"))
         self._length.setFixedWidth(px(100))
         self._length.returnPressed.connect(self._keep)
         self._wrong = label("", "quiet", wrap=True)

@@ -56,8 +56,8 @@ class TransportBar(QWidget):
     def playing(self) -> bool:
         return self._line.state() == QTimeLine.State.Running
 
-    def set_times(self, times: Sequence[float], index: int = 0) -> None:
-        """Take the instants [s], rising, and stand at one of them; none of them: nothing can be played."""
+    def set_times(self, times: Sequence[float]) -> None:
+        """Take the instants [s], rising, and stand at the last; none of them: nothing can be played."""
         self._times = times
         self._line.stop()
         with QSignalBlocker(self.slider):
@@ -66,7 +66,7 @@ class TransportBar(QWidget):
         self._index = -1
         self._enable()
         if len(times):
-            self.seek(index)
+            self.seek(len(times) - 1)
         else:
             set_text(self.time_label, "")
 

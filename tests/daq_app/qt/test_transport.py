@@ -14,7 +14,8 @@ TIMES = [1.0, 1.5, 2.0, 4.0]
 def test_a_replay_stands_where_it_was_put_whatever_plays_and_however_fast(steps):
     bar, places = TransportBar("the replay"), []
     bar.moved.connect(places.append)
-    bar.set_times(TIMES, 1)
+    bar.set_times(TIMES)
+    bar.seek(1)
     for what, by in steps:
         before = places[-1]
         match what:
