@@ -23,7 +23,8 @@ from drivers.clock import RealClock, SimulatedClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame, SessionPlan
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
 from sessions.recording.schema import COLUMNS

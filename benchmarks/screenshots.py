@@ -21,7 +21,8 @@ from daq_app.recorder import messages as m
 from drivers.calibration import Calibration, loads
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import VisitSetting, plan, protocol
+from sessions.plan.protocols.planning import VisitSetting, plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Acknowledged, LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status

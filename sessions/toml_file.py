@@ -24,7 +24,7 @@ class SettingsError(ValueError):
     """A value in a file given by the user is wrong; the message names file, key, value and what is allowed."""
 
 
-class NotAllowed(ValueError):
+class NotAllowed(SettingsError):
     """A value that is out of its range; raised by a dataclass that checks itself when it is made."""
 
     def __init__(self, key: str, value: object, allowed: str) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from daq_app.console import WrongValue, point_advice
 from sessions.plan.plan import Finger, SessionPlan
-from sessions.plan.protocols import Body
+from sessions.plan.protocols.planning import Body
 from sessions.plan.protocols.protocol import HEIGHTS
 from sessions.plan.protocols.protocol import LARGEST_SEED as LARGEST
 from sessions.strokes.stroke import FIXED, HERTZ_EXPONENT, PLANNED_AT, AreaLaw

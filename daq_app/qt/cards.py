@@ -22,7 +22,7 @@ from daq_app.window.state import Message
 from daq_app.window.subject import LENGTH, SubjectText, translator
 from daq_app.window.view import BenchView, bench_summary
 from daq_app.wording import tr
-from sessions.plan.protocols.languages import ENGLISH
+from sessions.plan.protocols.protocol import ENGLISH
 
 
 class CardFrame(Panel):

@@ -37,8 +37,7 @@ from daq_app.window.new_session import (
 from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
-from sessions.plan.protocols import protocol_names
-from sessions.plan.protocols.languages import ENGLISH
+from sessions.plan.protocols.protocol import ENGLISH, protocol_names
 
 TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
 HANDS: tuple[Hand | None, ...] = (None, "right", "left")

@@ -13,7 +13,7 @@ from daq_app.qt.tokens import GRID, missing_glyphs, px
 from daq_app.window.new_session import Refusal, SessionForm
 from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, first_question, preview, translator
 from daq_app.wording import tr
-from sessions.plan.protocols.languages import ENGLISH
+from sessions.plan.protocols.protocol import ENGLISH
 
 THUMBNAIL_HEIGHT = 110  # before the font's scale [px]
 MIRROR_HEIGHT = 150  # of the picture, before the font's scale [px]

@@ -14,7 +14,7 @@ from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
 from daq_app.wording import tr, typed_number
 from sessions.plan.plan import Hand
-from sessions.plan.protocols.languages import ENGLISH
+from sessions.plan.protocols.protocol import ENGLISH
 
 _LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
 SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of it, until a page holds its texts

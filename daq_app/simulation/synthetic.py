@@ -23,7 +23,8 @@ from daq_app.simulation.wiring import INPUT, Connection, SimulatedPeople, connec
 from drivers.clock import Clock, SimulatedClock
 from sessions.file_access import holds_something, write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
-from sessions.plan.protocols import VisitSetting, plan, protocol
+from sessions.plan.protocols.planning import VisitSetting, plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.prediction import PredictionOptions
 from sessions.prediction.scenes import seds_at
 from sessions.recording import FleetingWriter, RecordingError, SessionWriter, Setting, provenance

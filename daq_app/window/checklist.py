@@ -7,7 +7,7 @@ from pathlib import Path
 
 from daq_app.window.new_session import Bench, SessionForm, enrolment, place_of, refusals
 from daq_app.wording import tr, tr_noop
-from sessions.plan.protocols import is_code
+from sessions.plan.protocols.planning import is_code
 from sessions.plan.study import is_study
 
 CARD_FIELDS: Mapping[str, tuple[str, ...]] = {

@@ -13,8 +13,8 @@ from daq_app.window.state import BenchState
 from daq_app.wording import sentence, tr, tr_noop, two_meanings, typed_number
 from sessions.file_access import failure_sentence
 from sessions.plan.plan import Frame, Hand, Phase
-from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, is_code, plan, protocol
-from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, phases_before
+from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, is_code, plan
+from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, Protocol, phases_before, protocol
 from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed

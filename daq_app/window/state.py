@@ -14,7 +14,7 @@ from daq_app.wording import tr
 from drivers.catalog import Probe
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame
-from sessions.plan.protocols.languages import ENGLISH
+from sessions.plan.protocols.protocol import ENGLISH
 from sessions.recording import LoggedEvent
 
 Link = Literal["none", "connecting", "open", "lost"]

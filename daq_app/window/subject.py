@@ -12,7 +12,7 @@ from daq_app.window.course_state import SessionState, begin_session, session_aft
 from daq_app.window.new_session import PILOT, Bench, Refusal, SessionForm, check_form
 from daq_app.wording import SUBJECT, tr, tr_noop, translations
 from sessions.plan.plan import Frame, Hand, SessionPlan
-from sessions.plan.protocols.languages import ENGLISH
+from sessions.plan.protocols.protocol import ENGLISH
 from sessions.run import machine, states, steps
 from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 

@@ -24,7 +24,7 @@ from sessions.plan.study import check_code
 from sessions.recording.head import Setting, provenance
 from sessions.recording.writer import SessionWriter
 from sessions.strokes import ZERO_SETTING, ZERO_STATED
-from sessions.toml_file import NotAllowed, SettingsError, check_range
+from sessions.toml_file import SettingsError, check_range
 
 TIME = "t"
 SKIPPED = "-"
@@ -171,10 +171,7 @@ class ImportOptions:
         """Check what can be checked without the file. Raises SettingsError."""
         if self.normal is not None and self.normal not in NORMALS:
             raise SettingsError(f'--normal "{self.normal}" is not allowed: it must be one of {", ".join(NORMALS)}')
-        try:
-            check_range("--height", self.height, *HEIGHTS, "mm")
-        except NotAllowed as error:
-            raise SettingsError(str(error)) from error
+        check_range("--height", self.height, *HEIGHTS, "mm")
         check_code("--subject", self.subject)
         if self.rate is not None and not 0.0 < self.rate <= FASTEST:
             raise SettingsError(

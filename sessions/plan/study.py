@@ -30,9 +30,9 @@ from sessions.file_access import (
 )
 from sessions.plan.orders import opaque_codes, shuffle
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.plan.protocols import CODE_RULE, Body, Labels, Protocol, StudyPlace, design_rows, is_code
-from sessions.plan.protocols.planning import check_body
-from sessions.toml_file import NotAllowed, SettingsError, from_toml
+from sessions.plan.protocols.planning import CODE_RULE, Body, StudyPlace, check_body, design_rows, is_code
+from sessions.plan.protocols.protocol import Labels, Protocol
+from sessions.toml_file import SettingsError, from_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,10 +264,7 @@ def enrol(folder: Path, subject: str, body: Body) -> Member:
     check_code("the subject", subject)
 
     def choose(study: Study) -> tuple[str, Mapping[str, Any]]:
-        try:
-            check_body(body, study.protocol)
-        except NotAllowed as error:
-            raise SettingsError(str(error)) from error
+        check_body(body, study.protocol)
         if subject in study.members:
             raise StudyError(f"{subject} was enrolled in {study.name} before: every subject has a code of its own")
         return "enrolled", {"slot": free_slot(list(study.members.values())), "body": msgspec.to_builtins(body)}

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from daq_app.recorder.messages import Connect, People, StartSession
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import VisitSetting, plan, protocol
+from sessions.plan.protocols.planning import VisitSetting, plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.run.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, Finish, Scored, StimulusMounted
 
 PACE = 20.0

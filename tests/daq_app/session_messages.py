@@ -9,7 +9,8 @@ from daq_app.window.course_state import Quality, Remark
 from daq_app.window.state import AppState, fold
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Acknowledged, LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status

@@ -13,8 +13,8 @@ from daq_app.simulation.wiring import SimulatedPeople, simulated_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.orders import next_comparison
 from sessions.plan.plan import Stimulus
-from sessions.plan.protocols import plan, protocol
-from sessions.plan.protocols.protocol import FOLDER
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import FOLDER, protocol
 from sessions.plan.study import StudyError, create_study
 from sessions.recording import Recording
 from sessions.recording.archive import problems

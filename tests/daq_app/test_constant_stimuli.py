@@ -10,7 +10,8 @@ from daq_app.console import Console
 from daq_app.simulation.synthetic import conduct
 from daq_app.simulation.wiring import SimulatedPeople, simulated_surface
 from drivers.clock import SimulatedClock
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording
 from sessions.report import experiments
 from sessions.report.tables.scales import (

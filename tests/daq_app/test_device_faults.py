@@ -22,7 +22,8 @@ from daq_app.window.view import bench_view
 from daq_app.wording import COUNT_LABELS
 from drivers.clock import RealClock
 from drivers.transducer import COUNTS, Health
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.run.runner import run_session
 from simulators.faults import Fault, Faults

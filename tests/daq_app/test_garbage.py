@@ -12,7 +12,7 @@ import pytest
 from recordings import record_session
 
 from daq_app.cli.main import run
-from sessions.plan.protocols import protocol_file
+from sessions.plan.protocols.protocol import protocol_file
 
 SCENE = """
 title = "a scene"

@@ -31,7 +31,8 @@ from daq_app.recorder.messages import (
 from daq_app.recorder.pipes import Outbox
 from drivers.transducer import Health
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import LoggedEvent, Setting
 from sessions.run.steps import AskScore, Scored, Zeroed
 

@@ -16,7 +16,8 @@ from daq_app.cli.terminal import Terminal
 from daq_app.console import Console, accept_any_text
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import SessionEnded
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording
 from sessions.run.steps import (
     Abort,

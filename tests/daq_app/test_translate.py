@@ -8,9 +8,8 @@ import pytest
 from daq_app.cli.main import run
 from daq_app.window.subject import SubjectText
 from daq_app.wording import translations
-from sessions.plan.protocols import plan, protocol
-from sessions.plan.protocols.planning import VisitSetting
-from sessions.plan.protocols.protocol import FOLDER
+from sessions.plan.protocols.planning import VisitSetting, plan
+from sessions.plan.protocols.protocol import FOLDER, protocol
 
 
 def test_tables_filled_in_at_the_end_of_a_protocol_are_its_new_language(tmp_path, capsys):

@@ -17,7 +17,8 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "sessions")]
 
 from stand_ins import Hands, ResumableClock, StandIn  # noqa: E402
 
-from sessions.plan.protocols import plan, protocol  # noqa: E402
+from sessions.plan.protocols.planning import plan  # noqa: E402
+from sessions.plan.protocols.protocol import protocol  # noqa: E402
 from sessions.recording import SessionWriter, provenance  # noqa: E402
 from sessions.recording.archive import seal  # noqa: E402
 from sessions.recording.schema import FORMAT_VERSION  # noqa: E402

@@ -3,7 +3,8 @@
 from faulty_disk import FULL, IOERR_WRITE, OK, faulty_disk
 from stand_ins import INFO, Hands, ResumableClock, StandIn
 
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.schema import event_row
 from sessions.run.resuming import check_resumable, resumption

@@ -4,7 +4,8 @@ from datetime import UTC, datetime, timedelta
 
 from stand_ins import INFO, Hands, ResumableClock, StandIn
 
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.run.resuming import check_resumable, continue_clock, resumed_data, resumption
 from sessions.run.runner import Continuation, run_session

@@ -1,7 +1,7 @@
 from simulated_session import PAPER, Session, once
 from stand_ins import Hands, ResumableClock
 
-from sessions.plan.protocols import VisitSetting, plan
+from sessions.plan.protocols.planning import VisitSetting, plan
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.run.event_log import event_of
 from sessions.run.runner import run_session

@@ -16,7 +16,8 @@ import pytest
 
 from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, relations, true_slopes
 from daq_app.simulation.wiring import simulated_surface
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.statistics.findings import CARRY_OVER, DRIFT, SED_TERM
 from sessions.statistics.pooled import pool_visits
 from sessions.statistics.visit import TrialRow, Visit

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sessions.plan.protocols import VisitSetting, plan, protocol, protocol_names
-from sessions.plan.protocols.protocol import FOLDER, Protocol
+from sessions.plan.protocols.planning import VisitSetting, plan
+from sessions.plan.protocols.protocol import FOLDER, Protocol, protocol, protocol_names
 from sessions.plan.study import create_study, open_study
 from sessions.toml_file import SettingsError, from_toml, toml_text
 

@@ -5,8 +5,8 @@ import pytest
 from protocol_texts import OWN
 
 from sessions.plan.plan import Blinded, Finger, Frame
-from sessions.plan.protocols import Body, StudyPlace, VisitSetting, plan, protocol, protocol_names
-from sessions.plan.protocols.protocol import FOLDER
+from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, plan
+from sessions.plan.protocols.protocol import FOLDER, protocol, protocol_names
 from sessions.toml_file import SettingsError
 
 PAPER = "sensotact-friction"

@@ -10,7 +10,8 @@ from stand_ins import INFO, Hands, ResumableClock, StandIn
 from drivers.transducer import LinkLost, SetupError
 from sessions.exchange.import_csv import import_csv
 from sessions.plan.plan import Rests
-from sessions.plan.protocols import plan, protocol, protocol_names
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol, protocol_names
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import seal
 from sessions.recording.replay import ReplayTransducer

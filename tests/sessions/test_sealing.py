@@ -6,7 +6,7 @@ import pytest
 from stand_ins import Hands, ResumableClock
 
 from daq_app.cli.main import run
-from sessions.plan.protocols import Body, plan
+from sessions.plan.protocols.planning import Body, plan
 from sessions.plan.protocols.protocol import FOLDER
 from sessions.plan.study import create_study, enrol, open_study, study_key
 from sessions.prediction.sealed_predictions import SEAL, digest, seal_prediction, sealed_sentence

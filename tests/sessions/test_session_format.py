@@ -12,7 +12,7 @@ from simulated_session import Session
 
 from drivers.transducer import COUNTS
 from sessions.plan.plan import Rests, Visibility
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -20,6 +20,7 @@ from sessions.plan.protocols.protocol import (
     PreEvaluation,
     Protocol,
     Scale,
+    protocol,
 )
 from sessions.recording.archive import seal
 from sessions.run import event_log

@@ -16,7 +16,7 @@ from stand_ins import Hands, ResumableClock
 
 from sessions.plan import study
 from sessions.plan.plan import Blinded, Finger
-from sessions.plan.protocols import Body, design_rows, plan
+from sessions.plan.protocols.planning import Body, design_rows, plan
 from sessions.plan.protocols.protocol import FOLDER
 from sessions.plan.study import (
     KEY_FILE,

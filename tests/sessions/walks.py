@@ -5,7 +5,8 @@ from dataclasses import replace
 from hypothesis import strategies as st
 
 from sessions.plan.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.run.machine import advance, start
 from sessions.run.states import Closing, Mounting, Paused, Ready, Resting, Scoring, Settling, Stroking, Taring
 from sessions.run.steps import (

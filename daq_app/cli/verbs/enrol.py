@@ -13,7 +13,7 @@ from daq_app.cli.options import add_body_arguments, add_seed, body_of
 from daq_app.console import DONE, Console, WrongValue, table
 from sessions.file_access import write_whole
 from sessions.plan import study as studies
-from sessions.plan.protocols import protocol_file
+from sessions.plan.protocols.protocol import protocol_file
 from sessions.plan.study import Member, Study, StudyError
 from sessions.recording.derived import check_replaceable
 from sessions.toml_file import text_of

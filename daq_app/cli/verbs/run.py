@@ -17,8 +17,8 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
 from drivers.transducer import flagged_words
 from sessions.plan.plan import Frame, Phase
-from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
-from sessions.plan.protocols.protocol import AREAS
+from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, plan
+from sessions.plan.protocols.protocol import AREAS, Protocol, protocol
 from sessions.plan.study import open_study, study_key
 from sessions.recording import Setting
 from sessions.run.resuming import RESUMABLE

@@ -24,7 +24,8 @@ from drivers.calibration import Calibration
 from drivers.clock import RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.head import SELFTEST_FORMAT, machine, software_versions, write_certificate
 from sessions.recording.schema import LIVE_FILE, event_row

@@ -15,9 +15,7 @@ from daq_app.console import DONE, Console, WrongValue
 from daq_app.window.subject import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
 from sessions.file_access import name_failure, write_whole
-from sessions.plan.protocols import protocol
-from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
-from sessions.plan.protocols.protocol import Protocol
+from sessions.plan.protocols.protocol import ENGLISH, PRE_EVALUATION, Protocol, Translation, check_language, protocol
 from sessions.prediction import QUANTITIES
 from sessions.recording import RecordingError
 from sessions.report.wording import shown_response

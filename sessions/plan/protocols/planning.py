@@ -20,7 +20,7 @@ from sessions.plan.plan import (
     Trial,
 )
 from sessions.plan.protocols.protocol import LARGEST_SEED, BlockOutline, Labels, Protocol, check_phases
-from sessions.toml_file import NotAllowed, SettingsError, check, check_range
+from sessions.toml_file import SettingsError, check, check_range
 
 DIRECTIONS = {"proximal to distal": PROXIMAL_TO_DISTAL, "distal to proximal": DISTAL_TO_PROXIMAL}
 
@@ -75,14 +75,11 @@ def plan(
     """
     subject_body, visit_setting = body or Body(), setting or VisitSetting()
     planned_phases = protocol.phases if phases is None else phases
-    try:
-        protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
-        check(is_code(subject), "subject", subject, CODE_RULE)
-        check_range("seed", seed, 0, LARGEST_SEED)
-        check_phases(protocol, planned_phases)
-        check_body(subject_body, protocol)
-    except NotAllowed as error:
-        raise SettingsError(str(error)) from error
+    protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
+    check(is_code(subject), "subject", subject, CODE_RULE)
+    check_range("seed", seed, 0, LARGEST_SEED)
+    check_phases(protocol, planned_phases)
+    check_body(subject_body, protocol)
     area = protocol.face.contact_area if visit_setting.contact_area is None else visit_setting.contact_area
     rows = design_rows(protocol)
     row = None if rows is None else (seed % rows if place is None else place.row - 1) % rows + 1

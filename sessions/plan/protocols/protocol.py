@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Literal
 
@@ -13,14 +13,6 @@ from msgspec import structs
 
 from sessions.plan.orders import draw, opaque_codes
 from sessions.plan.plan import Frame, Phase, Rests, Visibility
-from sessions.plan.protocols.languages import (
-    ENGLISH,
-    PRE_EVALUATION,
-    Translation,
-    check_language,
-    check_translations,
-    languages_of,
-)
 from sessions.toml_file import (
     NotAllowed,
     SettingsError,
@@ -36,6 +28,8 @@ FOLDER = Path(__file__).parent
 LARGEST_SEED = 2**31 - 1  # a whole number that every language can hold
 LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equality and any just noticeable difference
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
+PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
+ENGLISH = "en"
 
 
 class BlockOutline(msgspec.Struct, frozen=True):
@@ -91,6 +85,29 @@ class BlockOutline(msgspec.Struct, frozen=True):
         check(len(indices) > LEAST_COMPARISONS, "indices", indices, allowed)
         allowed = "with a standard it must be even, so that each comparison comes first as often as second"
         check(adaptive or self.repetitions % 2 == 0, "repetitions", self.repetitions, allowed)
+
+
+@dataclass(frozen=True, slots=True)
+class Translation:
+    """The texts of one block in one language; it has those that the block has."""
+
+    language: str  # two or three small letters, as ISO 639 has them
+    block: str  # its name, or "pre-evaluation" for the instruction of that phase
+    instruction: str
+    scale_ends: tuple[str, str] | None = None
+    question: str = ""  # needed for every block: the program's own question is English
+
+    def __post_init__(self) -> None:
+        """Check the language, and that nothing is empty."""
+        check_language("language", self.language)
+        check_text("instruction", self.instruction)
+        check_scale_ends(self.scale_ends)
+
+
+def check_language(key: str, language: str) -> None:
+    """Raise NotAllowed unless a text is the code of a language."""
+    if not re.fullmatch(r"[a-z]{2,3}", language):
+        raise NotAllowed(key, language, 'it must be the code of a language, two or three small letters such as "de"')
 
 
 HEIGHTS = (-500, 500)  # of a face above the transducer's origin [mm]
@@ -207,8 +224,7 @@ class Protocol:
             check(name not in names[:i], f"blocks[{i}].name", name, "no two blocks may have the same name")
             self._check_answers(f"blocks[{i}]", block)
             self._check_order(f"blocks[{i}]", block)
-        scale_ends = {block.name: block.scale_ends for block in self.blocks}
-        check_translations(self.translations, scale_ends, self.language, pre_evaluation=self.pre_evaluation is not None)
+        self._check_translations()
 
     @property
     def labels(self) -> Labels:
@@ -228,7 +244,7 @@ class Protocol:
     @property
     def languages(self) -> tuple[str, ...]:
         """Return the languages that subjects may read, the protocol's own first."""
-        return (self.language, *languages_of(self.translations))
+        return tuple(dict.fromkeys((self.language, *(texts.language for texts in self.translations))))
 
     def in_language(self, language: str) -> "Protocol":
         """Return the protocol with its texts in a language. Raises NotAllowed where it has none."""
@@ -260,6 +276,29 @@ class Protocol:
             check(len(block.practice) != 1, f"{key}.practice", list(block.practice), "a choice takes at least two")
         elif block.standard is not None:
             raise NotAllowed(f"{key}.standard", block.standard, "only a choice of two compares with a standard")
+
+    def _check_translations(self) -> None:
+        """Check that each language has every text of the protocol once, and none that it has not."""
+        scale_ends = {block.name: block.scale_ends for block in self.blocks}
+        names = [*scale_ends, *([PRE_EVALUATION] if self.pre_evaluation is not None else [])]
+        translated: set[tuple[str, str]] = set()
+        for number, translation in enumerate(self.translations):
+            key, language, block = f"translations[{number}]", translation.language, translation.block
+            allowed = "it is the protocol's own: its texts stand in the blocks"
+            check(language != self.language, f"{key}.language", language, allowed)
+            check(block in names, f"{key}.block", block, f"it must be one of {', '.join(names)}")
+            is_new = (language, block) not in translated
+            check(is_new, f"{key}.block", block, f'"{language}" has its texts already')
+            translated.add((language, block))
+            ends = translation.scale_ends
+            remedy = "name both ends of its line" if ends is None else "it has no line: leave its ends out"
+            check((ends is None) == (scale_ends.get(block) is None), f"{key}.scale_ends", ends and list(ends), remedy)
+            has_question = block not in scale_ends or bool(translation.question.strip())
+            allowed = f"say what is asked of {block} in this language"
+            check(has_question, f"{key}.question", translation.question, allowed)
+        for language, block in product(self.languages[1:], names):
+            has_texts = (language, block) in translated
+            check(has_texts, "translations", language, f'the texts of {block} are missing in "{language}"')
 
     def _check_order(self, key: str, block: BlockOutline) -> None:
         if self.order.constrained and (self.order.rule == "williams" or self.scale.answer == "choice"):

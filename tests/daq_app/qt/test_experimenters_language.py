@@ -24,7 +24,7 @@ from daq_app.cli.verbs.translate import window_texts
 from daq_app.qt import preferences
 from daq_app.wording import EXPERIMENTER, VARIABLE, languages, tr, translations
 from sessions.exchange import FORMATS
-from sessions.plan.protocols import protocol_names
+from sessions.plan.protocols.protocol import protocol_names
 from tests.daq_app.qt.painted_text import painted_texts, paints_by_hand
 
 pytestmark = pytest.mark.qt

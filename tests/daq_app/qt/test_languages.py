@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QLabel
 from daq_app.qt.tokens import missing_glyphs
 from daq_app.window.subject import SubjectText, SubjectView, translator
 from daq_app.wording import SUBJECT, translations
-from sessions.plan.protocols import protocol
+from sessions.plan.protocols.protocol import protocol
 
 pytestmark = pytest.mark.qt
 TRANSLATED = ("de", "fr", "ja", "ar")

@@ -41,7 +41,7 @@ from daq_app.window.live_trace import CHANNELS, Columns
 from daq_app.window.new_session import SessionForm
 from daq_app.window.subject import preview, translator
 from daq_app.window.view import derive_view
-from sessions.plan.protocols import protocol, protocol_names
+from sessions.plan.protocols.protocol import protocol, protocol_names
 from tests.daq_app.qt.painted_text import contrast, cut_or_colliding, painted_texts
 from tests.daq_app.qt.review.examples import SESSION, Nobody, film
 from tests.daq_app.qt.written_text import ROUNDING, cut_off

@@ -17,7 +17,7 @@ from qt_events import click
 from daq_app.qt import header
 from daq_app.qt.header import Notice
 from daq_app.window.view import Banner
-from sessions.plan.protocols import protocol_file
+from sessions.plan.protocols.protocol import protocol_file
 from sessions.plan.study import create_study
 
 pytestmark = pytest.mark.qt

@@ -8,7 +8,8 @@ import pytest
 from daq_app.window.checklist import checklist, codes_in, headline, next_code
 from daq_app.window.new_session import Bench, SessionForm
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import Body, protocol_file
+from sessions.plan.protocols.planning import Body
+from sessions.plan.protocols.protocol import protocol_file
 from sessions.plan.study import create_study, enrol
 from sessions.recording import storage
 

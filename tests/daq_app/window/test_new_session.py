@@ -22,7 +22,8 @@ from daq_app.window.new_session import (
     unfinished_sessions,
 )
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import Body, protocol_file, protocol_names
+from sessions.plan.protocols.planning import Body
+from sessions.plan.protocols.protocol import protocol_file, protocol_names
 from sessions.plan.study import create_study, enrol, study_key, withdraw
 
 NOW = datetime(2026, 3, 1, 14, 30, 5)

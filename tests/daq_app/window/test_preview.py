@@ -7,7 +7,7 @@ import pytest
 from daq_app.window.new_session import Refusal, SessionForm
 from daq_app.window.subject import mirror_view, preview, subject_view
 from sessions.plan.plan import Visibility
-from sessions.plan.protocols import protocol, protocol_names
+from sessions.plan.protocols.protocol import protocol, protocol_names
 from tests.daq_app.session_messages import PLAN, READY, after
 
 ANSWERS = {

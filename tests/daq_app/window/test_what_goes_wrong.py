@@ -27,7 +27,8 @@ from daq_app.recorder import messages as m
 from daq_app.window.course_state import Judged
 from daq_app.window.subject import owner
 from daq_app.window.view import derive_view
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import plan
+from sessions.plan.protocols.protocol import protocol
 from sessions.run import steps
 
 NO_RECORDER = m.Gone(False, "the recorder has ended unexpectedly (signal 9)")
