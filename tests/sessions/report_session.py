@@ -8,9 +8,10 @@ from stand_ins import CALIBRATION, INFO, RATE
 
 from drivers.clock import SimulatedClock
 from drivers.readings import ReadingBlock
-from sessions.plan import protocols
 from sessions.plan.plan import Frame
 from sessions.plan.protocols.planning import VisitSetting
+from sessions.plan.protocols.planning import plan as plan_of
+from sessions.plan.protocols.protocol import protocol
 from sessions.recording import SessionWriter, provenance
 from simulators.bench import Bench
 from simulators.stroke import paper_surfaces
@@ -22,9 +23,9 @@ FRAME = Frame("-z", "set", 20.0, "measured")
 
 def plan(subject="P01", *, forces=True, per_block=5):
     """Return the paper's experiment on the first surfaces of each block."""
-    paper = protocols.protocol("sensotact-friction")
+    paper = protocol("sensotact-friction")
     blocks = tuple(structs.replace(block, indices=block.indices[:per_block], practice=()) for block in paper.blocks)
-    return protocols.plan(replace(paper, blocks=blocks), subject, 7, forces=forces, setting=VisitSetting(frame=FRAME))
+    return plan_of(replace(paper, blocks=blocks), subject, 7, forces=forces, setting=VisitSetting(frame=FRAME))
 
 
 def record(folder, *, seed=1, subject="P01", forces=True, per_block=5, discard=None):
