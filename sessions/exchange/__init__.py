@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sessions.file_access import holds_something, remedy, whole_folder
+from sessions.file_access import holds_something, name_failure, whole_folder
 from sessions.recording import Recording
 
 Progress = Callable[[float], None]  # part done, 0 to 1
@@ -45,11 +45,9 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress = l
     """
     if holds_something(folder):
         raise ExportError(f"{folder} is not empty; give a new folder, for nothing is written over")
-    try:
-        with whole_folder(folder) as unfinished:
-            importlib.import_module(FORMATS[name]).write(source, unfinished, progress)
-    except OSError as error:
-        raise ExportError(
-            f"{folder} cannot be written ({error.strerror or error}); {remedy(error, new=True)}, or give another folder"
-        ) from error
+    with (
+        name_failure(ExportError, f"{folder} cannot be written", ", or give another folder", new=True),
+        whole_folder(folder) as unfinished,
+    ):
+        importlib.import_module(FORMATS[name]).write(source, unfinished, progress)
     return folder

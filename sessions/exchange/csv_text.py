@@ -18,7 +18,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from sessions.exchange.session_tables import WRENCH, Column
-from sessions.file_access import LARGEST_TABLE, read_within_limit, remedy
+from sessions.file_access import LARGEST_TABLE, name_failure, read_within_limit
 from sessions.prediction.press_curves import DisplacementLog
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -50,13 +50,7 @@ def write_rows(file: TextIO, rows: Iterable[Sequence[Any]], delimiter: str = ","
 
 
 def _begins_like_a_formula(text: str) -> bool:
-    if not text.lstrip("'").startswith(_FORMULA):
-        return False
-    try:
-        float(text)
-    except ValueError:
-        return True
-    return False
+    return text.lstrip("'").startswith(_FORMULA) and number_in(text) is None
 
 
 COMMENT = "#"
@@ -69,10 +63,8 @@ class ImportRefused(Exception):
 
 def content_of(path: Path) -> bytes:
     """Return what a CSV file holds. Raises ImportRefused where it cannot be read."""
-    try:
+    with name_failure(ImportRefused, f"{path} cannot be read"):
         return read_within_limit(path, LARGEST_TABLE)
-    except OSError as error:
-        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:

@@ -147,8 +147,7 @@ def read_export(path: Path) -> ExportedSession | None:
             try:
                 return module.read(file)
             except _DAMAGED as error:
-                sentence = f"{path} cannot be read as an export ({_sentence(error)}); {_remedy(error)}"
-                raise ImportRefused(sentence) from error
+                raise _refusal(f"{path} cannot be read as an export", error) from error
     if path.suffix == ".nwb" or any(path.glob("*.nwb")):
         raise ImportRefused(f"{path} is an export for other programs alone; give one as csv, bids or hdf5")
     if path.is_dir():
@@ -171,19 +170,18 @@ def import_session(source: ExportedSession, folder: Path) -> RestoreResult:
     except FileExistsError as error:
         raise NotEmpty(folder) from error
     except _DAMAGED as error:
-        raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error
+        raise _refusal(f"{source.path} is damaged", error) from error
     recording = Recording.open(folder)
     return RestoreResult(sum(len(block) for block in recording.blocks()), len(recording.events), differences)
 
 
-def _remedy(error: Exception) -> str:
-    if isinstance(error, OSError) and error.errno not in (None, errno.ENOENT):
-        return remedy(error)
-    return "export the session anew"
-
-
-def _sentence(error: Exception) -> str:
+def _refusal(problem: str, error: Exception) -> ImportRefused:
+    """Return a sentence on an export: the problem, its cause, and what to do."""
+    cause, advice = " ".join(str(error).split()), "export the session anew"
+    if isinstance(error, KeyError):
+        cause += " is missing"
     if isinstance(error, OSError) and error.filename and error.strerror:
-        return f"{Path(error.filename).name}: {error.strerror.lower()}"
-    sentence = " ".join(str(error).split())
-    return f"{sentence} is missing" if isinstance(error, KeyError) else sentence
+        cause = f"{Path(error.filename).name}: {error.strerror.lower()}"
+    if isinstance(error, OSError) and error.errno not in (None, errno.ENOENT):
+        advice = remedy(error)
+    return ImportRefused(f"{problem} ({cause}); {advice}")

@@ -49,7 +49,7 @@ class Columns:
     time_unit: str
     axes: tuple[int, ...]  # positions of Fx Fy Fz Tx Ty Tz
     units: tuple[str, str]  # of forces and of torques
-    units_from: str  # "header" or "set"
+    units_origin: Origin
 
     @property
     def scales(self) -> tuple[float, ...]:
@@ -101,14 +101,13 @@ def columns(
             f'the time is in "{time_unit}", which is none of {", ".join(TIME_UNITS)}: convert the file'
         )
     stated_names = [*(axes or ()), *(f"column {i + 1}" for i in range(len(axes or ()), width))]
-    by_user = units is not None or axes is not None
     return Columns(
         tuple(stated_names if header is None else header),
         positions.get(TIME),
         time_unit,
         tuple(positions[axis] for axis in AXES),
         (force, torque),
-        "set" if by_user else "header",
+        "measured" if units is None and axes is None else "set",
     )
 
 
@@ -210,12 +209,11 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
             f"unit in the header ({', '.join(TIME_UNITS)}), or give a higher --rate"
         )
     block = _block(time, rows[:, list(layout.axes)])
-    digest = hashlib.sha256(content).hexdigest()
     clock = StillClock(int(block.received_ns[-1]))
     source = {
         "file": path.name,
         "bytes": len(content),
-        "sha256": digest,
+        "sha256": hashlib.sha256(content).hexdigest(),
         "kept_as": ORIGINAL_FILE,
         "columns": list(layout.names),
         "extra_columns": list(layout.extra),
@@ -356,10 +354,9 @@ def _info(
 
 
 def _settings(layout: Columns, frame: Frame, rate: float, rate_origin: Origin, options: ImportOptions) -> list[Setting]:
-    units: Origin = "measured" if layout.units_from == "header" else "set"
     return [
-        Setting("force unit", layout.units[0], "", units),
-        Setting("torque unit", layout.units[1], "", units),
+        Setting("force unit", layout.units[0], "", layout.units_origin),
+        Setting("torque unit", layout.units[1], "", layout.units_origin),
         Setting("normal", frame.normal, "", frame.normal_origin),
         Setting("height", frame.height, "mm", frame.height_origin),
         Setting("rate", rate, "Hz", rate_origin),

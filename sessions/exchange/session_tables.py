@@ -81,14 +81,6 @@ _PREDICTION = _columns(TrialPrediction, "prediction")
 FLAW, DECISION, _ANSWER, POSITION, RESPONSE = map(_columns_of, ("flaw", "decision", "answer", "position", "response"))
 
 _SUBTABLES = ("solver", "alternatives", "interval", "opposite_interval")
-_OF_INTERVALS = (
-    *("mu", "tau_max", "sed", "opposite_sed", "normal_force", "tangential_force", "indentation", "matching_depth"),
-    "mu_dynamic",
-)
-_PAIRS = {"steady": ("start", "stop")} | dict.fromkeys(
-    (*(f"{name}_interval" for name in _OF_INTERVALS), *(f"{name}_bootstrap" for name in NUMBERS)), ("low", "high")
-)
-
 EACH_EVENT = "a row for each thing that happened, in order"
 
 
@@ -176,7 +168,13 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
         for row in prediction["trials"]
     ]
     yield _table("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
-    yield from _responses(prediction)
+    responses = [
+        {"trial": row["trial"], "quantity": name, **response}
+        for row in prediction["trials"]
+        for name, response in (row.get("solver") or {}).get("responses", {}).items()  # which older ones do not hold
+    ]
+    if responses:
+        yield _table("responses", "every quantity at the ending for each predicted trial", responses, RESPONSE)
     variants = [
         {
             "trial": row["trial"],
@@ -199,18 +197,6 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
 
 def _without(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
     return {name: value for name, value in row.items() if name not in names}
-
-
-def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
-    """Return the table of every quantity at the ending, where the prediction holds them: older ones do not."""
-    rows: list[dict[str, Any]] = [
-        {"trial": row["trial"], "quantity": name, **response}
-        for row in prediction["trials"]
-        if row.get("solver")
-        for name, response in row["solver"].get("responses", {}).items()
-    ]
-    meaning = "every quantity at the ending for each predicted trial"
-    return (_table("responses", meaning, rows, RESPONSE),) if rows else ()
 
 
 def _sed_interval(name: str, interval: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -360,14 +346,17 @@ def _table(
 
 
 def _names(column: str) -> tuple[str, ...]:
-    return tuple(f"{column}_{suffix}" for suffix in _PAIRS[column]) if column in _PAIRS else (column,)
+    """Return the columns that hold a value: two of a span or an interval."""
+    if column == "steady":
+        return ("steady_start", "steady_stop")
+    return (f"{column}_low", f"{column}_high") if column.endswith(("_interval", "_bootstrap")) else (column,)
 
 
 def _flat(row: Mapping[str, Any]) -> Iterable[tuple[str, Cell]]:
     """Yield the cells of a row: pairs and stimuli as several, texts joined, other lists as JSON."""
     for name, value in row.items():
-        if name in _PAIRS:
-            yield from zip(_names(name), value or (None, None), strict=True)
+        if len(names := _names(name)) > 1:
+            yield from zip(names, value or (None, None), strict=True)
         elif isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in cast("Sequence[Any]", value)):
             yield name, "; ".join(cast("Sequence[str]", value)) or None
         elif isinstance(value, Mapping) and name == "stimulus":
