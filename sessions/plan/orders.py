@@ -138,10 +138,7 @@ def next_comparison(candidates: Sequence[Stimulus], answers: Sequence[tuple[Stim
 
 
 def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stimulus, bool]]) -> SessionPlan:
-    """Return the plan in which the pair that begins with a trial compares what the answers of its block ask for.
-
-    The same plan where the trial begins no pair of an adaptive block.
-    """
+    """Return the plan in which an adaptive pair that begins with a trial compares what the answers ask for."""
     block = next(block for block in plan.blocks if any(trial.number == number for trial in block.trials))
     if not block.candidates or number not in {trial.compared_with for trial in block.trials}:
         return plan

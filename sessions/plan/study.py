@@ -22,6 +22,7 @@ import msgspec
 
 from sessions.file_access import (
     DATABASE_FAILURES,
+    as_type,
     json_object,
     limit_values,
     name_failure,
@@ -35,18 +36,24 @@ from sessions.plan.protocols.protocol import Labels, Protocol
 from sessions.toml_file import SettingsError, from_toml
 
 
-@dataclass(frozen=True, slots=True)
-class Key:
+class KeyedStimulus(msgspec.Struct, frozen=True):
+    """The stimulus that bears a code."""
+
+    descriptor: str
+    index: int
+
+
+class Key(msgspec.Struct, frozen=True):
     """Which stimulus bears which code, throughout a study."""
 
     salt: str  # hexadecimal, by chance: without it the few possible keys could be tried one by one
-    stimuli: Mapping[str, tuple[str, int]]  # code -> descriptor and index
+    stimuli: dict[str, KeyedStimulus]  # by code
 
     @property
     def sha256(self) -> str:
         """Return the SHA-256 of the UTF-8 text "salt", then a line "code descriptor index" each, codes sorted."""
-        stimuli = sorted(self.stimuli.items())
-        lines = [self.salt, *(f"{code} {descriptor} {index}" for code, (descriptor, index) in stimuli)]
+        stimuli = (f"{code} {s.descriptor} {s.index}" for code, s in sorted(self.stimuli.items()))
+        lines = [self.salt, *stimuli]
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def seal(self) -> str:
@@ -56,33 +63,23 @@ class Key:
     @property
     def labels(self) -> Labels:
         """Return the code of each stimulus."""
-        return {stimulus: code for code, stimulus in self.stimuli.items()}
+        return {(stimulus.descriptor, stimulus.index): code for code, stimulus in self.stimuli.items()}
 
     @staticmethod
     def unseal(text: str) -> "Key":
         """Return the key that `seal` gave the text for. Raises ValueError where it is none."""
-        return Key.from_dict(json.loads(base64.b64decode(text, validate=True)))
+        return as_type(json_object(base64.b64decode(text, validate=True)), Key)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        stimuli = {code: {"descriptor": name, "index": index} for code, (name, index) in sorted(self.stimuli.items())}
-        return {"salt": self.salt, "stimuli": stimuli}
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> "Key":
-        """Return the key that `to_dict` gave `data` for. Raises ValueError where it is none."""
-        try:
-            stimuli = {code: (str(entry["descriptor"]), int(entry["index"])) for code, entry in data["stimuli"].items()}
-            return Key(str(data["salt"]), stimuli)
-        except (KeyError, TypeError, AttributeError) as error:
-            raise ValueError(f"this is no key of a study ({error})") from error
+        """Return it as plain data, codes sorted."""
+        return msgspec.to_builtins(self, order="sorted")
 
     def reveal(self, trial: Trial) -> Trial:
         """Return a trial with the index of its stimulus. Raises ValueError where the key lacks its code."""
         stimulus = self.stimuli.get(trial.stimulus.code)
         if stimulus is None:
             raise ValueError(f"the key has no stimulus {trial.stimulus.code}")
-        return replace(trial, stimulus=replace(trial.stimulus, index=stimulus[1]))
+        return replace(trial, stimulus=replace(trial.stimulus, index=stimulus.index))
 
     def plan(self, plan: SessionPlan) -> SessionPlan:
         """Return a blinded plan with the index of every stimulus."""
@@ -306,7 +303,7 @@ def study_key(folder: Path) -> Key | None:
 
 
 def _new_key(protocol: Protocol) -> Key:
-    stimuli = list(protocol.labels)
+    stimuli = [KeyedStimulus(*stimulus) for stimulus in protocol.labels]
     codes = opaque_codes(len(stimuli), secrets.randbelow(2**31))
     return Key(secrets.token_hex(16), dict(zip(codes, stimuli, strict=True)))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from sessions.file_access import json_object, json_text, name_failure, read_within_limit, write_whole
+from sessions.file_access import as_type, json_object, json_text, name_failure, read_within_limit, write_whole
 from sessions.plan.study import Key
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
@@ -189,10 +189,7 @@ UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
 
 
 def reveal(recording: Recording) -> Recording:
-    """Return a session with the indices of its stimuli once its key has been opened; until then as it is.
-
-    Raises RecordingError where the opened key is not the one that was sealed.
-    """
+    """Return a session with the indices of its stimuli once its key was opened. Raises RecordingError for a wrong key."""
     if not recording.plan.blinded:
         return recording
     stored = load_derived(recording.folder, UNBLINDING)
@@ -200,7 +197,7 @@ def reveal(recording: Recording) -> Recording:
         return recording
     path = recording.folder / UNBLINDING
     try:
-        key = Key.from_dict(stored["key"])
+        key = as_type(stored["key"], Key)
         if key.sha256 != recording.plan.key_sha256:
             raise ValueError("its SHA-256 is not that in the plan")
         plan = key.plan(recording.plan)
@@ -212,10 +209,7 @@ def reveal(recording: Recording) -> Recording:
 
 
 def session_folders(folder: Path) -> tuple[Path, ...]:
-    """Return the session folders in a folder, by name, those without their recording or out of reach too, to be named.
-
-    Raises OSError.
-    """
+    """Return the session folders in a folder, by name, also those that lack their recording. Raises OSError."""
     return tuple(sorted(path for path in folder.iterdir() if _may_hold_session(path)))
 
 

@@ -81,13 +81,14 @@ def release_reserve(folder: Path) -> None:
         (folder / RESERVE_FILE).unlink(missing_ok=True)
 
 
-# File systems whose blocks lie on another computer, as Linux (/proc/mounts) and macOS (mount) name them.
-NETWORK = re.compile(
+# File systems whose blocks lie on another computer, on the host of a virtual machine, or in a cloud, as Linux
+# (/proc/mounts) and macOS (mount) name them.
+REMOTE = re.compile(
     r"nfs[34]?|cifs|smb[23]|smbfs|afpfs|webdav|davfs2?|ncpfs|afs|coda|ceph|glusterfs|lustre|gpfs|beegfs|orangefs|pvfs2"
     r"|fuse\.(sshfs|rclone|davfs2?|glusterfs|ceph|s3fs|gcsfuse|goofys|curlftpfs|smbnetfs|mfs|juicefs)|(osx|mac)fuse_sshfs"
+    r"|vboxsf|vmhgfs|fuse\.vmhgfs-fuse|prl_fs|drvfs"
+    r"|fuse\.(google-drive-ocamlfuse|onedriver|dropbox|pcloud|insync|mega|keybase|expandrive)"
 )
-SHARED_FOLDERS = re.compile(r"vboxsf|vmhgfs|fuse\.vmhgfs-fuse|prl_fs|drvfs")  # of a virtual machine's host
-CLOUD = re.compile(r"fuse\.(google-drive-ocamlfuse|onedriver|dropbox|pcloud|insync|mega|keybase|expandrive)")
 # Names of folders under which a synchronising program keeps its files, as those programs call them.
 SYNC_FOLDERS: tuple[tuple[str, str], ...] = (
     (r"dropbox( \(.*\))?", "Dropbox"),
@@ -155,11 +156,10 @@ def innermost(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
 def network_mount(path: PurePath, mounts: Iterable[Mount]) -> Mount | None:
     """Return the mount that holds `path` where that lies on another computer, else None."""
     mount = innermost(path, mounts)
-    if mount is None:
-        return None
-    windows_drive = mount.kind == "9p" and re.match(r"([A-Z]:|drvfs)", mount.source) is not None  # seen from WSL
-    remote = any(pattern.fullmatch(mount.kind) for pattern in (NETWORK, SHARED_FOLDERS, CLOUD))
-    return mount if remote or windows_drive else None
+    if mount is None or REMOTE.fullmatch(mount.kind):
+        return mount
+    windows_drive = mount.kind == "9p" and re.match(r"([A-Z]:|drvfs)", mount.source)  # seen from WSL
+    return mount if windows_drive else None
 
 
 def sync_folder_above(path: PurePath) -> str | None:

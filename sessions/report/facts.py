@@ -259,14 +259,10 @@ def reproduction_facts(recording: Recording, analysis: Analysis) -> tuple[Fact, 
         for name, entry in settings.items()
     ]
     if info is not None:
-        facts.append(Fact("analysis", "; ".join(_describe_settings(analysis.settings))))
+        usual = dict(leaves(asdict(AnalysisSettings())))
+        analysis_settings = (
+            f"{name} {f'{value:g}' if isinstance(value, float) else value}{'' if value == usual[name] else ' (set)'}"
+            for name, value in leaves(asdict(analysis.settings))
+        )
+        facts.append(Fact("analysis", "; ".join(analysis_settings)))
     return tuple(fact for fact in facts if fact.value)
-
-
-def _describe_settings(settings: AnalysisSettings) -> list[str]:
-    """Return every setting with its value; those that differ from the usual ones are marked."""
-    usual = dict(leaves(asdict(AnalysisSettings())))
-    return [
-        f"{name} {f'{value:g}' if isinstance(value, float) else value}{'' if value == usual[name] else ' (set)'}"
-        for name, value in leaves(asdict(settings))
-    ]

@@ -31,10 +31,7 @@ _NumberOf = Callable[[PredictionFinding], float | None]
 
 
 def doubts(report: Report) -> tuple[str, ...]:
-    """Return what would change the sign of r between prediction and scores; nothing where there is no r.
-
-    That is the other strain, the ending's place, a given force, and another finger.
-    """
+    """Return what would change the sign of r between prediction and scores; nothing where there is no r."""
     if all(p.sed is None for p in report.predictions) or not report.scored:
         return ()
     strain: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"

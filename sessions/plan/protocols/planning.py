@@ -137,10 +137,7 @@ def design_rows(protocol: Protocol) -> int | None:
 
 
 def block_order(protocol: Protocol, number: int) -> tuple[BlockOutline, ...]:
-    """Return the blocks as a subject meets them; counterbalanced ones begin one later with each `number`, from 0.
-
-    With two blocks half of all subjects begin with each; with more, each block comes equally often at each place.
-    """
+    """Return the blocks as a subject meets them; counterbalanced ones begin one later with each `number`, from 0."""
     start = number % len(protocol.blocks) if protocol.order.blocks == "counterbalanced" else 0
     return protocol.blocks[start:] + protocol.blocks[:start]
 
